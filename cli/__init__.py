@@ -1,0 +1,1 @@
+"""The command line of zfcal: parse, load, call one function, write."""

@@ -1,0 +1,1 @@
+"""Schemas of every artifact, as data files; installed as ``zfcal.schemas``."""

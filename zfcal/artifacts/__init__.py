@@ -1,0 +1,1 @@
+"""Files of a trial: formats, provenance, staleness and locks; nothing of behaviour or models."""

@@ -1,0 +1,1 @@
+"""The search for parameters with which the model reproduces measured statistics."""
