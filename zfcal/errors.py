@@ -1,0 +1,66 @@
+"""Everything that can go wrong and that a person can mend.
+
+::
+
+    ZfcalError            exit 1
+    ├── InputError        what a person gave is wrong: a value, a file, an option
+    │   └── SchemaError   an artifact of another schema or version
+    ├── DamagedError      a file that cannot be read whole; the rest goes on, exit 3
+    ├── StorageError      the disk is full, or a place cannot be written
+    └── LockedError       the same command is at work on the same trial, exit 75
+
+A message says what, where, expected and got; the hint says what to do. The
+command line alone turns these into text. Anything else that escapes is a bug.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class ZfcalError(Exception):
+    """Base class; the command line prints it without a traceback.
+
+    Parameters
+    ----------
+    message
+        What is wrong and where, with the value that was found.
+    hint
+        What to do about it.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class InputError(ZfcalError):
+    """Something that a person gave is wrong."""
+
+
+class SchemaError(InputError):
+    """An artifact was written with another schema, or another version of it."""
+
+    def __init__(self, path: Path | str, *, found: str, wanted: str) -> None:
+        super().__init__(
+            f"{path}: schema is {found!r}, expected {wanted!r}.",
+            hint="See what the file is with: zfcal inspect FILE",
+        )
+
+
+class DamagedError(ZfcalError):
+    """A file cannot be read whole; it is left out and the rest goes on."""
+
+    exit_code = 3
+
+
+class StorageError(ZfcalError):
+    """A file cannot be written: the disk is full or the place is closed."""
+
+
+class LockedError(ZfcalError):
+    """The same command is already at work on the same trial."""
+
+    exit_code = 75

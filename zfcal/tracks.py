@@ -1,0 +1,118 @@
+"""Positions of agents over time: as measured (rows) and on the model's clock.
+
+The two shapes in which every other part sees a trial. Files are read in
+``artifacts``; statistics are taken in ``behaviour``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.errors import InputError
+
+FISH = 0
+ROBOT = 1
+KINDS = ("fish", "robot")
+"""Names of the kinds, in the order of their codes."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracks:
+    """One row per agent and frame in which it was seen; sorted by frame, then agent.
+
+    Parameters
+    ----------
+    time_s : ndarray of float64, shape (row,)
+        Seconds since the start of the trial.
+    frame : ndarray of int64, shape (row,)
+    agent : ndarray of int32, shape (row,)
+        Track id, unique in the trial; a lost agent returns under a new id.
+    kind : ndarray of int8, shape (row,)
+        Index into `KINDS`.
+    x_m, y_m : ndarray of float64, shape (row,)
+        Position in metres, finite.
+    heading_rad : ndarray of float32, shape (row,)
+        Counter-clockwise from x; NaN where unknown.
+    confidence : ndarray of float32, shape (row,)
+        In [0, 1]; below 0.5 a position is a guess.
+    """
+
+    time_s: Floats
+    frame: NDArray[np.int64]
+    agent: NDArray[np.int32]
+    kind: NDArray[np.int8]
+    x_m: Floats
+    y_m: Floats
+    heading_rad: NDArray[np.float32]
+    confidence: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        sizes = {field.name: getattr(self, field.name).shape for field in fields(self)}
+        if len(set(sizes.values())) != 1:
+            raise InputError(f"Tracks need columns of one length, got {sizes}.")
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Tracks:
+        """Return the chosen rows, in the order in which they are chosen."""
+        return Tracks(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+
+def concatenate(parts: list[Tracks]) -> Tracks:
+    """Return the rows of several tracks, sorted by frame, then agent."""
+    joined = Tracks(
+        **{
+            f.name: np.concatenate([getattr(part, f.name) for part in parts])
+            for f in fields(Tracks)
+        }
+    )
+    return joined.take(np.lexsort((joined.agent, joined.frame)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """Agents on the model's clock: sample k is the state at ``k * dt_s``.
+
+    Parameters
+    ----------
+    dt_s
+        The model's step, in seconds.
+    k : ndarray of int64, shape (sample,)
+        Sample numbers, ascending and without gaps.
+    agent : ndarray of int32, shape (agent,)
+        Track ids, ascending.
+    kind : ndarray of int8, shape (agent,)
+        Index into `KINDS`.
+    xy_m : ndarray of float64, shape (sample, agent, 2)
+        Positions in metres; NaN where an agent is missing. Never interpolated.
+    confidence : ndarray of float32, shape (sample, agent)
+        NaN where an agent is missing.
+    """
+
+    dt_s: float
+    k: NDArray[np.int64]
+    agent: NDArray[np.int32]
+    kind: NDArray[np.int8]
+    xy_m: Floats
+    confidence: NDArray[np.float32]
+
+    def of_kind(self, kind: int) -> Samples:
+        """Return the samples of one kind of agent only."""
+        return self.take_agents(self.kind == kind)
+
+    def take_agents(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Samples:
+        """Return the samples of the chosen agents."""
+        return Samples(
+            dt_s=self.dt_s,
+            k=self.k,
+            agent=self.agent[chosen],
+            kind=self.kind[chosen],
+            xy_m=self.xy_m[:, chosen],
+            confidence=self.confidence[:, chosen],
+        )

@@ -1,0 +1,105 @@
+"""What a trial is, and where its files lie. No file is opened here."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from zfcal.errors import InputError
+
+CONFIG_NAME = "trial.toml"
+_DIGITS = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """The settings of a trial, as ``trial.toml`` states them.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    arena
+        Name of an arena that comes with zfcal, or the path of a GeoJSON file,
+        relative to the trial.
+    n_fish, n_robots
+        Agents in the tank.
+    fps
+        Frame rate of the tracks, in hertz.
+    dt_s
+        The model's step in seconds: a whole number of frames.
+    seed
+        All random numbers of the trial derive from it.
+    model
+        The starting model, relative to the trial.
+    source
+        Where the data come from, in words.
+    cameras
+        For each camera (``overhead``, ``below``) its ``file`` and ``source``.
+    """
+
+    root: Path
+    arena: str
+    n_fish: int
+    n_robots: int
+    fps: float
+    dt_s: float
+    seed: int
+    model: str = "models/000000.toml"
+    source: str = ""
+    cameras: dict[str, dict[str, str]] | None = None
+
+    def __post_init__(self) -> None:
+        where = str(self.root / CONFIG_NAME)
+        if not 0 < self.fps < math.inf:
+            raise InputError(f"{where}: fps must be a positive rate in hertz, got {self.fps!r}.")
+        if self.n_fish < 0 or self.n_robots < 0 or self.n_fish + self.n_robots < 1:
+            raise InputError(
+                f"{where}: needs at least one agent, got n_fish = {self.n_fish} and "
+                f"n_robots = {self.n_robots}."
+            )
+        frames = self.dt_s * self.fps
+        if not (
+            math.isfinite(frames) and round(frames) >= 1 and abs(frames - round(frames)) < 1e-3
+        ):
+            raise InputError(
+                f"{where}: dt_s must be a whole number of frames, got {self.dt_s!r} s "
+                f"at {self.fps!r} Hz ({frames:.4g} frames).",
+                hint=f"One frame is {1 / self.fps:.6g} s.",
+            )
+
+    @property
+    def config(self) -> Path:
+        """The settings file."""
+        return self.root / CONFIG_NAME
+
+    @property
+    def n_agents(self) -> int:
+        """Fish and robots."""
+        return self.n_fish + self.n_robots
+
+    def path(self, folder: str, second: int, ending: str) -> Path:
+        """Return the place of an artifact, such as ``tracks/000060.parquet``.
+
+        Parameters
+        ----------
+        folder
+            ``tracks``, ``stats``, ``scores``, ``models``, ...
+        second
+            Seconds since trial start: a segment's start or a window's end.
+        ending
+            What follows the number, such as ``.parquet`` or ``-model.parquet``.
+        """
+        return self.root / folder / f"{second:0{_DIGITS}d}{ending}"
+
+
+def second_of(path: Path, ending: str = ".parquet") -> int | None:
+    """Return the number in an artifact's name; None if it is not named so.
+
+    >>> second_of(Path("tracks/000060.parquet"))
+    60
+    """
+    match = re.fullmatch(r"(\d{6,})" + re.escape(ending), path.name)
+    return int(match.group(1)) if match else None
