@@ -1,0 +1,174 @@
+"""Files that appear whole or not at all.
+
+What a file holds is the business of the other modules here; this one knows
+about disks: names, flushing, renaming, and the ways in which they fail.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import itertools
+import os
+import platform
+import re
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+from zfcal.errors import InputError, StorageError
+
+_COUNTER = itertools.count()
+_IN_USE: set[str] = set()
+"""Names of the dot-files that this process is writing."""
+
+_HINTS = {
+    errno.ENOSPC: "The disk is full: make room and run the same command again.",
+    errno.EDQUOT: "Your quota is used up: make room and run the same command again.",
+    errno.EFBIG: "A limit on file sizes stands in the way (ulimit -f), or the file system's own.",
+    errno.EROFS: "The file system is mounted read-only: copy the trial to a disk of your own.",
+    errno.EACCES: "You may not write there: change its permissions, or copy the trial.",
+    errno.EPERM: "You may not write there: change its permissions, or copy the trial.",
+    errno.ENOTDIR: "A file stands where a folder is needed: move it away.",
+    errno.EEXIST: "A file stands where a folder is needed: move it away.",
+    errno.EISDIR: "A folder stands where the file is to go: move it away.",
+}
+# What a directory that cannot be flushed says: some network file systems have no such call.
+_NO_FLUSH = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Make a file that at every instant is absent, the old one, or the new one whole.
+
+    Parameters
+    ----------
+    path
+        Where the file goes; its folder is made when missing.
+    write
+        Writes the content to the path that it is given: a dot-file in the same
+        folder, whose ending says nothing about the format.
+
+    Raises
+    ------
+    StorageError
+        The disk is full, or the place cannot be written. What was there stays,
+        and the dot-file is removed.
+    """
+    part = _part_of(path)
+    _IN_USE.add(part.name)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_orphans(path)
+        write(part)
+        _flush(part)
+        part.replace(path)
+        _flush_folder(path.parent)
+    except OSError as error:
+        raise storage_error(path, error) from error
+    finally:
+        # After the rename there is nothing left to remove.
+        with contextlib.suppress(OSError):
+            part.unlink()
+        _IN_USE.discard(part.name)
+
+
+def write_text_whole(path: Path, text: str) -> None:
+    """Make a UTF-8 text file with `write_whole`, its line ends as they stand in ``text``."""
+
+    def write(part: Path) -> None:
+        part.write_bytes(text.encode())
+
+    write_whole(path, write)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hexadecimal.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """Return the error for a file that cannot be opened for reading."""
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
+    return InputError(
+        f"{path}: cannot be read ({error.strerror or error}).",
+        hint="Check that it is a file, and its permissions.",
+    )
+
+
+def storage_error(path: Path, error: OSError) -> StorageError:
+    """Return the error for a place that cannot be written, with what to do about it."""
+    return StorageError(
+        f"{path}: cannot be written ({error.strerror or error}). What was there is kept.",
+        hint=_HINTS.get(error.errno or 0, "Check the disk, and the connection to it."),
+    )
+
+
+def is_part(name: str) -> bool:
+    """Return whether a file name is that of a write under way, or of one that was killed."""
+    return name.startswith(".") and ".part-" in name
+
+
+def is_orphan(path: Path) -> bool:
+    """Return whether a dot-file is what a process of this computer left when it was killed."""
+    match = re.search(rf"\.part-{_host()}-(\d+)-\d+$", path.name)
+    if match is None:
+        return False
+    process = int(match.group(1))
+    # In a container the next run may well get the number of the one that was killed.
+    return path.name not in _IN_USE if process == os.getpid() else not _is_alive(process)
+
+
+def _host() -> str:
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _part_of(path: Path) -> Path:
+    """Name the dot-file after host, process and count: nobody else writes to it."""
+    return path.with_name(f".{path.name}.part-{_host()}-{os.getpid()}-{next(_COUNTER)}")
+
+
+def _remove_orphans(path: Path) -> None:
+    """Remove what processes of this computer left of the same file when they were killed."""
+    start = f".{path.name}.part-"
+    for part in path.parent.iterdir():
+        if part.name.startswith(start) and is_orphan(part):
+            part.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Make the rename itself last through a loss of power."""
+    try:
+        _flush(folder)
+    except OSError as error:
+        if error.errno not in _NO_FLUSH:
+            raise

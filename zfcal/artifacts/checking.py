@@ -1,0 +1,349 @@
+"""Whether every artifact of a trial is whole, valid and what its lineage says.
+
+The computer that it lies on is looked at in `machine`.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from zfcal.arena import Arena
+from zfcal.artifacts import machine
+from zfcal.artifacts.arenas import load_arena
+from zfcal.artifacts.atomic import is_orphan, is_part
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import package_version, read_lineage
+from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.models import read_model, read_model_for
+from zfcal.artifacts.settings import read_trial
+from zfcal.artifacts.tables import POPULATION, SCORES, STATS, read_table, read_tracks
+from zfcal.artifacts.validation import check, read_json
+from zfcal.errors import DamagedError, InputError, ZfcalError
+from zfcal.trial import CONFIG_NAME, Trial, second_of
+from zfcal.units import SEGMENT_S
+
+OK, NOTE, WARNING, ERROR = "ok", "note", "warning", "error"
+
+LOW_DISK_BYTES = 2**30
+"""About what half an hour of camera images takes."""
+
+NO_DISK_BYTES = 50 * 2**20
+"""Too little to finish a round."""
+
+CLOCK_SLACK_S = 2.0
+"""Two computers that share a trial may differ by so much without a warning."""
+
+GROWING_S = 10.0
+"""A file that changed so lately is taken to be growing still."""
+
+_THIS_WAS_WRITTEN_S = 1.7e9
+"""Late in 2023: a clock before that has lost its battery."""
+
+FORGOTTEN_S = 3600.0
+"""No copy and no write takes so long: a dot-file of that age was left behind."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing that a check found.
+
+    Parameters
+    ----------
+    level
+        ``ok``, ``note``, ``warning`` or ``error``.
+    where
+        The file, relative to the trial, or what else it is about.
+    says
+        What was found.
+    hint
+        What to do about it.
+    """
+
+    level: str
+    where: str
+    says: str
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """What the check of one file needs to know; None for what could not be read."""
+
+    root: Path
+    now_s: float
+    trial: Trial | None
+    arena: Arena | None
+
+
+def check_trial(root: Path, *, now_s: float | None = None) -> list[Finding]:
+    """Check a trial: its settings, every artifact, their lineage, and the computer.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    now_s
+        Seconds since 1970 to take as now; None for the clock's.
+
+    Returns
+    -------
+    list of Finding
+        The trial is sound if none is of level ``error``.
+
+    Raises
+    ------
+    InputError
+        There is no such folder.
+    """
+    if not root.is_dir():
+        raise InputError(f"{root}: is no folder.", hint="Give the folder of a trial.")
+    now_s = time.time() if now_s is None else now_s
+    place, findings = _settings(root, now_s)
+    counts: Counter[str] = Counter()
+    for path in _files(root):
+        found = list(_file_findings(place, path))
+        findings += found
+        if _checker_of(root, path) and not any(f.level == ERROR for f in found):
+            counts[path.relative_to(root).parts[0]] += 1
+    findings += [
+        Finding(level=OK, where=folder, says=f"{count} whole and valid")
+        for folder, count in sorted(counts.items())
+    ]
+    return findings + list(_computer(root, now_s))
+
+
+def _settings(root: Path, now_s: float) -> tuple[_Place, list[Finding]]:
+    findings: list[Finding] = []
+    trial = arena = None
+    try:
+        trial = read_trial(root)
+        arena = load_arena(trial.arena, root)
+        findings.append(Finding(level=OK, where=CONFIG_NAME, says=f"arena {arena.name}"))
+    except ZfcalError as error:
+        where = CONFIG_NAME if trial is None else trial.arena
+        findings.append(_mistake(where, root, error))
+    if trial is not None and not (root / trial.model).is_file():
+        findings.append(
+            Finding(
+                level=ERROR,
+                where=trial.model,
+                says="the starting model that trial.toml names is missing",
+                hint="Make it with zfcal init, or set model in trial.toml to another one.",
+            )
+        )
+    return _Place(root=root, now_s=now_s, trial=trial, arena=arena), findings
+
+
+def _mistake(where: str, root: Path, error: ZfcalError) -> Finding:
+    says = str(error).removeprefix(f"{root / where}: ").rstrip(".")
+    return Finding(level=ERROR, where=where, says=says, hint=error.hint)
+
+
+def _files(root: Path) -> Iterator[Path]:
+    """Yield all files of a trial, sorted by path; a folder whose name starts with a dot is left."""
+    for path in sorted(root.iterdir()):
+        if path.is_dir() and not path.name.startswith("."):
+            yield from _files(path)
+        elif path.is_file():
+            yield path
+
+
+def _file_findings(place: _Place, path: Path) -> Iterator[Finding]:
+    name = path.relative_to(place.root).as_posix()
+    if path.name.startswith("."):
+        yield from _dot_file(place, path, name)
+        return
+    checker = _checker_of(place.root, path)
+    if checker is None:
+        yield from _unknown(place, name)
+        return
+    yield from _clock(place, path, name)
+    try:
+        yield from checker(place, path)
+        yield from _lineage(place, path, name)
+    except ZfcalError as error:
+        yield _mistake(name, place.root, error)
+
+
+def _dot_file(place: _Place, path: Path, name: str) -> Iterator[Finding]:
+    if path.name.startswith(".lock-"):
+        return
+    age_s = place.now_s - path.stat().st_mtime
+    if is_part(path.name) and (is_orphan(path) or age_s > FORGOTTEN_S):
+        yield Finding(
+            level=NOTE,
+            where=name,
+            says="was left by a command that was killed; nothing reads it",
+            hint=f"Remove it: rm '{path}'",
+        )
+    elif age_s > FORGOTTEN_S and path.suffix == ".checkpoint":
+        says = "a round that was not finished; calibrate goes on from there"
+        yield Finding(level=NOTE, where=name, says=says)
+    elif age_s > FORGOTTEN_S:
+        yield Finding(level=NOTE, where=name, says="a dot-file that no command of zfcal reads")
+
+
+def _unknown(place: _Place, name: str) -> Iterator[Finding]:
+    folder = name.partition("/")[0]
+    named = {place.trial.arena, place.trial.model} if place.trial else set()
+    if place.trial and place.trial.cameras:
+        named |= {path for camera in place.trial.cameras.values() for path in camera.values()}
+    if name == CONFIG_NAME or name in named or folder in {"diagnosis", "report"}:
+        return
+    says = "is no artifact of a trial, and no command reads it"
+    if re.fullmatch(r"\d{1,5}\D.*", name.rpartition("/")[2]):
+        says = "is not read: names have at least six digits"
+    yield Finding(level=NOTE, where=name, says=says)
+
+
+def _clock(place: _Place, path: Path, name: str) -> Iterator[Finding]:
+    ahead_s = path.stat().st_mtime - place.now_s
+    if not ahead_s <= CLOCK_SLACK_S:
+        yield Finding(
+            level=WARNING,
+            where=name,
+            says=f"was changed {ahead_s:.0f} s in the future",
+            hint="The clocks of the computers that share the trial differ: set them by NTP.",
+        )
+
+
+def _lineage(place: _Place, path: Path, name: str) -> Iterator[Finding]:
+    """Compare the hashes of the inputs that an artifact states with what lies there."""
+    if path.suffix == ".mcap" or path.name == CONFIG_NAME:
+        return
+    try:
+        lineage = read_lineage(path)
+    except DamagedError as error:
+        # A model may be written by hand.
+        level = NOTE if path.suffix == ".toml" else ERROR
+        yield Finding(level=level, where=name, says=str(error).removeprefix(f"{path}: "))
+        return
+    again = f"Make it again with: zfcal {lineage.command} {place.root}"
+    for source, sha256 in lineage.inputs.items():
+        origin = place.root / source
+        if not origin.is_file():
+            yield Finding(level=NOTE, where=name, says=f"its input {source} is gone")
+        elif hash_inputs(place.root, [origin]) != {source: sha256}:
+            says = f"is out of date: its input {source} has changed"
+            yield Finding(level=WARNING, where=name, says=says, hint=again)
+    if lineage.version != package_version():
+        says = f"was made by zfcal {lineage.version}, this is {package_version()}"
+        yield Finding(level=NOTE, where=name, says=says)
+
+
+def _check_tracks(place: _Place, path: Path) -> Iterator[Finding]:
+    tracks = read_tracks(path)
+    name = path.relative_to(place.root).as_posix()
+    start_s = second_of(path) or 0
+    outside = (tracks.time_s < start_s - 1e-6) | (tracks.time_s >= start_s + SEGMENT_S - 1e-6)
+    if outside.any():
+        says = (
+            f"holds {np.count_nonzero(outside)} rows outside {start_s} s to "
+            f"{start_s + SEGMENT_S:.0f} s, such as {tracks.time_s[np.argmax(outside)]:.3f} s"
+        )
+        yield Finding(level=WARNING, where=name, says=says, hint="Import or track it again.")
+    if len(tracks) == 0:
+        yield Finding(level=NOTE, where=name, says="nobody was seen in this segment")
+    if place.arena is None or len(tracks) == 0:
+        return
+    xy_m, _ = place.arena.settle(np.stack([tracks.x_m, tracks.y_m], axis=-1))
+    share = np.mean(place.arena.zone_of(xy_m) == 0)
+    if share > 0.05:
+        yield Finding(
+            level=WARNING,
+            where=name,
+            says=f"{share:.0%} of the positions lie outside arena {place.arena.name}",
+            hint="Check the arena in trial.toml, and units, origin and y in the import.",
+        )
+
+
+def _check_model(place: _Place, path: Path) -> Iterator[Finding]:
+    if place.trial is None or place.arena is None:
+        read_model(path)
+    else:
+        read_model_for(path, place.arena, dt_s=place.trial.dt_s)
+    yield from ()
+
+
+def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
+    found = overview(path)
+    name = path.relative_to(place.root).as_posix()
+    if found.whole:
+        return
+    if place.now_s - path.stat().st_mtime < GROWING_S:
+        yield Finding(level=NOTE, where=name, says="still grows")
+    else:
+        says = (
+            f"{found.problem}; {found.lost_bytes} of {found.total_bytes} bytes are lost, "
+            f"{found.counts.total()} messages can be read"
+        )
+        yield Finding(level=WARNING, where=name, says=says, hint="Commands read what is whole.")
+
+
+def _check_findings(_: _Place, path: Path) -> Iterator[Finding]:
+    check(read_json(path), "findings", path)
+    yield from ()
+
+
+def _table_checker(schema: str) -> Callable[[_Place, Path], Iterator[Finding]]:
+    def check_table(_: _Place, path: Path) -> Iterator[Finding]:
+        read_table(path, schema)
+        yield from ()
+
+    return check_table
+
+
+_CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
+    r"tracks/\d{6,}\.parquet": _check_tracks,
+    r"stats/\d{6,}(-[a-z-]+)?\.parquet": _table_checker(STATS),
+    r"scores/\d{6,}(-[a-z-]+)?\.parquet": _table_checker(SCORES),
+    r"models/\d{6,}\.parquet": _table_checker(POPULATION),
+    r"models/[^/]+\.toml": _check_model,
+    r"(poses|drive|frames/(overhead|below))/\d{6,}\.mcap": _check_mcap,
+    r"diagnosis/findings\.json": _check_findings,
+}
+
+
+def _checker_of(root: Path, path: Path) -> Callable[[_Place, Path], Iterator[Finding]] | None:
+    name = path.relative_to(root).as_posix()
+    return next((c for pattern, c in _CHECKERS.items() if re.fullmatch(pattern, name)), None)
+
+
+def _computer(root: Path, now_s: float) -> Iterator[Finding]:
+    versions = ", ".join(f"{name} {number}" for name, number in machine.versions().items())
+    yield Finding(level=OK, where="versions", says=versions)
+    yield Finding(level=OK, where="cores", says=str(machine.cores()))
+    yield from _disk(machine.free_bytes(root))
+    yield from _file_system(machine.file_system(root))
+    is_set = now_s > _THIS_WAS_WRITTEN_S
+    says = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(now_s))
+    hint = "" if is_set else "Set the clock, or the times of files mean nothing."
+    yield Finding(level=OK if is_set else WARNING, where="clock", says=says, hint=hint)
+
+
+def _disk(free_bytes: int) -> Iterator[Finding]:
+    says = f"{free_bytes / 2**30:.1f} GiB free"
+    level = OK
+    if free_bytes < LOW_DISK_BYTES:
+        level = ERROR if free_bytes < NO_DISK_BYTES else WARNING
+    hint = "" if level == OK else "Make room before the next recording."
+    yield Finding(level=level, where="disk", says=says, hint=hint)
+
+
+def _file_system(kind: str) -> Iterator[Finding]:
+    if machine.is_network(kind):
+        yield Finding(
+            level=WARNING,
+            where="file system",
+            says=f"{kind}: changes made on other computers are not announced",
+            hint="zfcal watch --poll looks for them; it does so by itself on such a file system.",
+        )
+    else:
+        yield Finding(level=OK, where="file system", says=kind or "of unknown type")

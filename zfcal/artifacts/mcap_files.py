@@ -1,0 +1,198 @@
+"""MCAP files, closed or cut short: their metadata records and an overview of what they hold.
+
+Decoding messages is the business of those who write them.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zstandard
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+
+from zfcal.artifacts.atomic import unreadable
+from zfcal.errors import DamagedError
+
+_RECORD_LIMIT = 2**28
+"""Bytes of the longest record that is believed: a damaged length asks for more."""
+
+_BROKEN = (
+    McapError,
+    ValueError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,  # lz4 has no error of its own
+    OverflowError,  # a damaged size of what a chunk unpacks to
+    MemoryError,  # the same
+)
+
+
+@dataclass(slots=True, kw_only=True)
+class Overview:
+    """What an MCAP file holds, as far as it can be read.
+
+    Parameters
+    ----------
+    profile, library
+        From the header.
+    schemas
+        Name of the schema of each topic.
+    counts
+        Messages of each topic.
+    metadata
+        The metadata records by name.
+    start_s, end_s
+        Log time of the first and the last message, in seconds; None without messages.
+    whole
+        Whether the file ends as a closed one does.
+    read_bytes, total_bytes
+        How far reading came, and the file's size.
+    problem
+        Why reading stopped early; empty for a whole file.
+    """
+
+    profile: str = ""
+    library: str = ""
+    schemas: dict[str, str] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    start_s: float | None = None
+    end_s: float | None = None
+    whole: bool = False
+    read_bytes: int = 0
+    total_bytes: int = 0
+    problem: str = ""
+
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes behind the last record that could be read."""
+        return 0 if self.whole else self.total_bytes - self.read_bytes
+
+
+def overview(path: Path) -> Overview:
+    """Read an MCAP file in file order, and as far as it goes when it was cut short.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be opened.
+    DamagedError
+        It is no MCAP file.
+    """
+    found = Overview()
+    channels: dict[int, Channel] = {}
+    names: dict[int, str] = {}
+    try:
+        for record, position in _records(path, found):
+            _note(record, found, channels, names)
+            found.read_bytes = position
+        found.whole = True
+    except EndOfFile:
+        found.problem = "the file ends in the middle of a record: it was cut short, or still grows"
+    except _BROKEN as error:
+        found.problem = f"a damaged record ({error})"
+    return found
+
+
+def read_metadata(path: Path, name: str) -> dict[str, str] | None:
+    """Return a metadata record of an MCAP file, also of one that still grows; None if absent.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be opened.
+    DamagedError
+        It is no MCAP file, or is damaged before the record.
+    """
+    try:
+        for record, _ in _records(path, Overview()):
+            if isinstance(record, Metadata) and record.name == name:
+                return dict(record.metadata)
+    except EndOfFile:
+        return None
+    except _BROKEN as error:
+        raise DamagedError(
+            f"{path}: a record is damaged ({error}).",
+            hint=f"See how much of it can be read with: zfcal inspect {path}",
+        ) from error
+    return None
+
+
+class _Bounded:
+    """An open file that ends a reading which asks for more than is there.
+
+    The library would take a part for the whole, and memory for a damaged length.
+    """
+
+    def __init__(self, file: io.BufferedReader, size: int) -> None:
+        self._file = file
+        self._left = size
+
+    def read(self, length: int) -> bytes:
+        """Return just so many bytes."""
+        if length > self._left:
+            raise EndOfFile
+        self._left -= length
+        return self._file.read(length)
+
+
+def _records(path: Path, found: Overview) -> Iterator[tuple[McapRecord, int]]:
+    """Yield each record and where the next one starts, in file order."""
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise unreadable(path, error) from error
+    with file:
+        found.total_bytes = path.stat().st_size
+        _check_magic(path, file, found.total_bytes)
+        bounded: Any = _Bounded(file, found.total_bytes)
+        reader = StreamReader(bounded, validate_crcs=True, record_size_limit=_RECORD_LIMIT)
+        for record in reader.records:
+            yield record, file.tell()
+
+
+def _check_magic(path: Path, file: io.BufferedReader, size: int) -> None:
+    if size == 0:
+        raise DamagedError(
+            f"{path}: the file is empty (0 bytes).", hint="Remove it, or copy it again."
+        )
+    head = file.read(8)
+    file.seek(0)
+    if head != b"\x89MCAP0\r\n":
+        raise DamagedError(
+            f"{path}: is not an MCAP file (it starts with {head!r}).",
+            hint="Move it out of the trial, or copy the right file there.",
+        )
+
+
+def _note(
+    record: McapRecord, found: Overview, channels: dict[int, Channel], names: dict[int, str]
+) -> None:
+    match record:
+        case Header():
+            found.profile, found.library = record.profile, record.library
+        case Schema():
+            names[record.id] = record.name
+        case Channel():
+            channels[record.id] = record
+            found.schemas[record.topic] = names.get(record.schema_id, "")
+        case Metadata():
+            found.metadata[record.name] = dict(record.metadata)
+        case Message():
+            if record.channel_id not in channels:
+                message = f"a message of the unknown channel {record.channel_id}"
+                raise McapError(message)
+            found.counts[channels[record.channel_id].topic] += 1
+            seconds = record.log_time / 1e9
+            found.start_s = seconds if found.start_s is None else min(found.start_s, seconds)
+            found.end_s = seconds if found.end_s is None else max(found.end_s, seconds)
+        case _:
+            pass
