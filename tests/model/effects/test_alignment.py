@@ -1,0 +1,85 @@
+"""Alignment does what its sentence says."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.onestep import heading_density
+from zfcal.model.simulate import simulate_tracks
+
+
+def test_a_neighbour_that_swims_upward_turns_the_focal_fish_upward(two_rooms, make_natural, twin):
+    """More density toward the neighbour's heading, less elsewhere; by the weight stated.
+
+    A neighbour at 0.06 m ahead that swims across: with weight w and solid
+    angle A the new component holds w A / (1 + alpha A + w A) of the density.
+    """
+    state = {"xy_m": [(0.2, 0.78), (0.26, 0.78)], "heading_rad": [0.0, math.pi / 2]}
+    plain = make_natural(two_rooms)
+    aligned = dataclasses.replace(plain, effects={"alignment": {"weight": 40.0, "kappa": 25.0}})
+
+    theta, before = heading_density(plain, two_rooms, speed_m_s=0.0, **state)
+    _, after = heading_density(aligned, two_rooms, speed_m_s=0.0, **state)
+
+    assert theta[np.argmax(after - before)] == pytest.approx(math.pi / 2, abs=0.05)
+    angle = twin.body_solid_angle(*state["xy_m"], math.pi / 2)
+    share = 40 * angle / (1 + 49 * angle + 40 * angle)
+    component = (after - (1 - share) * before) / share
+    assert np.trapezoid(component, theta) == pytest.approx(1.0, abs=1e-6)
+    assert component.min() > -1e-3
+
+
+def test_aligned_fish_are_more_polarised(two_rooms, make_natural):
+    """Mean polarisation of five fish over 4,000 s rises by more than 0.02 (0.37 to 0.42)."""
+    plain = make_natural(two_rooms)
+    aligned = dataclasses.replace(plain, effects={"alignment": {"weight": 20.0, "kappa": 10.0}})
+
+    polarisation = []
+    for model in (plain, aligned):
+        _, heading = simulate_tracks(model, two_rooms, n_agents=5, n_steps=20_000, seed=6)
+        polarisation.append(np.abs(np.exp(1j * heading).mean(axis=1)).mean())
+
+    assert polarisation[1] - polarisation[0] > 0.02
+
+
+def test_without_weight_it_changes_nothing(two_rooms, make_natural):
+    """The density is the base model's."""
+    state = {"xy_m": [(0.2, 0.78), (0.26, 0.78)], "heading_rad": [0.0, 1.0], "speed_m_s": 0.1}
+    plain = make_natural(two_rooms)
+    idle = dataclasses.replace(plain, effects={"alignment": {"weight": 0.0}})
+
+    assert heading_density(idle, two_rooms, **state)[1] == pytest.approx(
+        heading_density(plain, two_rooms, **state)[1]
+    )
+
+
+def test_every_effect_is_found_by_its_name():
+    """The folder is the list; each effect says what it means and where it was described."""
+    for effect in all_effects():
+        assert find_effect(effect.name) is effect
+        assert effect.says.endswith(".")
+        assert effect.reference
+        assert len(effect.values({})) == len(effect.parameters)
+
+
+def test_an_unknown_effect_names_the_nearest(two_rooms):
+    """A slip of the pen is answered with the right word."""
+    with pytest.raises(InputError) as caught:
+        find_effect("alignement")
+    assert "alignment" in caught.value.hint
+
+
+def test_a_parameter_out_of_bounds_is_refused():
+    """Bounds, value and name are in the message; NaN is out of bounds."""
+    effect = find_effect("alignment")
+    for value in (-1.0, math.nan):
+        with pytest.raises(InputError, match=r"weight must be in \[0, 50\]"):
+            effect.values({"weight": value})
+    with pytest.raises(InputError, match="no parameter 'strength'"):
+        effect.values({"strength": 1.0})

@@ -1,0 +1,1 @@
+"""Compiled formulas on scalars and small arrays; what they mean is said in each."""

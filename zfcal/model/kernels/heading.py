@@ -1,0 +1,303 @@
+"""One agent's next move: the heading density of the model and two ways to draw from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.model.compiled import inlined, kernel
+from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.hooks import call_component, call_factor, call_speed
+from zfcal.model.kernels.perception import Sight
+from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
+from zfcal.model.kernels.world import (
+    ALPHA,
+    HX,
+    HY,
+    KAPPA_BASE,
+    KAPPA_F,
+    R_BASE,
+    R_F,
+    SPEED,
+    TAU_X,
+    TAU_Y,
+    ZONE,
+    Packed,
+    Work,
+    X,
+    Y,
+)
+
+_REJECTIONS = 200
+_REDRAWS = 50
+
+Floats = NDArray[np.float64]
+Random = NDArray[np.uint64]
+
+
+@inlined
+def draw_speed(
+    i: int, state: Floats, model: int, packed: Packed, tank: Tank, random: Random
+) -> float:
+    """Return a speed from the histogram of the agent's zone, in m/s."""
+    zone = int(state[ZONE, i])
+    place = 10.0 * uniform(random)
+    column = int(place)
+    if place - column >= packed.speed_take[model, zone, column]:
+        column = packed.speed_other[model, zone, column]
+    share = (column + uniform(random)) / 10.0
+    return tank.speed_low + (tank.speed_high - tank.speed_low) * share
+
+
+@inlined
+def gather(
+    i: int, state: Floats, model: int, packed: Packed, sight: Sight, parts: Floats
+) -> tuple[int, float]:
+    """Write the components of an agent's heading mixture beyond the base.
+
+    Parameters
+    ----------
+    parts : ndarray, shape (agent + component, 5)
+        Receives weight, unit vector x and y, kappa, r of each component; the
+        base has weight one and is not among them.
+
+    Returns
+    -------
+    count : int
+    total : float
+        Sum of all weights, the base included.
+    """
+    zone = int(state[ZONE, i])
+    alpha = packed.zones[model, zone, ALPHA]
+    kappa, r = packed.zones[model, zone, KAPPA_F], packed.zones[model, zone, R_F]
+    n = state.shape[1]
+    count, total = 0, 1.0
+    for j in range(n):
+        angle = sight.angle_sr[i * n + j]
+        if angle > 0.0:
+            weight = alpha * angle
+            parts[count, 0] = weight
+            parts[count, 1] = sight.dx_m[i * n + j] * sight.toward_per_m[i * n + j]
+            parts[count, 2] = sight.dy_m[i * n + j] * sight.toward_per_m[i * n + j]
+            parts[count, 3] = kappa
+            parts[count, 4] = r
+            total += weight
+            count += 1
+    for k in range(packed.components.shape[0]):
+        weight = call_component(
+            packed.components[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, n, i,
+            packed.effects[model, packed.components[k, 1]].ctypes.data,
+            parts[count, 1:].ctypes.data,
+        )  # fmt: skip
+        if weight > 0.0:
+            parts[count, 0], parts[count, 4] = weight, vonmises_r(parts[count, 3])
+            total += weight
+            count += 1
+    return count, total
+
+
+@kernel
+def _tilt(
+    i: int,
+    move: tuple[float, float, float, int],
+    state: Floats,
+    model: int,
+    packed: Packed,
+    sight: Sight,
+) -> float:
+    """Return the product of the effects' factors for a heading, in [0, 1]."""
+    ux, uy, speed, landing = move
+    product = 1.0
+    for k in range(packed.factors.shape[0]):
+        product *= call_factor(
+            packed.factors[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
+            state.shape[1], i, packed.effects[model, packed.factors[k, 1]].ctypes.data,
+            ux, uy, speed, landing,
+        )  # fmt: skip
+    return product
+
+
+@kernel
+def density_on_grid(
+    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
+    work: Work,
+) -> None:  # fmt: skip
+    """Write the unscaled heading density at -pi, ..., pi into ``work.density``.
+
+    Zero where the landing point is outside. Each von Mises density is scaled by
+    its own sum over the grid, which for a smooth periodic function is exact.
+    """
+    count, _ = gather(i, state, model, packed, sight, work.parts)
+    zone = int(state[ZONE, i])
+    kappa = packed.zones[model, zone, KAPPA_BASE]
+    work.density[:] = 0.0
+    if tank.follows[zone]:
+        _add(work, 0.5, state[TAU_X, i], state[TAU_Y, i], kappa)
+        _add(work, 0.5, -state[TAU_X, i], -state[TAU_Y, i], kappa)
+    else:
+        _add(work, 1.0, state[HX, i], state[HY, i], kappa)
+    for k in range(count):
+        _add(work, work.parts[k, 0], work.parts[k, 1], work.parts[k, 2], work.parts[k, 3])
+    reach = speed * packed.dt_s
+    for k in range(work.grid_x.size):
+        ux, uy = work.grid_x[k], work.grid_y[k]
+        landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
+        work.density[k] *= packed.gamma[model, zone, landing]
+        if packed.factors.shape[0] > 0 and work.density[k] > 0.0:
+            work.density[k] *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+
+
+@kernel
+def _add(work: Work, weight: float, ux: float, uy: float, kappa: float) -> None:
+    total, grid = 0.0, work.grid_x.size - 1
+    for k in range(grid + 1):
+        work.values[k] = math.exp(kappa * (ux * work.grid_x[k] + uy * work.grid_y[k] - 1.0))
+        total += work.values[k] if k < grid else 0.0
+    for k in range(grid + 1):
+        work.density[k] += weight * work.values[k] / total
+
+
+@kernel
+def draw_from_grid(
+    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
+    random: Random, work: Work,
+) -> bool:  # fmt: skip
+    """Draw a heading by inverse transform of the cumulative density on the grid.
+
+    The integral is the trapezoid's, the heading linear within a cell.
+
+    Returns
+    -------
+    bool
+        False when no direction is admissible; otherwise row i of ``work.moves``
+        holds the unit vector x, y and the landing zone.
+    """
+    density_on_grid(i, speed, state, model, packed, tank, sight, work)
+    return draw_on_grid(i, speed, state, model, packed, tank, random, work)
+
+
+@kernel
+def draw_on_grid(
+    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank,
+    random: Random, work: Work,
+) -> bool:  # fmt: skip
+    """Draw as `draw_from_grid` does, with ``work.density`` at hand."""
+    total, grid = 0.0, work.grid_x.size - 1
+    for k in range(grid):
+        total += 0.5 * (work.density[k] + work.density[k + 1])
+    if not total > 0.0:
+        return False
+    reach = speed * packed.dt_s
+    zone = int(state[ZONE, i])
+    # Beside an admissible angle of the grid the drawn heading can still end where none may.
+    for _ in range(_REJECTIONS):
+        level = uniform(random) * total
+        k = 0
+        width = 0.5 * (work.density[0] + work.density[1])
+        while level >= width and k < grid - 1:
+            level -= width
+            k += 1
+            width = 0.5 * (work.density[k] + work.density[k + 1])
+        share = min(1.0, level / width) if width > 0.0 else 0.0
+        theta = -math.pi + 2.0 * math.pi * (k + share) / grid
+        ux, uy = math.cos(theta), math.sin(theta)
+        landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
+        if packed.gamma[model, zone, landing] > 0.0:
+            work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
+            return True
+    return False
+
+
+@inlined
+def draw_exact(
+    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
+    random: Random, work: Work, count: int, total: float,
+) -> bool:  # fmt: skip
+    """Draw a heading by rejection; after 200 rejections the grid decides.
+
+    A component of the mixture, then its von Mises law, then the attraction of
+    the landing zone (zero outside) and the effects' factors as acceptance.
+    """
+    zone = int(state[ZONE, i])
+    reach = speed * packed.dt_s
+    follows = tank.follows[zone]
+    x, y = state[X, i], state[Y, i]
+    for _ in range(_REJECTIONS):
+        level = uniform(random) * total
+        if level < 1.0:
+            kappa, r = packed.zones[model, zone, KAPPA_BASE], packed.zones[model, zone, R_BASE]
+            if follows:
+                cx, cy = state[TAU_X, i], state[TAU_Y, i]
+                if next_word(random) >> np.uint64(63):
+                    cx, cy = -cx, -cy
+            else:
+                cx, cy = state[HX, i], state[HY, i]
+        else:
+            level -= 1.0
+            k = 0
+            while k < count - 1 and level >= work.parts[k, 0]:
+                level -= work.parts[k, 0]
+                k += 1
+            cx, cy, kappa, r = (
+                work.parts[k, 1],
+                work.parts[k, 2],
+                work.parts[k, 3],
+                work.parts[k, 4],
+            )
+        cosine, sine = vonmises_turn(kappa, r, random)
+        ux, uy = cx * cosine - cy * sine, cx * sine + cy * cosine
+        landing = zone_of(x + reach * ux, y + reach * uy, tank)
+        accept = packed.gamma[model, zone, landing]
+        if packed.factors.shape[0] > 0 and accept > 0.0:
+            accept *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+        if accept >= 1.0 or uniform(random) < accept:
+            work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
+            return True
+    return draw_from_grid(i, speed, state, model, packed, tank, sight, random, work)
+
+
+@inlined
+def draw_move(
+    i: int, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
+    random: Random, work: Work, grid: bool,
+) -> None:  # fmt: skip
+    """Write an agent's next heading, landing zone and speed into row i of ``work.moves``.
+
+    Without an admissible direction the speed is redrawn, at most 50 times;
+    then the agent stays: speed zero, the heading and zone that it has.
+    """
+    count, total = gather(i, state, model, packed, sight, work.parts)
+    factor = 1.0
+    for k in range(packed.speeds.shape[0]):
+        factor *= call_speed(
+            packed.speeds[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, state.shape[1],
+            i, packed.effects[model, packed.speeds[k, 1]].ctypes.data,
+        )  # fmt: skip
+    for _ in range(1 + _REDRAWS):
+        speed = factor * draw_speed(i, state, model, packed, tank, random)
+        work.moves[i, 3] = speed
+        if grid:
+            drawn = draw_from_grid(i, speed, state, model, packed, tank, sight, random, work)
+        else:
+            drawn = draw_exact(
+                i, speed, state, model, packed, tank, sight, random, work, count, total
+            )
+        if drawn:
+            return
+    work.moves[i, 0], work.moves[i, 1], work.moves[i, 2], work.moves[i, 3] = (
+        state[HX, i],
+        state[HY, i],
+        state[ZONE, i],
+        0.0,
+    )
+
+
+@inlined
+def apply_move(i: int, work: Work, dt_s: float, state: Floats) -> None:
+    """Move an agent; its wall is looked up later."""
+    state[X, i] += work.moves[i, 3] * dt_s * work.moves[i, 0]
+    state[Y, i] += work.moves[i, 3] * dt_s * work.moves[i, 1]
+    state[HX, i], state[HY, i] = work.moves[i, 0], work.moves[i, 1]
+    state[SPEED, i], state[ZONE, i] = work.moves[i, 3], work.moves[i, 2]

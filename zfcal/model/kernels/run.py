@@ -1,0 +1,176 @@
+"""Whole simulations: steps of all agents, counted on the fly or recorded."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.model.compiled import inlined, kernel, lean
+from zfcal.model.geometry import Tank
+from zfcal.model.kernels.heading import apply_move, draw_move
+from zfcal.model.kernels.perception import Sight, make_sight
+from zfcal.model.kernels.random import seeded
+from zfcal.model.kernels.world import (
+    GRID,
+    HX,
+    HY,
+    SPEED,
+    STATES,
+    TIME,
+    WALL,
+    ZONE,
+    Packed,
+    Work,
+    X,
+    Y,
+    look,
+    make_work,
+    place,
+    settle,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Random = NDArray[np.uint64]
+
+
+class Counts(NamedTuple):
+    """Histograms of simulations, each with leading axes (model, run).
+
+    Attributes
+    ----------
+    distance, wall, speed : ndarray of int64, shape (model, run, zone, 10)
+    occupation : ndarray of int64, shape (model, run, zone)
+    transition : ndarray of int64, shape (model, run, zone, zone)
+    """
+
+    distance: Ints
+    wall: Ints
+    occupation: Ints
+    transition: Ints
+    speed: Ints
+
+
+@lean
+def advance(
+    state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight, random: Random,
+    work: Work, grid: bool,
+) -> None:  # fmt: skip
+    """Move all agents at once by one step: each sees where the others were."""
+    look(state, model, packed, sight)
+    n = state.shape[1]
+    for i in range(n):
+        draw_move(i, state, model, packed, tank, sight, random, work, grid)
+    for i in range(n):
+        apply_move(i, work, packed.dt_s, state)
+        settle(i, state, tank)
+        state[TIME, i] += packed.dt_s
+
+
+@inlined
+def _bin(value: float, low: float, per: float) -> int:
+    return min(9, max(0, int((value - low) * per)))
+
+
+@inlined
+def _count_state(
+    state: Floats, n_counted: int, tank: Tank, model: int, run: int, counts: Counts
+) -> None:
+    for i in range(n_counted):
+        zone = int(state[ZONE, i])
+        counts.occupation[model, run, zone - 1] += 1
+        column = _bin(state[WALL, i], tank.wall_low_m, tank.wall_per_m)
+        counts.wall[model, run, zone - 1, column] += 1
+        for j in range(i):
+            if state[ZONE, j] == state[ZONE, i]:
+                away = math.sqrt(
+                    (state[X, i] - state[X, j]) ** 2 + (state[Y, i] - state[Y, j]) ** 2
+                )
+                column = _bin(away, tank.distance_low_m, tank.distance_per_m)
+                counts.distance[model, run, zone - 1, column] += 1
+
+
+@inlined
+def _count_step(
+    zones_before: Floats, state: Floats, n_counted: int, tank: Tank, model: int, run: int,
+    counts: Counts,
+) -> None:  # fmt: skip
+    per = 10.0 / (tank.speed_high - tank.speed_low)
+    for i in range(n_counted):
+        before = int(zones_before[i]) - 1
+        counts.transition[model, run, before, int(state[ZONE, i]) - 1] += 1
+        counts.speed[model, run, before, _bin(state[SPEED, i], tank.speed_low, per)] += 1
+
+
+@kernel
+def count_runs(
+    first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], packed: Packed,
+    tank: Tank, counts: Counts,
+) -> None:  # fmt: skip
+    """Simulate jobs ``first`` to ``last - 1`` and add up their histograms.
+
+    Parameters
+    ----------
+    first, last
+        Job ``k`` is run ``k % R`` of model ``k // R``.
+    seeds : ndarray of uint64, shape (R,)
+        One per run, the same for all models (common random numbers).
+    sizes
+        Agents, agents that count (the first ones), steps of burn-in, samples.
+    """
+    n, n_counted, burn_in, samples = sizes
+    state = np.zeros((STATES, n))
+    work = make_work(n, packed.components.shape[0], GRID)
+    sight = make_sight(n * n)
+    for job in range(first, last):
+        model, run = job // seeds.size, job % seeds.size
+        random = seeded(seeds[run])
+        state[:] = 0.0
+        place(state, tank, random)
+        for _ in range(burn_in):
+            advance(state, model, packed, tank, sight, random, work, False)
+        _count_state(state, n_counted, tank, model, run, counts)
+        for _ in range(samples - 1):
+            for i in range(n_counted):
+                work.zones[i] = state[ZONE, i]
+            advance(state, model, packed, tank, sight, random, work, False)
+            _count_step(work.zones, state, n_counted, tank, model, run, counts)
+            _count_state(state, n_counted, tank, model, run, counts)
+
+
+@kernel
+def record_run(
+    seed: np.uint64, n: int, burn_in: int, samples: int, packed: Packed, tank: Tank, grid: int
+) -> Floats:
+    """Simulate the first model and return its states.
+
+    Parameters
+    ----------
+    grid
+        Angles of the numeric sampler; 0 for the exact one.
+
+    Returns
+    -------
+    ndarray, shape (sample, agent, 5)
+        x, y in metres, unit vector x, y of the heading, speed of the step that
+        led here in m/s.
+    """
+    state = np.zeros((STATES, n))
+    work = make_work(n, packed.components.shape[0], grid if grid > 0 else GRID)
+    sight = make_sight(n * n)
+    random = seeded(seed)
+    place(state, tank, random)
+    for _ in range(burn_in):
+        advance(state, 0, packed, tank, sight, random, work, grid > 0)
+    record = np.empty((samples, n, 5))
+    for k in range(samples):
+        if k > 0:
+            advance(state, 0, packed, tank, sight, random, work, grid > 0)
+        for i in range(n):
+            record[k, i, 0], record[k, i, 1] = state[X, i], state[Y, i]
+            record[k, i, 2], record[k, i, 3] = state[HX, i], state[HY, i]
+            record[k, i, 4] = state[SPEED, i]
+    return record

@@ -1,0 +1,165 @@
+"""Models and genes into the kernels' arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zfcal.arena import Arena
+from zfcal.errors import InputError
+from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
+from zfcal.model.kernels.random import vonmises_r
+from zfcal.model.kernels.world import ZONE_COLUMNS, Packed
+from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales
+
+Floats = NDArray[np.float64]
+
+
+def check_model(parameters: Parameters, arena: Arena) -> None:
+    """Raise an `InputError` unless the model's zones are the arena's, in order, and gamma whole."""
+    if parameters.zone_names != arena.zone_names:
+        raise InputError(
+            f"The model has zones {list(parameters.zone_names)}, arena {arena.name!r} has "
+            f"{list(arena.zone_names)}.",
+            hint="A model is calibrated for one arena; calibrate it anew for another one.",
+        )
+    for zone in parameters.zones:
+        if set(zone.gamma) != set(arena.zone_names):
+            raise InputError(
+                f"Zone {zone.name!r}: gamma names {sorted(zone.gamma)}, expected one value for "
+                f"each of {list(arena.zone_names)}."
+            )
+
+
+def pack(models: Sequence[Parameters], arena: Arena) -> Packed:
+    """Return models in the kernels' arrays.
+
+    Parameters
+    ----------
+    models
+        With one step, one set of effects, and the arena's zones in its order.
+
+    Raises
+    ------
+    InputError
+        Zones, steps or effects do not fit together.
+    """
+    first = models[0]
+    for parameters in models:
+        check_model(parameters, arena)
+        if parameters.dt_s != first.dt_s or list(parameters.effects) != list(first.effects):
+            raise InputError("Models of one population need the same dt_s and the same effects.")
+    own = np.array([[(zone.kappa_0, zone.kappa_f, zone.alpha) for zone in p.zones] for p in models])
+    gamma = np.array([p.gamma_matrix() for p in models])
+    return _packed(own, gamma, models, arena)
+
+
+def pack_genes(genes: ArrayLike, template: Parameters, arena: Arena) -> Packed:
+    """Return a population of genomes in the kernels' arrays.
+
+    Parameters
+    ----------
+    genes : array_like, shape (model, gene)
+        In [0, 1], in the order of `zfcal.parameters.gene_names`.
+    template
+        Gives all that is not calibrated.
+    """
+    check_model(template, arena)
+    n_zones = len(template.zones)
+    values = np.asarray(genes, dtype=np.float64) * gene_scales(n_zones)
+    own = values[:, : 3 * n_zones].reshape(-1, n_zones, 3)
+    gamma = values[:, 3 * n_zones :].reshape(-1, n_zones, n_zones)
+    return _packed(own, gamma, [template], arena)
+
+
+def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Arena) -> Packed:
+    """Pack; ``models`` holds one for each row, or one for all."""
+    n_models, n_zones = own.shape[:2]
+    zones = np.zeros((n_models, n_zones + 1, ZONE_COLUMNS))
+    kappa_base = _base_kappa(own[:, :, 0], models, arena)
+    zones[:, 1:] = np.stack(
+        [kappa_base, _r(kappa_base), own[:, :, 1], _r(own[:, :, 1]), own[:, :, 2]], axis=-1
+    )
+    attraction = np.zeros((n_models, n_zones + 1, n_zones + 1))
+    top = gamma.max(axis=2, keepdims=True)
+    # A row of zeros asks for nothing: without a preference all zones are alike.
+    attraction[:, 1:, 1:] = np.divide(gamma, top, out=np.ones_like(gamma), where=top > 0)
+    tables = [[_alias(zone) for zone in parameters.zones] for parameters in models]
+    take = np.ones((n_models, n_zones + 1, SPEED_BINS))
+    other = np.zeros((n_models, n_zones + 1, SPEED_BINS), dtype=np.int64)
+    take[:, 1:] = [[table[0] for table in row] for row in tables]
+    other[:, 1:] = [[table[1] for table in row] for row in tables]
+    effects = [find_effect(name) for name in models[0].effects]
+    fov = np.array([parameters.fov_rad for parameters in models])
+    # At pi everything is seen, whatever the rounding of the cosine.
+    cos_fov = np.where(fov >= math.pi, -2.0, np.cos(fov))
+    return Packed(
+        zones=zones,
+        gamma=attraction,
+        speed_take=take,
+        speed_other=other,
+        cos_fov=np.ascontiguousarray(np.broadcast_to(cos_fov, (n_models,))),
+        dt_s=float(models[0].dt_s),
+        components=_hooks(effects, "component"),
+        factors=_hooks(effects, "factor"),
+        speeds=_hooks(effects, "speed"),
+        sights=_hooks(effects, "sight"),
+        effects=_effect_parameters(effects, models, n_models),
+    )
+
+
+def _base_kappa(kappa_0: Floats, models: Sequence[Parameters], arena: Arena) -> Floats:
+    base = kappa_0.copy()
+    for z, zone in enumerate(arena.zones):
+        if zone.follows_walls:
+            given = [parameters.zones[z].kappa_w for parameters in models]
+            base[:, z] = [
+                kappa_0[m, z] if given[m % len(given)] is None else given[m % len(given)]
+                for m in range(len(base))
+            ]
+    return base
+
+
+def _r(kappa: Floats) -> Floats:
+    return np.vectorize(vonmises_r, otypes=[np.float64])(kappa)
+
+
+def _alias(zone: ZoneParameters) -> tuple[Floats, NDArray[np.int64]]:
+    """Return Walker's alias table of a zone's speed histogram.
+
+    Source: Walker 1977, ACM Transactions on Mathematical Software 3(3), with
+    the pairing of Vose 1991, IEEE Transactions on Software Engineering 17(9).
+    """
+    share = np.array(zone.speed_frequency) / sum(zone.speed_frequency) * SPEED_BINS
+    take, other = np.ones(SPEED_BINS), np.arange(SPEED_BINS)
+    small = [k for k in range(SPEED_BINS) if share[k] < 1]
+    large = [k for k in range(SPEED_BINS) if share[k] >= 1]
+    while small and large:
+        poor, rich = small.pop(), large.pop()
+        take[poor], other[poor] = share[poor], rich
+        share[rich] -= 1 - share[poor]
+        (small if share[rich] < 1 else large).append(rich)
+    return take, other
+
+
+def _hooks(effects: Sequence[Effect], kind: str) -> NDArray[np.int64]:
+    rows = [
+        (function.address, row)
+        for row, effect in enumerate(effects)
+        if (function := getattr(effect, kind)) is not None
+    ]
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+
+def _effect_parameters(
+    effects: Sequence[Effect], models: Sequence[Parameters], n_models: int
+) -> Floats:
+    packed = np.zeros((n_models, len(effects), MAX_PARAMETERS))
+    for row, effect in enumerate(effects):
+        for model in range(n_models):
+            given = models[model % len(models)].effects[effect.name]
+            packed[model, row, : len(effect.parameters)] = effect.values(given)
+    return packed

@@ -1,0 +1,148 @@
+"""Simulate models: a whole population counted in one call, or one run recorded."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.errors import InputError
+from zfcal.model.geometry import Tank, make_tank
+from zfcal.model.kernels.run import Counts, count_runs, record_run
+from zfcal.model.kernels.world import GRID, Packed
+from zfcal.model.packing import pack, pack_genes
+from zfcal.parameters import Parameters
+from zfcal.units import BURN_IN_S
+
+__all__ = [
+    "Counts",
+    "Packed",
+    "burn_in_steps",
+    "pack",
+    "pack_genes",
+    "simulate_counts",
+    "simulate_tracks",
+    "tank_of",
+]
+
+_JOB_STEPS = 20_000
+"""Agent-steps in a piece of work: some milliseconds, much more than a call costs."""
+
+
+def tank_of(arena: Arena) -> Tank:
+    """Return the kernels' arrays of an arena, made once per process."""
+    return _tank(arena.outline.wkb, arena)
+
+
+@lru_cache(maxsize=8)
+def _tank(_outline: bytes, arena: Arena) -> Tank:
+    return make_tank(arena)
+
+
+def burn_in_steps(dt_s: float) -> int:
+    """Return the number of steps dropped at the start of a simulation (60 s)."""
+    return int(np.ceil(BURN_IN_S / dt_s - 1e-9))
+
+
+def simulate_counts(
+    packed: Packed,
+    arena: Arena,
+    *,
+    n_agents: int,
+    n_steps: int,
+    seeds: NDArray[np.uint64],
+    n_counted: int | None = None,
+    n_threads: int | None = None,
+) -> Counts:
+    """Simulate every model with every seed and return the histograms.
+
+    Parameters
+    ----------
+    packed
+        From `pack` or `pack_genes`.
+    n_agents
+        Agents in the tank, all driven by the model.
+    n_steps
+        Samples that count, after 60 s of burn-in; there is one transition less.
+    seeds : ndarray of uint64, shape (run,)
+        The same for all models: common random numbers.
+    n_counted
+        How many of the agents count, from the first one; None for all.
+    n_threads
+        None for one per core. The numbers do not depend on it.
+
+    Returns
+    -------
+    Counts
+        With leading axes (model, run).
+    """
+    counted = n_agents if n_counted is None else n_counted
+    if not 0 < counted <= n_agents or n_steps < 1 or len(seeds) < 1:
+        raise InputError(
+            f"A simulation needs agents, steps and seeds; got {n_agents} agents of which "
+            f"{counted} count, {n_steps} steps, {len(seeds)} seeds."
+        )
+    tank = tank_of(arena)
+    counts = _zeros(len(packed.zones), len(seeds), len(arena.zones))
+    sizes = (n_agents, counted, burn_in_steps(packed.dt_s), n_steps)
+    jobs = len(packed.zones) * len(seeds)
+    # Pieces of some milliseconds, so that the last one is short on every core.
+    per_piece = max(1, _JOB_STEPS // (n_agents * (n_steps + sizes[2])))
+    words = np.ascontiguousarray(seeds, dtype=np.uint64)
+
+    def work(first: int) -> None:
+        count_runs(first, min(first + per_piece, jobs), words, sizes, packed, tank, counts)
+
+    with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
+        list(pool.map(work, range(0, jobs, per_piece)))
+    return counts
+
+
+def _zeros(n_models: int, n_runs: int, n_zones: int) -> Counts:
+    lead = (n_models, n_runs, n_zones)
+    shapes = ((*lead, 10), (*lead, 10), lead, (*lead, n_zones), (*lead, 10))
+    return Counts(*(np.zeros(shape, dtype=np.int64) for shape in shapes))
+
+
+def simulate_tracks(
+    parameters: Parameters,
+    arena: Arena,
+    *,
+    n_agents: int,
+    n_steps: int,
+    seed: int,
+    sampler: str = "exact",
+    grid: int = GRID,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Simulate one model and return where the agents were.
+
+    Parameters
+    ----------
+    n_steps
+        Samples, after 60 s of burn-in.
+    seed
+        Not negative; the run's numbers derive from it by `numpy.random.SeedSequence`.
+    sampler
+        ``exact``, or ``grid`` for the paper's numeric way.
+    grid
+        Angles of that grid.
+
+    Returns
+    -------
+    xy_m : ndarray, shape (step, agent, 2)
+    heading_rad : ndarray, shape (step, agent)
+        Direction of the step that led there.
+    """
+    if sampler not in {"exact", "grid"}:
+        raise InputError(f"Sampler must be 'exact' or 'grid', got {sampler!r}.")
+    packed = pack([parameters], arena)
+    word = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
+    record = record_run(
+        word, n_agents, burn_in_steps(packed.dt_s), n_steps, packed, tank_of(arena),
+        grid if sampler == "grid" else 0,
+    )  # fmt: skip
+    return record[:, :, :2], np.arctan2(record[:, :, 3], record[:, :, 2])
