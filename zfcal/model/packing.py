@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
-from zfcal.model.kernels.random import vonmises_r
-from zfcal.model.kernels.world import ZONE_COLUMNS, Packed
+from zfcal.model.kernels.staircase import COLUMNS, ROWS, build
+from zfcal.model.kernels.world import KAPPA_BASE, KAPPA_F, LAWS, ZONE_COLUMNS, Packed
 from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales
 
 Floats = NDArray[np.float64]
@@ -80,9 +80,9 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
     n_models, n_zones = own.shape[:2]
     zones = np.zeros((n_models, n_zones + 1, ZONE_COLUMNS))
     kappa_base = _base_kappa(own[:, :, 0], models, arena)
-    zones[:, 1:] = np.stack(
-        [kappa_base, _r(kappa_base), own[:, :, 1], _r(own[:, :, 1]), own[:, :, 2]], axis=-1
-    )
+    zones[:, 1:] = np.stack([kappa_base, own[:, :, 1], own[:, :, 2]], axis=-1)
+    turns = np.zeros((*zones.shape[:2], LAWS, ROWS, COLUMNS))
+    build(zones[:, :, [KAPPA_BASE, KAPPA_F]].ravel(), turns.reshape(-1, ROWS, COLUMNS))
     attraction = np.zeros((n_models, n_zones + 1, n_zones + 1))
     top = gamma.max(axis=2, keepdims=True)
     # A row of zeros asks for nothing: without a preference all zones are alike.
@@ -98,6 +98,7 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
     cos_fov = np.where(fov >= math.pi, -2.0, np.cos(fov))
     return Packed(
         zones=zones,
+        turns=turns,
         gamma=attraction,
         speed_take=take,
         speed_other=other,
@@ -121,10 +122,6 @@ def _base_kappa(kappa_0: Floats, models: Sequence[Parameters], arena: Arena) -> 
                 for m in range(len(base))
             ]
     return base
-
-
-def _r(kappa: Floats) -> Floats:
-    return np.vectorize(vonmises_r, otypes=[np.float64])(kappa)
 
 
 def _alias(zone: ZoneParameters) -> tuple[Floats, NDArray[np.int64]]:

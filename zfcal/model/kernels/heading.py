@@ -12,14 +12,15 @@ from zfcal.model.geometry import Tank, zone_of
 from zfcal.model.kernels.hooks import call_component, call_factor, call_speed
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
+from zfcal.model.kernels.staircase import staircase_turn
 from zfcal.model.kernels.world import (
     ALPHA,
     HX,
     HY,
     KAPPA_BASE,
     KAPPA_F,
-    R_BASE,
-    R_F,
+    LAW_BASE,
+    LAW_F,
     SPEED,
     TAU_X,
     TAU_Y,
@@ -32,6 +33,7 @@ from zfcal.model.kernels.world import (
 
 _REJECTIONS = 200
 _REDRAWS = 50
+_TABLE = 0.0
 
 Floats = NDArray[np.float64]
 Random = NDArray[np.uint64]
@@ -60,8 +62,9 @@ def gather(
     Parameters
     ----------
     parts : ndarray, shape (agent + component, 5)
-        Receives weight, unit vector x and y, kappa, r of each component; the
-        base has weight one and is not among them.
+        Receives weight, unit vector x and y, kappa of each component, and the
+        constant of its sampler, zero where the zone's table serves; the base
+        has weight one and is not among them.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def gather(
     """
     zone = int(state[ZONE, i])
     alpha = packed.zones[model, zone, ALPHA]
-    kappa, r = packed.zones[model, zone, KAPPA_F], packed.zones[model, zone, R_F]
+    kappa = packed.zones[model, zone, KAPPA_F]
     n = state.shape[1]
     count, total = 0, 1.0
     for j in range(n):
@@ -82,7 +85,7 @@ def gather(
             parts[count, 1] = sight.dx_m[i * n + j] * sight.toward_per_m[i * n + j]
             parts[count, 2] = sight.dy_m[i * n + j] * sight.toward_per_m[i * n + j]
             parts[count, 3] = kappa
-            parts[count, 4] = r
+            parts[count, 4] = _TABLE
             total += weight
             count += 1
     for k in range(packed.components.shape[0]):
@@ -227,7 +230,7 @@ def draw_exact(
     for _ in range(_REJECTIONS):
         level = uniform(random) * total
         if level < 1.0:
-            kappa, r = packed.zones[model, zone, KAPPA_BASE], packed.zones[model, zone, R_BASE]
+            law, r, kappa = LAW_BASE, _TABLE, packed.zones[model, zone, KAPPA_BASE]
             if follows:
                 cx, cy = state[TAU_X, i], state[TAU_Y, i]
                 if next_word(random) >> np.uint64(63):
@@ -240,13 +243,12 @@ def draw_exact(
             while k < count - 1 and level >= work.parts[k, 0]:
                 level -= work.parts[k, 0]
                 k += 1
-            cx, cy, kappa, r = (
-                work.parts[k, 1],
-                work.parts[k, 2],
-                work.parts[k, 3],
-                work.parts[k, 4],
-            )
-        cosine, sine = vonmises_turn(kappa, r, random)
+            law, cx, cy = LAW_F, work.parts[k, 1], work.parts[k, 2]
+            kappa, r = work.parts[k, 3], work.parts[k, 4]
+        if r == _TABLE:
+            cosine, sine = staircase_turn(kappa, packed.turns, (model, zone, law), random)
+        else:
+            cosine, sine = vonmises_turn(kappa, r, random)
         ux, uy = cx * cosine - cy * sine, cx * sine + cy * cosine
         landing = zone_of(x + reach * ux, y + reach * uy, tank)
         accept = packed.gamma[model, zone, landing]

@@ -21,7 +21,10 @@ Ints = NDArray[np.int64]
 X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, STATES = range(11)
 
 # Columns of a zone's parameters.
-KAPPA_BASE, R_BASE, KAPPA_F, R_F, ALPHA, ZONE_COLUMNS = range(6)
+KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
+
+# Laws of a zone's tables of von Mises draws.
+LAW_BASE, LAW_F, LAWS = range(3)
 
 
 GRID = 360
@@ -33,8 +36,10 @@ class Packed(NamedTuple):
 
     Attributes
     ----------
-    zones : ndarray, shape (model, zone + 1, 5)
-        Columns KAPPA_BASE, R_BASE, KAPPA_F, R_F, ALPHA.
+    zones : ndarray, shape (model, zone + 1, 3)
+        Columns KAPPA_BASE, KAPPA_F, ALPHA.
+    turns : ndarray, shape (model, zone + 1, 2, 3, 66)
+        Tables of `zfcal.model.kernels.staircase` for LAW_BASE and LAW_F.
     gamma : ndarray, shape (model, zone + 1, zone + 1)
         Rows scaled to a maximum of one; attraction to void is zero.
     speed_take, speed_other : ndarray, shape (model, zone + 1, bin)
@@ -49,6 +54,7 @@ class Packed(NamedTuple):
     """
 
     zones: Floats
+    turns: Floats
     gamma: Floats
     speed_take: Floats
     speed_other: Ints
