@@ -1,0 +1,108 @@
+"""What a file holds, in its own unit and axes, before anything is decided about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """One row per agent and frame.
+
+    Parameters
+    ----------
+    time_s : ndarray of float64, shape (row,)
+        Seconds since the start of the trial.
+    frame, agent : ndarray of int64, shape (row,)
+    x, y : ndarray of float64, shape (row,)
+        In `unit`; NaN where the agent is missing.
+    unit
+        ``m``, ``cm``, ``mm`` or ``px``.
+    heading_rad : ndarray of float64, shape (row,), optional
+        From x towards y, in the file's axes; NaN where unknown.
+    confidence : ndarray of float64, shape (row,), optional
+        In [0, 1]; NaN is taken as certain.
+    kind : ndarray of int8, shape (row,), optional
+        Index into `zfcal.tracks.KINDS`; all are fish without it.
+    names
+        What the file calls an agent, by agent number.
+    y_down
+        Whether the format is known to count y downwards.
+    notes
+        What a person should know of the file, a sentence each.
+    """
+
+    time_s: Floats
+    frame: Ints
+    agent: Ints
+    x: Floats
+    y: Floats
+    unit: str
+    heading_rad: Floats | None = None
+    confidence: Floats | None = None
+    kind: NDArray[np.int8] | None = None
+    names: Mapping[int, str] = field(default_factory=dict)
+    y_down: bool = True
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """Every agent in every frame.
+
+    Parameters
+    ----------
+    xy : ndarray of float64, shape (frame, agent, 2)
+        In `unit`; NaN where the agent is missing.
+    frame : ndarray of int64, shape (frame,)
+    time_s : ndarray of float64, shape (frame,)
+        Seconds since the start of the trial.
+    unit
+        ``m``, ``cm``, ``mm`` or ``px``.
+    heading_rad, confidence : ndarray of float64, shape (frame, agent), optional
+        As in `Rows`.
+    names
+        Names of the agents, in the order of the columns.
+    y_down, notes
+        As in `Rows`.
+    """
+
+    xy: Floats
+    frame: Ints
+    time_s: Floats
+    unit: str
+    heading_rad: Floats | None = None
+    confidence: Floats | None = None
+    names: tuple[str, ...] = ()
+    y_down: bool = True
+    notes: tuple[str, ...] = ()
+
+    def rows(self) -> Rows:
+        """Return the same, one row per agent and frame.
+
+        Agents keep their names where these are whole numbers; else they are
+        numbered from 0, in the order of the columns.
+        """
+        n_frames, n_agents = self.xy.shape[:2]
+        numbered = len(set(self.names)) == n_agents and all(map(str.isdecimal, self.names))
+        agents = np.array(list(map(int, self.names)) if numbered else range(n_agents))
+        return Rows(
+            time_s=np.repeat(self.time_s, n_agents),
+            frame=np.repeat(self.frame, n_agents),
+            agent=np.tile(agents.astype(np.int64), n_frames),
+            x=self.xy[..., 0].ravel(),
+            y=self.xy[..., 1].ravel(),
+            unit=self.unit,
+            heading_rad=None if self.heading_rad is None else self.heading_rad.ravel(),
+            confidence=None if self.confidence is None else self.confidence.ravel(),
+            names=dict(zip(agents.tolist(), self.names, strict=False)),
+            y_down=self.y_down,
+            notes=self.notes,
+        )
