@@ -1,0 +1,244 @@
+"""Measure the main job: start-up, analyse, kernel, generations, recovery of parameters.
+
+Writes ``benchmarks/results/main_job.json`` and ``docs/benchmarks-main-job.md``.
+
+    .venv/bin/python benchmarks/bench_main_job.py
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from zfcal.artifacts.arenas import load_arena
+from zfcal.calibrate.objective import Group, SeedSource, express
+from zfcal.calibrate.rounds import calibrate_window
+from zfcal.calibrate.task import Settings, Task
+from zfcal.behaviour.statistics import measure
+from zfcal.model.likelihood import fit
+from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
+from zfcal.model.steps import steps_of
+from zfcal.parameters import Parameters, gene_names, natural
+from zfcal.tracks import Samples
+
+ROOT = Path(__file__).resolve().parent.parent
+ZFCAL = [str(Path(sys.executable).parent / "zfcal")]
+ARENA = load_arena("two-rooms", Path())
+TRUTH = natural(tuple((zone.name, zone.follows_walls) for zone in ARENA.zones), dt_s=0.2)
+
+
+def start_up() -> dict[str, float]:
+    """Return the median wall-clock time of ``zfcal --help`` over 11 starts."""
+    times = []
+    for _ in range(11):
+        begin = time.perf_counter()
+        subprocess.run([*ZFCAL, "--help"], stdout=subprocess.DEVNULL, check=True)
+        times.append(time.perf_counter() - begin)
+    return {"help_s": statistics.median(times)}
+
+
+def analyse() -> dict[str, float]:
+    """Return time and peak memory of analyse on 30 min of 5 agents at 15 Hz."""
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial"
+        quiet = {"check": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        subprocess.run(
+            [*ZFCAL, "init", trial, "--arena", "two-rooms", "--fish", "4", "--robot", "--fps", "15"],
+            **quiet,
+        )
+        subprocess.run(
+            [*ZFCAL, "simulate", trial, "--model", trial / "models/000000.toml", "--duration", "1800"],
+            **quiet,
+        )
+        times = []
+        for _ in range(3):
+            begin = time.perf_counter()
+            subprocess.run([*ZFCAL, "analyse", trial, "--force"], **quiet)
+            times.append(time.perf_counter() - begin)
+    peak_kb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    return {"wall_s": statistics.median(times), "peak_mb": peak_kb / 1024}
+
+
+def kernel() -> dict[str, float]:
+    """Return nanoseconds per agent-step of both samplers, the best of five."""
+    packed = pack([TRUTH], ARENA)
+    found = {}
+    for threads in (1, 2):
+        seeds = np.arange(20, dtype=np.uint64)
+
+        def run(threads: int = threads, seeds: np.ndarray = seeds) -> None:
+            simulate_counts(
+                packed, ARENA, n_agents=5, n_steps=9000, seeds=seeds, n_threads=threads
+            )
+
+        found[f"exact_{threads}_core_ns"] = _best(run) / (20 * 9300 * 5) * 1e9
+
+    def grid() -> None:
+        simulate_tracks(TRUTH, ARENA, n_agents=5, n_steps=2000, seed=1, sampler="grid")
+
+    found["grid_1_core_ns"] = _best(grid) / (2300 * 5) * 1e9
+    return found
+
+
+def _best(run) -> float:
+    run()
+    times = []
+    for _ in range(5):
+        begin = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def _samples(xy_m: np.ndarray) -> Samples:
+    n, agents = xy_m.shape[:2]
+    return Samples(
+        dt_s=0.2,
+        k=np.arange(n),
+        agent=np.arange(agents, dtype=np.int32),
+        kind=np.zeros(agents, dtype=np.int8),
+        xy_m=xy_m,
+        confidence=np.ones((n, agents), dtype=np.float32),
+    )
+
+
+def _task(xy_m: np.ndarray, template: Parameters, seed: int, workers: int) -> Task:
+    return Task(
+        group=Group(arena=ARENA, template=template, n_fish=4, n_robots=1, n_workers=workers),
+        control=measure(_samples(xy_m), ARENA),
+        seeds=SeedSource(trial_seed=seed, window_end_s=1800),
+    )
+
+
+def generations() -> dict[str, float]:
+    """Return seconds per generation of 60 individuals on all cores, champion included apart."""
+    xy, _ = simulate_tracks(TRUTH, ARENA, n_agents=4, n_steps=600, seed=3)
+    task = _task(xy, TRUTH, 1, os.cpu_count() or 1)
+    found = {}
+    for name, runs, steps, n in (("default", 1, 3000, 12), ("authors", 10, 1800, 3)):
+        times = []
+        for count in (0, n):
+            settings = Settings(generations=count, runs=runs, steps=steps)
+            begin = time.perf_counter()
+            calibrate_window(task, settings)
+            times.append(time.perf_counter() - begin)
+        found[f"{name}_s_per_generation"] = (times[1] - times[0]) / n
+        found[f"{name}_first_population_and_closing_s"] = times[0]
+    return found
+
+
+def recovery() -> list[dict[str, object]]:
+    """Return true and found parameters of three simulated half hours, both ways."""
+    rows = []
+    for seed in (11, 12, 13):
+        xy, _ = simulate_tracks(TRUTH, ARENA, n_agents=5, n_steps=9000, seed=seed)
+        begin = time.perf_counter()
+        by_likelihood = fit(steps_of(_samples(xy), ARENA, fov_rad=TRUTH.fov_rad), ARENA, TRUTH)
+        likelihood_s = time.perf_counter() - begin
+        begin = time.perf_counter()
+        by_score = calibrate_window(
+            _task(xy, TRUTH, seed, os.cpu_count() or 1),
+            Settings(generations=60, window_s=1800.0, n_windows=40),
+        )
+        score_s = time.perf_counter() - begin
+        intervals = {part.name: part for part in by_score.intervals.parameters}
+        truth = _scaled(express(_genes(TRUTH), TRUTH))
+        likely = _scaled(by_likelihood.parameters)
+        for name in gene_names(ARENA.zone_names):
+            part = intervals[name]
+            rows.append(
+                {
+                    "seed": seed,
+                    "parameter": name,
+                    "true": truth[name],
+                    "likelihood": likely[name],
+                    "likelihood_interval": by_likelihood.interval[name],
+                    "likelihood_identified": by_likelihood.identified[name],
+                    "score": part.value,
+                    "score_interval": (part.low, part.high),
+                    "score_identified": part.identified,
+                    "likelihood_s": likelihood_s,
+                    "score_s": score_s,
+                }
+            )
+    return rows
+
+
+def _genes(parameters: Parameters) -> np.ndarray:
+    from zfcal.parameters import to_genes
+
+    return to_genes(parameters)
+
+
+def _scaled(parameters: Parameters) -> dict[str, float]:
+    found = {}
+    for zone in parameters.zones:
+        top = max(zone.gamma.values())
+        found |= {f"{zone.name}.{k}": getattr(zone, k) for k in ("kappa_0", "kappa_f", "alpha")}
+        found |= {f"{zone.name}.gamma.{to}": value / top for to, value in zone.gamma.items()}
+    return found
+
+
+def _markdown(found: dict[str, object]) -> str:
+    lines = [
+        "# The main job, measured",
+        "",
+        "Made by `benchmarks/bench_main_job.py`; numbers in `benchmarks/results/main_job.json`.",
+        f"Machine: {found['machine']}. It is shared: times vary by a third.",
+        "",
+        "| what | value |",
+        "|---|---|",
+    ]
+    for section in ("start_up", "analyse", "kernel", "generations"):
+        lines += [f"| {section}: {name} | {value:.4g} |" for name, value in found[section].items()]
+    lines += [
+        "",
+        "## Parameters recovered from simulated half hours",
+        "",
+        "Five fish in two rooms, natural parameters. By one-step likelihood, and by the score S",
+        "(60 generations, one pooled window); 95 % intervals; `-` where the recording does not tell.",
+        "",
+        "| seed | parameter | true | likelihood | interval | score | interval |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in found["recovery"]:
+        low, high = row["likelihood_interval"]
+        first, last = row["score_interval"]
+        likely = f"{low:.3g} to {high:.3g}" if row["likelihood_identified"] else "-"
+        scored = f"{first:.3g} to {last:.3g}" if row["score_identified"] else "-"
+        lines.append(
+            f"| {row['seed']} | {row['parameter']} | {row['true']:.3g} | {row['likelihood']:.3g} "
+            f"| {likely} | {row['score']:.3g} | {scored} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure all and write both files."""
+    found = {
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        "start_up": start_up(),
+        "analyse": analyse(),
+        "kernel": kernel(),
+        "generations": generations(),
+        "recovery": recovery(),
+    }
+    results = ROOT / "benchmarks" / "results"
+    results.mkdir(exist_ok=True)
+    (results / "main_job.json").write_text(json.dumps(found, indent=1) + "\n")
+    (ROOT / "docs" / "benchmarks-main-job.md").write_text(_markdown(found))
+    print(_markdown(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""How well a perfect model would score: a model's short windows against its own long run.
+
+Two windows of one and the same model are never equal, so S means something only
+beside what the model reaches against itself. Computed each time, never quoted.
+"""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.behaviour.ceilings import Ceiling, summarise
+from zfcal.behaviour.scores import population_scores
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.objective import Seeds, Simulator, runs_of
+from zfcal.errors import InputError
+
+_SDS = 2 * NormalDist().inv_cdf(0.975)
+"""Standard deviations from the 2.5 to the 97.5 % quantile of a normal distribution."""
+
+Floats = NDArray[np.float64]
+
+
+def measure_ceiling(
+    group: Simulator, genome: Floats, *, long_run: Statistics, n_steps: int, seeds: Seeds
+) -> Ceiling:
+    """Simulate windows of a model and score each against the model's own long run.
+
+    Parameters
+    ----------
+    group
+        Only as many agents as there are fish are counted in a window, as in a
+        measured one; all of them where there is no fish.
+    genome : ndarray, shape (gene,)
+        The model.
+    long_run
+        Its own long simulation, all agents counted.
+    n_steps
+        Steps of a window.
+    seeds : ndarray of uint64, shape (window,)
+        One per window, none of them used for the long run.
+
+    Returns
+    -------
+    Ceiling
+        Mean and 2.5 to 97.5 % quantiles over windows, for every feature and zone.
+    """
+    if len(seeds) < 1 or n_steps < 1:
+        raise InputError(
+            f"A ceiling needs at least one window of one step, got {len(seeds)} windows "
+            f"of {n_steps} steps."
+        )
+    counts = group.simulate(
+        genome[None, :], n_counted=group.n_fish or group.n_agents, n_steps=n_steps, seeds=seeds
+    )
+    scores = population_scores(runs_of(counts, 0), long_run)
+    return summarise(scores.each(long_run.zone_names))
+
+
+def window_noise(ceiling: Ceiling) -> float:
+    """Return the standard deviation of S between windows, from the ceiling's interval.
+
+    Parameters
+    ----------
+    ceiling
+        Its interval is taken as that of a normal distribution.
+
+    Returns
+    -------
+    float
+        NaN where S is null in every window.
+    """
+    _, low, high = ceiling.of("S")
+    return (high - low) / _SDS

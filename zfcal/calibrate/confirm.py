@@ -1,0 +1,82 @@
+"""The independent second look: long simulations with new seeds.
+
+The best of a thousand noisy scores is partly luck. Whoever is handed to the robot,
+and every score that is reported, comes from here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.behaviour.scores import Scores, population_scores
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.objective import Objective, as_statistics
+from zfcal.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Confirmed:
+    """The best of some genomes by long simulations with seeds of their own.
+
+    Parameters
+    ----------
+    genes : ndarray, shape (gene,)
+        The winner.
+    scores
+        Its similarities with the window; S is NaN where every feature is null.
+    long_run
+        The counts of its simulation, all agents.
+    candidates : ndarray, shape (genome,)
+        S of all genomes that were compared, in the order given.
+    """
+
+    genes: Floats
+    scores: Scores
+    long_run: Statistics
+    candidates: Floats
+
+
+def confirm(objective: Objective, genes: Floats) -> Confirmed:
+    """Simulate genomes anew and return the one that scores best.
+
+    Parameters
+    ----------
+    objective
+        With long runs and seeds that the search has not seen.
+    genes : ndarray, shape (genome, gene)
+        At least one; of equals the first wins.
+    """
+    if len(genes) == 0:
+        raise InputError("No genome to confirm: the search has evaluated none.")
+    counts = objective.counts(genes)
+    scores = population_scores(counts, objective.control)
+    best = int(np.argmax(np.nan_to_num(scores.S, nan=-1.0)))
+    zone_names = objective.control.zone_names
+    return Confirmed(
+        genes=genes[best],
+        scores=scores.each(zone_names)[best],
+        long_run=as_statistics(counts, best, zone_names),
+        candidates=scores.S,
+    )
+
+
+def best_distinct(genes: Floats, scores: Floats, n: int) -> Floats:
+    """Return the ``n`` best different genomes, best first.
+
+    Parameters
+    ----------
+    genes : ndarray, shape (genome, gene)
+        May hold copies.
+    scores : ndarray, shape (genome,)
+        NaN comes last; of equals the earlier is better.
+    n
+        How many; fewer where there are not so many different ones.
+    """
+    order = np.argsort(-np.nan_to_num(scores, nan=-1.0), kind="stable")
+    _, first = np.unique(genes[order], axis=0, return_index=True)
+    return genes[order][np.sort(first)[:n]]

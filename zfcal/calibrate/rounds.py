@@ -1,0 +1,172 @@
+"""One calibration round: from the statistics of a window to a champion and what it is worth.
+
+The same code offline and online; a round knows the last one's outcome and nothing
+of files. What leads to the champion is in ``search``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.scores import Scores
+from zfcal.calibrate.ceiling import measure_ceiling, window_noise
+from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
+from zfcal.calibrate.evolve import State
+from zfcal.calibrate.history import Generation
+from zfcal.calibrate.intervals import Intervals, parameter_intervals
+from zfcal.calibrate.objective import Purpose, express
+from zfcal.calibrate.pace import Deadline
+from zfcal.calibrate.search import Progress, Watch, search
+from zfcal.calibrate.task import Previous, Settings, Task
+from zfcal.parameters import Parameters
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RoundResult:
+    """What a round has found.
+
+    Parameters
+    ----------
+    champion
+        The model that is handed on, its gamma rows scaled to a maximum of one.
+    genes : ndarray, shape (gene,)
+        The same as a genome, gamma as it was bred.
+    scores
+        Its similarities with the window, by long simulations with new seeds.
+    optimiser_score
+        The best S that the search itself saw: higher by its luck.
+    ceiling
+        What the champion reaches against itself.
+    intervals
+        Per parameter, the values that agree with the window.
+    history
+        A line per generation.
+    population
+        The last one, best first, with objectives and rank.
+    world_changed
+        Whether the last population's probe did worse than noise explains.
+    n_renewed
+        How many of it were replaced by random genomes.
+    """
+
+    champion: Parameters
+    genes: Floats
+    scores: Scores
+    optimiser_score: float
+    ceiling: Ceiling
+    intervals: Intervals
+    history: tuple[Generation, ...]
+    population: State
+    world_changed: bool
+    n_renewed: int
+
+    @property
+    def generations(self) -> int:
+        """Generations bred; with this number and the same seed the round repeats bit by bit."""
+        return self.population.generation
+
+    @property
+    def evaluations(self) -> int:
+        """Genomes evaluated in the search."""
+        return self.population.evaluations
+
+    @property
+    def against_ceiling(self) -> float:
+        """S over its ceiling: about one for a model that misses nothing; NaN without a ceiling."""
+        mean = self.ceiling.of("S")[0]
+        return self.scores.S / mean if mean > 0 else math.nan
+
+    @property
+    def as_previous(self) -> Previous:
+        """What the next round starts from."""
+        return Previous(
+            genes=self.population.genes,
+            scores=self.population.scores,
+            champion=self.genes,
+            noise=window_noise(self.ceiling),
+        )
+
+
+def calibrate_window(
+    task: Task,
+    settings: Settings,
+    *,
+    deadline: Deadline | None = None,
+    watch: Watch | None = None,
+    resume: Progress | None = None,
+) -> RoundResult:
+    """Find the model that comes nearest to a window.
+
+    Parameters
+    ----------
+    task, settings
+        What to calibrate, and how much to do.
+    deadline
+        When to be over. The answer is valid even if the time does not suffice for
+        the initial population, the confirmation and the ceiling, which are done in
+        any case. None for no limit.
+    watch
+        Sees every generation: to show it, or to save it for `resume`.
+    resume
+        Where a killed round of the same task and settings was.
+
+    Returns
+    -------
+    RoundResult
+        The same, bit by bit, for one task, seed and number of generations.
+
+    Raises
+    ------
+    InputError
+        The window is empty, or is of another arena than the model or the last population.
+    """
+    progress = search(task, settings, deadline=deadline, watch=watch, resume=resume)
+    return conclude(task, settings, progress)
+
+
+def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
+    """Choose the champion of a search and say what its score is worth.
+
+    The ten best of all that the search evaluated are simulated anew; the best by
+    that simulation is the champion, and its S there is the one that is reported.
+    """
+    best = best_distinct(progress.genes, progress.scores, settings.n_confirmed)
+    confirmed = confirm(task.confirmation(settings), best)
+    ceiling = ceiling_of(task, settings, confirmed)
+    intervals = parameter_intervals(
+        confirmed.genes,
+        (progress.genes, progress.scores),
+        score=confirmed.scores.S,
+        ceiling=ceiling,
+        zone_names=task.control.zone_names,
+    )
+    return RoundResult(
+        champion=express(confirmed.genes, task.simulator.template),
+        genes=confirmed.genes,
+        scores=confirmed.scores,
+        optimiser_score=float(np.nan_to_num(progress.scores, nan=0.0).max()),
+        ceiling=ceiling,
+        intervals=intervals,
+        history=progress.history,
+        population=progress.state,
+        world_changed=progress.world_changed,
+        n_renewed=progress.n_renewed,
+    )
+
+
+def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
+    """Return what a confirmed model reaches against its own long run."""
+    return measure_ceiling(
+        task.simulator,
+        confirmed.genes,
+        long_run=confirmed.long_run,
+        n_steps=task.steps_of(settings.window_s),
+        seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
+    )

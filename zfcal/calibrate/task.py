@@ -1,0 +1,189 @@
+"""What a calibration round is given: the window, the group, what came before, how much to do.
+
+Plain data and what follows from it. The search is in ``search``, the round in ``rounds``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.evolve import GROUP
+from zfcal.calibrate.objective import (
+    Objective,
+    Purpose,
+    SeedSource,
+    Simulator,
+    check_genome_length,
+    with_measured_speeds,
+)
+from zfcal.errors import InputError
+from zfcal.units import BURN_IN_S, WINDOW_S
+
+DEFAULT_GENERATIONS = 15
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How much a round does.
+
+    Parameters
+    ----------
+    population
+        Genomes, a multiple of four.
+    generations
+        How many to breed at most; None for 15, or as many as a deadline allows.
+    runs, steps
+        Simulations of an evaluation and their length.
+    optimiser
+        ``zfcal``, or ``deap`` for DEAP's own operators.
+    n_confirmed
+        So many of the best are simulated anew, and the best of these is champion.
+    long_runs, long_s
+        Simulations of a confirmation and their length in seconds.
+    n_windows, window_s
+        Simulated windows of the ceiling and their length in seconds: that of the
+        window that is calibrated on, if S is to be comparable with it.
+    """
+
+    population: int = 60
+    generations: int | None = None
+    runs: int = 1
+    steps: int = 3000
+    optimiser: Literal["zfcal", "deap"] = "zfcal"
+    n_confirmed: int = 10
+    long_runs: int = 10
+    long_s: float = 1800.0
+    n_windows: int = 200
+    window_s: float = WINDOW_S
+
+    def __post_init__(self) -> None:
+        if self.population < GROUP or self.population % GROUP:
+            raise InputError(
+                f"population must be a positive multiple of {GROUP}, got {self.population}.",
+                hint="The published population is 60.",
+            )
+        if self.generations is not None and self.generations < 0:
+            raise InputError(f"generations must not be negative, got {self.generations}.")
+        for name in ("runs", "steps", "n_confirmed", "long_runs", "n_windows"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        for name in ("long_s", "window_s"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InputError(
+                    f"{name} must be a positive time in seconds, got {getattr(self, name)!r}."
+                )
+        if self.optimiser not in {"zfcal", "deap"}:
+            raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Previous:
+    """What the last round left.
+
+    Parameters
+    ----------
+    genes : ndarray, shape (genome, gene)
+        Its last population, best first.
+    scores : ndarray, shape (genome,)
+        Their S on that round's window; NaN is null.
+    champion : ndarray, shape (gene,)
+        The genome that was handed to the robot.
+    noise
+        Standard deviation of S between windows, from that round's ceiling.
+    """
+
+    genes: Floats
+    scores: Floats
+    champion: Floats
+    noise: float
+
+    def __post_init__(self) -> None:
+        if self.genes.ndim != 2 or self.scores.shape != self.genes.shape[:1]:
+            raise InputError(
+                f"A population needs a row of genes and a score per genome, got shapes "
+                f"{self.genes.shape} and {self.scores.shape}."
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """What is calibrated on what.
+
+    Parameters
+    ----------
+    group
+        Simulates the trial's agents; its template gives what genes do not say,
+        save the speeds, which are measured.
+    control
+        The statistics of the window.
+    seeds
+        Where the round's random numbers come from.
+    previous
+        What the last round left; None in the first one.
+    guests : ndarray, shape (genome, gene)
+        Genomes that join the initial population, such as a maximum-likelihood estimate.
+    """
+
+    group: Simulator
+    control: Statistics
+    seeds: SeedSource
+    previous: Previous | None = None
+    guests: Floats | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        n_zones = len(self.group.template.zones)
+        if self.previous is not None:
+            check_genome_length(self.previous.genes, n_zones)
+            check_genome_length(self.previous.champion, n_zones)
+        if self.guests is not None:
+            check_genome_length(self.guests, n_zones)
+
+    @property
+    def simulator(self) -> Simulator:
+        """The group with the speeds that were measured in the window."""
+        return self.group.with_template(with_measured_speeds(self.group.template, self.control))
+
+    def steps_of(self, seconds: float) -> int:
+        """Return the number of the model's steps in a time."""
+        return max(1, round(seconds / self.group.template.dt_s))
+
+    def evaluation(self, settings: Settings) -> Objective:
+        """Return what the search maximises: short runs, one seed set for the round."""
+        return Objective(
+            group=self.simulator,
+            control=self.control,
+            n_steps=settings.steps,
+            seeds=self.seeds.seeds(Purpose.EVALUATION, settings.runs),
+        )
+
+    def confirmation(self, settings: Settings) -> Objective:
+        """Return what decides in the end: long runs with seeds of their own."""
+        return Objective(
+            group=self.simulator,
+            control=self.control,
+            n_steps=self.steps_of(settings.long_s),
+            seeds=self.seeds.seeds(Purpose.CONFIRMATION, settings.long_runs),
+        )
+
+    def work(self, *, n_genomes: int, n_runs: int, n_steps: int) -> float:
+        """Return the steps that each worker has to simulate, burn-in included."""
+        shifts = math.ceil(n_genomes * n_runs / max(self.group.n_workers, 1))
+        return float(shifts * (n_steps + self.steps_of(BURN_IN_S)))
+
+    def closing_work(self, settings: Settings) -> float:
+        """Return the steps that confirmation and ceiling take each worker."""
+        return self.work(
+            n_genomes=settings.n_confirmed,
+            n_runs=settings.long_runs,
+            n_steps=self.steps_of(settings.long_s),
+        ) + self.work(
+            n_genomes=1, n_runs=settings.n_windows, n_steps=self.steps_of(settings.window_s)
+        )
