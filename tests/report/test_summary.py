@@ -1,0 +1,229 @@
+"""Plain words: every S with its ceiling, the worst first, and what to type."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from zfcal.report.integration import NOT_COMPARED
+from zfcal.report.summary import gaps, statements, worst_features
+from zfcal.report.trials_summary import gaps_of_trials, statements_of_trials
+from zfcal.report.views import FEATURE_NAMES, MODEL, Integration, Mark
+
+
+def answer_to(view, start):
+    """Return the answer to the question that starts so."""
+    (found,) = (s for s in statements(view) if s.question.startswith(start))
+    return found
+
+
+def test_s_never_stands_alone(make_view):
+    """Mean 0.79, ceiling 0.85: both are in the sentence, and their ratio stands out."""
+    said = answer_to(make_view(), "Does the model")
+
+    assert "S = 0.79" in said.answer
+    assert "0.85" in said.answer
+    assert said.figure == ("93 %", "of what a perfect model would score")
+
+
+def test_windows_within_the_ceiling_are_counted(make_view, course):
+    """Of 0.5, 0.74, 0.75, 0.9 two are no lower than 0.75, the ceiling's low end."""
+    courses = {(MODEL, "S", None): course([0.5, 0.74, 0.75, 0.9], ceiling=0.85)}
+
+    assert "In 2 of 4 windows" in answer_to(make_view(courses=courses), "Does the model").answer
+
+
+def test_a_feature_that_s_hides_is_named(make_view, course):
+    """S within its ceiling in all windows, W below its own in two of three."""
+    courses = {
+        (MODEL, "S", None): course([0.84] * 3, ceiling=0.85),
+        (MODEL, "W", None): course([0.6, 0.7, 0.9], ceiling=0.85),
+        (MODEL, "O", None): course([0.6, 0.9, 0.9], ceiling=0.85),
+    }
+
+    said = answer_to(make_view(courses=courses), "Does the model").answer
+
+    assert "the distances to the wall lie below their own such range in 2 of 3 windows" in said
+    assert "in each zone" not in said
+
+
+def test_a_single_window_is_spoken_of_as_one(make_view, course):
+    """No mean over one window, and its interval is named."""
+    courses = {(MODEL, "S", None): course([0.8], ceiling=0.85)}
+    said = answer_to(make_view(courses=courses), "Does the model").answer
+
+    assert said.startswith("In the only window")
+    assert "0.75 and 0.95" in said
+    assert "windows S" not in said
+
+
+def test_the_worst_is_what_lies_farthest_below_its_ceiling(make_view, course):
+    """0.1 below with an interval of 0.05 is worse than 0.2 below with one of 0.4."""
+    view = make_view()
+    courses = {
+        (MODEL, "D", "corridor"): course([0.6], ceiling=0.8, half_width=0.4),
+        (MODEL, "W", "centre"): course([0.7], ceiling=0.8, half_width=0.05),
+        (MODEL, "T", "walls"): course([0.2]),
+    }
+
+    ranked = worst_features(replace(view, courses=courses))
+
+    assert [(feature, zone) for feature, zone, _ in ranked] == [("W", "centre"), ("D", "corridor")]
+
+
+@pytest.mark.parametrize("feature", ["D", "W", "T"])
+def test_the_worst_says_which_way_it_differs(make_view, course, feature):
+    """With the last window's statistics at hand, fish and model are both named."""
+    courses = {
+        (MODEL, feature, "walls"): course([0.3], ceiling=0.8),
+        (MODEL, "S", None): course([0.5], ceiling=0.8),
+    }
+    view = make_view(courses=courses, n_windows=8)
+
+    said = answer_to(view, "What differs").answer
+
+    assert "in the zone walls" in said
+    assert "In the last window" in said
+    assert "model's" in said
+
+
+def test_too_few_observations_are_no_direction(make_view, course):
+    """A zone where no pair of fish was seen says so instead of a number."""
+    view = make_view(courses={(MODEL, "D", "corridor"): course([0.3], ceiling=0.8)})
+    nobody = replace(view.model_statistics, distance=np.zeros((3, 10), dtype=np.int64))
+
+    said = answer_to(replace(view, model_statistics=nobody), "What differs").answer
+
+    assert said.endswith("too few observations to say which way.")
+
+
+def test_a_good_model_has_nothing_that_differs(make_view, course):
+    """At the ceiling nothing is accused."""
+    courses = {(MODEL, "O", None): course([0.84], ceiling=0.85)}
+
+    assert answer_to(make_view(courses=courses), "What differs").answer.startswith("Nothing stands")
+
+
+def test_the_robot_is_judged_by_a_fish_in_its_place(make_view):
+    """0.60 where a fish scores 0.90 (0.80 to 0.95): it stands out; at 0.85 it does not."""
+    view = make_view()
+    good = {feature: Mark(value=0.85, low=0.8, high=0.95, ceiling=0.9, n=4) for feature in "DWOTS"}
+    blended = replace(view, integration=replace(view.integration, robot=good))
+
+    assert "stands out" in answer_to(view, "Does the robot").answer
+    assert "0.90 on average (0.80 to 0.95, 4 fish)" in answer_to(view, "Does the robot").answer
+    assert "within what fish differ" in answer_to(blended, "Does the robot").answer
+    assert answer_to(view, "Does the robot").figure[0] == "67 %"
+
+
+def test_a_robot_without_ceiling_is_not_judged(make_view):
+    """No ceiling, no verdict: the reason stands instead."""
+    bare = Integration(
+        start_s=300,
+        end_s=540,
+        robot={feature: Mark(value=0.6) for feature in FEATURE_NAMES},
+        missing=("There is no ceiling.",),
+    )
+    said = answer_to(make_view(integration=bare), "Does the robot")
+
+    assert said.answer.endswith("There is no ceiling.")
+    assert "no ceiling" in said.figure[1]
+
+
+def test_parameters_that_mean_nothing_are_counted(make_view):
+    """6 of 18 are open: 12 are pinned down."""
+    assert answer_to(make_view(), "Which parameters").figure[0] == "12 of 18"
+
+
+def test_all_parameters_known_is_said_without_reserve(make_view):
+    """No warning where nothing is open."""
+    view = make_view()
+    known = replace(view.rounds[-1], unidentified=frozenset())
+
+    said = answer_to(replace(view, rounds=[known]), "Which parameters").answer
+
+    assert said == "The last window pins down 18 of 18 parameters."
+
+
+def test_an_empty_trial_says_where_to_begin(make_view):
+    """No tracks: import them, and nothing else is asked for."""
+    empty = make_view(
+        located=None,
+        statistics={},
+        courses={},
+        rounds=[],
+        integration=Integration(start_s=0, end_s=0),
+    )
+    found = gaps(empty)
+
+    assert [gap.command for gap in found] == ["zfcal import TRACKS.csv trial --format csv"]
+    assert statements(empty) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "command"),
+    [
+        ({"statistics": {}, "courses": {}, "rounds": []}, "zfcal analyse trial"),
+        ({"rounds": [], "model_statistics": None}, "zfcal calibrate trial"),
+        ({"courses": {}}, "zfcal calibrate trial --force"),
+        (
+            {"integration": Integration(start_s=0, end_s=0, missing=(NOT_COMPARED,))},
+            "zfcal analyse trial --force",
+        ),
+        (
+            {
+                "integration": Integration(start_s=0, end_s=0, missing=(NOT_COMPARED,)),
+                "scoring": "legacy",
+            },
+            "zfcal analyse trial --scoring paper",
+        ),
+    ],
+    ids=["no statistics", "no model", "no scores", "robot not compared", "legacy scoring"],
+)
+def test_what_is_missing_comes_with_its_command(make_view, changes, command):
+    """Each gap says what to type next."""
+    assert command in [gap.command for gap in gaps(make_view(**changes))]
+
+
+def test_a_whole_trial_lacks_nothing(make_view):
+    """No gap where every part is there."""
+    assert gaps(make_view()) == []
+
+
+def test_one_window_is_called_one(make_view):
+    """A course of one point is no course."""
+    assert any("single window" in gap.what for gap in gaps(make_view(n_windows=1)))
+
+
+def test_several_trials_by_hand(make_view):
+    """Windows from 360 s on: the last four of 0.74 to 0.84 in steps of 1/70, mean 0.819."""
+    views = [make_view("a"), make_view("b")]
+
+    said = statements_of_trials(views)[0].answer
+
+    assert "In 2 of 2 trials, from 6 min on" in said
+    assert "S = 0.82 ± 0.00" in said
+    assert "0.850" in said
+
+
+def test_robots_of_several_trials_are_counted(make_view):
+    """Of two robots one is within its fish."""
+    view = make_view("a")
+    good = {feature: Mark(value=0.85, low=0.8, high=0.95, ceiling=0.9, n=4) for feature in "DWOTS"}
+    other = make_view("b", integration=replace(view.integration, robot=good))
+
+    assert "In 1 of them" in statements_of_trials([view, other])[1].answer
+
+
+def test_gaps_of_several_trials_name_the_trial(make_view):
+    """One complete trial says nothing, the other is named."""
+    found = gaps_of_trials([make_view("a"), make_view("b", rounds=[], model_statistics=None)])
+
+    assert [gap.what.split(":")[0] for gap in found] == ["b"]
+
+
+def test_trials_that_are_too_short_have_no_common_score(make_view):
+    """No window from 360 s on: nothing is claimed."""
+    views = [make_view(name, n_windows=2) for name in "ab"]
+
+    assert [s.question for s in statements_of_trials(views)] == ["Do the robots move like fish?"]

@@ -1,0 +1,240 @@
+"""Read a trial's artifacts into what the report draws from.
+
+A file that is damaged is left out and named; the rest is still shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from zfcal.arena import Arena
+from zfcal.artifacts.arenas import load_arena
+from zfcal.artifacts.freshness import hash_inputs, relative_to
+from zfcal.artifacts.lineage import Lineage, read_lineage
+from zfcal.artifacts.models import read_model_for, read_result
+from zfcal.artifacts.settings import read_trial
+from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
+from zfcal.behaviour.located import Located, join, locate
+from zfcal.behaviour.rows import statistics_from_rows
+from zfcal.behaviour.sampling import sample
+from zfcal.behaviour.statistics import Statistics
+from zfcal.errors import DamagedError, InputError
+from zfcal.report.integration import measure_integration
+from zfcal.report.simulated import long_run
+from zfcal.report.views import Course, CourseKey, Round, Source, TrialView
+from zfcal.trial import Trial, second_of
+from zfcal.units import SEGMENT_S
+
+Damage = Callable[[DamagedError], None]
+
+POOLED_KEY = "robot_pooled_from_s"
+"""Extra metadata of the scores: from when on the robot is judged."""
+
+_KEY_COLUMNS = ("compared", "feature", "zone")
+_NUMBER_COLUMNS = ("window_end_s", "value", "low", "high", "ceiling", "n_windows")
+_ENDINGS = (
+    ("tracks", ".parquet"),
+    ("stats", ".parquet"),
+    ("scores", ".parquet"),
+    ("scores", "-model.parquet"),
+    ("models", ".toml"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Reader:
+    """Reads the files of one trial and notes those that cannot be read."""
+
+    trial: Trial
+    arena: Arena
+    on_damage: Damage
+    damaged: dict[Path, str] = field(default_factory=dict)
+
+    def attempt(self, path: Path, read: Callable[[Path], Any]) -> Any:
+        """Return what a reader returns; None, and a note, where the file is damaged."""
+        if path in self.damaged:
+            return None
+        try:
+            return read(path)
+        except (DamagedError, InputError) as error:
+            # The same text wherever the trial lies.
+            self.damaged[path] = str(error).replace(f"{self.trial.root}/", "")
+            self.on_damage(DamagedError(str(error), hint=error.hint))
+            return None
+
+    def files(self, folder: str, ending: str) -> list[tuple[int, Path]]:
+        """Return the artifacts of a folder by their second, in order."""
+        found = (self.trial.root / folder).glob("*" + ending)
+        numbered = ((second_of(path, ending), path) for path in found)
+        return sorted((second, path) for second, path in numbered if second is not None)
+
+
+def input_files(root: Path) -> list[Path]:
+    """Return the files of a trial that bear on its report: settings, arena and artifacts.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+
+    Raises
+    ------
+    InputError
+        It is no trial.
+    """
+    trial = read_trial(root)
+    reader = _Reader(trial=trial, arena=load_arena(trial.arena, root), on_damage=_ignore)
+    own_arena = root / trial.arena
+    files = [trial.config, *([own_arena] if own_arena.is_file() else [])]
+    for folder, ending in _ENDINGS:
+        files += [path for _, path in reader.files(folder, ending)]
+    return files
+
+
+def gather(root: Path, on_damage: Damage) -> TrialView:
+    """Read all that the report shows of a trial.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    on_damage
+        Hears of each file that is left out.
+
+    Raises
+    ------
+    InputError
+        It is no trial, or its settings or arena are wrong.
+    """
+    trial = read_trial(root)
+    arena = load_arena(trial.arena, root)
+    reader = _Reader(trial=trial, arena=arena, on_damage=on_damage)
+    courses, scored = _courses(reader)
+    rounds = [
+        r for second, path in reader.files("models", ".toml") if (r := _round(reader, second, path))
+    ]
+    calibrated = next((r for r in reversed(rounds) if r.second > 0), None)
+    located = _located(reader)
+    return TrialView(
+        root=root,
+        trial=trial,
+        arena=arena,
+        courses=courses,
+        statistics=_statistics(reader, None if calibrated is None else calibrated.second),
+        rounds=rounds,
+        model_statistics=None if calibrated is None else long_run(calibrated, trial, arena),
+        located=located,
+        integration=measure_integration(
+            courses, located, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
+        ),
+        sources=list(_sources(reader)),
+        left_out=list(reader.damaged.values()),
+        scoring=str(scored.get("scoring", "paper")),
+        has_control_trials="control" in scored,
+    )
+
+
+def _courses(reader: _Reader) -> tuple[dict[CourseKey, Course], dict[str, Any]]:
+    """Return the scores over time, and the options of the newest scores of analyse."""
+    rows: dict[CourseKey, list[tuple[Any, ...]]] = {}
+    options: dict[str, Any] = {}
+    for ending in (".parquet", "-model.parquet"):
+        for _, path in reader.files("scores", ending):
+            table = reader.attempt(path, lambda p: read_table(p, SCORES))
+            if table is None:
+                continue
+            if ending == ".parquet":
+                options = dict(read_lineage(path).options)
+            names = _KEY_COLUMNS + _NUMBER_COLUMNS
+            for compared, feature, zone, *numbers in zip(
+                *(table.column(name).to_pylist() for name in names), strict=True
+            ):
+                rows.setdefault((compared, feature, zone), []).append(tuple(numbers))
+    return {key: _course(found) for key, found in rows.items()}, options
+
+
+def _course(rows: list[tuple[Any, ...]]) -> Course:
+    ordered = sorted(rows, key=lambda row: int(row[0]))
+    end_s = np.array([row[0] for row in ordered], dtype=np.int64)
+    value, low, high, ceiling = (
+        np.array([np.nan if row[i] is None else row[i] for row in ordered], dtype=np.float64)
+        for i in range(1, 5)
+    )
+    n = np.array([row[5] or 0 for row in ordered], dtype=np.int64)
+    return Course(end_s=end_s, value=value, low=low, high=high, ceiling=ceiling, n=n)
+
+
+def _statistics(reader: _Reader, second: int | None) -> dict[tuple[int, str], Statistics]:
+    """Return the statistics of one window by case; of the last that can be read without it."""
+    files = reader.files("stats", ".parquet")
+    for _, path in sorted(files, key=lambda file: (file[0] == second, file[0]), reverse=True):
+        found = reader.attempt(
+            path, lambda p: statistics_from_rows(read_table(p, STATS).to_pydict())
+        )
+        if found is not None:
+            names = reader.arena.zone_names
+            return {key: counts for key, counts in found.items() if counts.zone_names == names}
+    return {}
+
+
+def _round(reader: _Reader, second: int, path: Path) -> Round | None:
+    arena, dt_s = reader.arena, reader.trial.dt_s
+    model = reader.attempt(path, lambda p: read_model_for(p, arena, dt_s=dt_s))
+    if model is None:
+        return None
+    said = read_result(path).get("intervals", {}).get("parameters", {})
+    known = {name: row for name, row in said.items() if {"low", "high", "identified"} <= row.keys()}
+    return Round(
+        second=second,
+        parameters=model,
+        intervals={name: (float(row["low"]), float(row["high"])) for name, row in known.items()},
+        unidentified=frozenset(name for name, row in known.items() if not row["identified"]),
+    )
+
+
+def _located(reader: _Reader) -> Located | None:
+    """Return where everybody was, over all segments that can be read."""
+    parts: list[Located] = []
+    for start_s, path in reader.files("tracks", ".parquet"):
+        part = reader.attempt(path, lambda p, s=start_s: _locate(reader, p, s))  # type: ignore[misc]
+        if part is not None:
+            parts.append(part)
+    return join(parts) if parts else None
+
+
+def _locate(reader: _Reader, path: Path, start_s: int) -> Located:
+    trial = reader.trial
+    end_s = start_s + SEGMENT_S
+    samples = sample(
+        read_tracks(path), fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s
+    )
+    return locate(samples, reader.arena)
+
+
+def _pooled_from(reader: _Reader) -> int:
+    """Return from when on the newest scores judge the robot; 0 where they do not say."""
+    for _, path in reversed(reader.files("scores", ".parquet")):
+        extra = reader.attempt(path, read_extra)
+        if extra is not None:
+            value = extra.get(POOLED_KEY)
+            return value if isinstance(value, int) else 0
+    return 0
+
+
+def _sources(reader: _Reader) -> Iterator[Source]:
+    root = reader.trial.root
+    for folder, ending in _ENDINGS:
+        for _, path in reader.files(folder, ending):
+            lineage = reader.attempt(path, read_lineage)
+            if isinstance(lineage, Lineage):
+                (digest,) = hash_inputs(root, [path]).values()
+                yield Source(path=relative_to(root, path), sha256=digest, lineage=lineage)
+
+
+def _ignore(_: DamagedError) -> None:
+    """Leave it to `gather`, which reads the files, to say what is damaged."""

@@ -1,0 +1,107 @@
+"""The robot among the fish, and how alike the fish are to themselves.
+
+Robot against fish comes from the scores, which pool it from 300 s to the end of
+the newest window; its ceiling puts each fish in the robot's place. The halves
+of the recording are compared here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from zfcal.behaviour.ceilings import halves_ceiling
+from zfcal.behaviour.located import Located
+from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integration, Mark
+from zfcal.tracks import FISH
+
+LATE_S = 300
+"""From here on the robot is judged (Cazenille et al.: scores have settled by then)."""
+
+NOT_COMPARED = "The robot has not been compared with the fish yet."
+
+HALVES_MIN_S = 600.0
+"""Five minutes a half: with less, chance alone makes the halves differ as two windows do."""
+
+
+def measure_integration(
+    courses: Mapping[CourseKey, Course],
+    located: Located | None,
+    *,
+    has_robot: bool,
+    start_s: int,
+) -> Integration:
+    """Return how fish-like the robot moves, and how alike two halves of the fish are.
+
+    Parameters
+    ----------
+    courses
+        The scores over time.
+    located
+        All agents of the trial; None without tracks.
+    has_robot
+        Whether the trial has one.
+    start_s
+        From when on the newest scores pool the robot.
+
+    Returns
+    -------
+    Integration
+        What is missing is said in it.
+    """
+    missing: list[str] = []
+    robot, end_s = _robot(courses)
+    if not has_robot:
+        missing.append("There is no robot in this trial.")
+    elif not robot:
+        missing.append(NOT_COMPARED)
+    elif start_s < LATE_S:
+        missing.append(
+            f"The trial is too young to judge the robot from {LATE_S} s on: the times before "
+            "are in, when the fish were still getting used to it."
+        )
+    if robot and math.isnan(robot["S"].ceiling):
+        missing.append(
+            "There is no ceiling for the robot: to put a fish in its place needs three fish."
+        )
+    halves, why = _halves(located)
+    return Integration(
+        start_s=start_s,
+        end_s=end_s,
+        robot=robot,
+        halves=halves,
+        missing=(*missing, *([why] if why else [])),
+    )
+
+
+def _robot(courses: Mapping[CourseKey, Course]) -> tuple[dict[str, Mark], int]:
+    """Return the newest robot-vs-fish scores by feature, and where their window ends."""
+    newest = courses.get((ROBOT, "S", None))
+    if newest is None or newest.last is None:
+        return {}, 0
+    end_s = int(newest.end_s[newest.last])
+    marks = {}
+    for feature in FEATURE_NAMES:
+        course = courses.get((ROBOT, feature, None))
+        at = [] if course is None else [i for i, end in enumerate(course.end_s) if end == end_s]
+        if course is not None and at:
+            marks[feature] = course.mark(at[0])
+    return marks, end_s
+
+
+def _halves(located: Located | None) -> tuple[dict[str, float], str]:
+    """Return the fish of every other minute against the others, or why not."""
+    if located is None or not len(located):
+        return {}, "There are no tracks."
+    fish = located.of_kind(FISH)
+    length_s = (int(located.k[-1]) - int(located.k[0]) + 1) * located.dt_s
+    if length_s < HALVES_MIN_S - located.dt_s:
+        return {}, (
+            f"The recording is {length_s:.0f} s long; to compare its halves with each other it "
+            f"needs {HALVES_MIN_S:.0f} s."
+        )
+    scores = halves_ceiling(fish, located.arena)
+    if scores is None:
+        return {}, "There are no fish in one half of the recording."
+    named = {"D": scores.I_D, "W": scores.I_W, "O": scores.I_O, "T": scores.I_T, "S": scores.S}
+    return {name: value for name, value in named.items() if not math.isnan(value)}, ""

@@ -1,0 +1,223 @@
+"""The tables of the page: scores, parameters, trials, and where each file comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from zfcal.artifacts.lineage import to_json
+from zfcal.report.parameters_figure import values_of
+from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
+
+_COMPARED = {
+    MODEL: "model",
+    SOCIAL: "fish with robot",
+    ROBOT: "robot",
+}
+_NONE = "–"
+_LONGEST_OPTIONS = 160
+_SCORE_HEADS = ("mean", "last window", "ceiling", "of ceiling", "ceiling's 95 %")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table of the page.
+
+    Parameters
+    ----------
+    name
+        Its anchor.
+    title
+        Its heading.
+    heads
+        Of the columns.
+    rows
+        Cells as text.
+    numbers, wide
+        Columns that stand to the right; columns that may break lines.
+    folded
+        What to press to see it; always open if empty.
+    note
+        How to read it.
+    """
+
+    name: str
+    title: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numbers: Sequence[int] = ()
+    wide: Sequence[int] = ()
+    folded: str = ""
+    note: str = ""
+
+
+def tables(view: TrialView) -> list[Table]:
+    """Return the tables of one trial, those without a row left out."""
+    made = (
+        _scores(view),
+        _scores_by_zone(view),
+        _windows(view),
+        _parameters(view),
+        lineage_table([view]),
+    )
+    return [table for table in made if table.rows]
+
+
+def trials_table(views: Sequence[TrialView]) -> Table:
+    """Return a row per trial: its score, its ceiling and its robot."""
+    rows = []
+    for view in views:
+        mean, robot = view.course(MODEL, "S").mean(), view.integration.robot.get("S")
+        n = int((view.course(MODEL, "S").value >= 0).sum())
+        halves = view.integration.halves.get("S", math.nan)
+        rows.append(
+            [
+                view.name,
+                f"{view.tracked_s / 60:.1f}",
+                str(n),
+                *_cells(mean),
+                *(_cells(robot)[:2] if robot is not None else (_NONE, _NONE)),
+                _number(halves),
+            ]
+        )
+    heads = ("trial", "min", "windows", "model S, mean", "ceiling", "S / ceiling",
+             "robot S, pooled", "fish in its place", "S of two halves")  # fmt: skip
+    return Table(
+        name="trials",
+        title="Trials",
+        heads=heads,
+        rows=rows,
+        numbers=range(1, len(heads)),
+        note="Means over the windows of each trial.",
+    )
+
+
+def lineage_table(views: Sequence[TrialView]) -> Table:
+    """Return a row per artifact that the report was made from, with its origin."""
+    several = len(views) > 1
+    rows = [
+        [
+            f"{view.name}/{source.path}" if several else source.path,
+            source.lineage.command,
+            source.lineage.version,
+            _NONE if source.lineage.seed is None else str(source.lineage.seed),
+            str(len(source.lineage.inputs)),
+            source.sha256[:12],
+            _short(to_json(dict(source.lineage.options))),
+        ]
+        for view in views
+        for source in view.sources
+    ]
+    return Table(
+        name="lineage",
+        title="Where the files come from",
+        heads=("file", "made by zfcal", "version", "seed", "inputs", "SHA-256", "options"),
+        rows=rows,
+        numbers=(3, 4),
+        wide=(6,),
+        folded="1 file" if len(rows) == 1 else f"{len(rows)} files",
+        note="zfcal inspect FILE shows all of a file's origin.",
+    )
+
+
+def _scores(view: TrialView) -> Table:
+    rows = [
+        [_COMPARED[compared], feature, *_score_cells(view.course(compared, feature))]
+        for compared in _COMPARED
+        for feature in FEATURE_NAMES
+        if view.course(compared, feature).last is not None
+    ]
+    return Table(
+        name="numbers",
+        title="Numbers",
+        heads=("against the fish", "of", *_SCORE_HEADS),
+        rows=rows,
+        numbers=range(2, 7),
+        note="Similarities between 0 and 1: D distances between fish, W distances to the wall, "
+        "O time in each zone, T moves between zones, S all together. Ceiling and interval are "
+        "those of the last window.",
+    )
+
+
+def _scores_by_zone(view: TrialView) -> Table:
+    rows = [
+        [_COMPARED[compared], feature, zone, *_score_cells(view.course(compared, feature, zone))]
+        for compared in _COMPARED
+        for feature in "DWT"
+        for zone in view.arena.zone_names
+        if view.course(compared, feature, zone).last is not None
+    ]
+    return Table(
+        name="numbers-by-zone",
+        title="Numbers by zone",
+        heads=("against the fish", "of", "zone", *_SCORE_HEADS),
+        rows=rows,
+        numbers=range(3, 8),
+        folded=f"{len(rows)} scores",
+    )
+
+
+def _score_cells(course: Course) -> list[str]:
+    last = course.mark(course.last or 0)
+    interval = _NONE if math.isnan(last.low) else f"{last.low:.3f} to {last.high:.3f}"
+    return [_number(course.mean().value), *_cells(last), interval]
+
+
+def _windows(view: TrialView) -> Table:
+    shown = [key for key in _COMPARED if view.course(key, "S").last is not None]
+    ends = sorted({int(end) for key in shown for end in view.course(key, "S").end_s})
+    rows = []
+    for end in ends:
+        cells = []
+        for key in shown:
+            course = view.course(key, "S")
+            at = [i for i, each in enumerate(course.end_s) if each == end]
+            cells += list(_cells(course.mark(at[0]))[:2]) if at else [_NONE, _NONE]
+        rows.append([str(end), *cells])
+    heads = ["end (s)"]
+    for key in shown:
+        heads += [f"S, {_COMPARED[key]}", "ceiling"]
+    return Table(
+        name="windows",
+        title="S of each window",
+        heads=heads,
+        rows=rows,
+        numbers=range(len(heads)),
+        folded="1 window" if len(rows) == 1 else f"{len(rows)} windows",
+    )
+
+
+def _parameters(view: TrialView) -> Table:
+    last = view.calibrated
+    rows = []
+    if last is not None:
+        for name, value in values_of(last).items():
+            low, high = last.intervals.get(name, (math.nan, math.nan))
+            interval = _NONE if math.isnan(low) else f"{low:.3g} to {high:.3g}"
+            known = "no" if name in last.unidentified else "yes" if last.intervals else _NONE
+            rows.append([name, f"{value:.3g}", interval, known])
+    return Table(
+        name="parameter-values",
+        title="Parameters of the last round",
+        heads=("parameter", "value", "values that fit as well", "identified"),
+        rows=rows,
+        numbers=(1,),
+        folded=f"{len(rows)} parameters",
+        note="The interval spans 95 % of the genomes of the round that agree with the window as "
+        "well as the champion does.",
+    )
+
+
+def _cells(mark: Mark) -> tuple[str, str, str]:
+    share = mark.against_ceiling
+    percent = _NONE if math.isnan(share) else f"{100 * share:.0f} %"
+    return _number(mark.value), _number(mark.ceiling), percent
+
+
+def _number(value: float) -> str:
+    return _NONE if math.isnan(value) else f"{value:.3f}"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_OPTIONS else text[: _LONGEST_OPTIONS - 3] + "..."

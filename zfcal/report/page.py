@@ -1,0 +1,184 @@
+"""One page and its pictures: what a trial, or several, have shown.
+
+The page holds its figures, so that it can be sent by itself. The same inputs
+give the same bytes: nothing of the day or the machine is in it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from zfcal.artifacts.atomic import sha256_of, storage_error, write_text_whole, write_whole
+from zfcal.artifacts.freshness import hash_inputs, stale_reason
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.validation import check, read_json
+from zfcal.errors import DamagedError, InputError
+from zfcal.report.document import SCHEMA, integration_document
+from zfcal.report.gather import Damage, gather, input_files
+from zfcal.report.panels import Picture, write_picture
+from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
+from zfcal.report.render import render_page
+from zfcal.report.views import TrialView
+
+FOLDER = "report"
+PAGE = "index.html"
+NUMBERS = "integration.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """Where a report goes, and the folder to which its lineage's paths are relative."""
+
+    folder: Path
+    base: Path
+
+
+def write_report(
+    roots: Sequence[Path], out_dir: Path | None = None, *, on_damage: Damage | None = None
+) -> list[Path]:
+    """Write the report of a trial, or one over several trials.
+
+    Parameters
+    ----------
+    roots
+        The trials' directories.
+    out_dir
+        Where the report goes; None for ``report/`` in the trial. Several
+        trials need one.
+    on_damage
+        Hears of each file that is damaged and left out.
+
+    Returns
+    -------
+    list of Path
+        The page, the pictures and the numbers of integration, which come last:
+        whoever finds these finds the others too.
+
+    Raises
+    ------
+    InputError
+        One is no trial, or there are several and ``out_dir`` is missing.
+    StorageError
+        The disk is full, or the place cannot be written.
+    """
+    place = _place(roots, out_dir)
+    lineage = _lineage(roots, place)
+    views = [gather(root, on_damage or _ignore) for root in roots]
+    _check_one_arena(views)
+    pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
+    written = []
+    for picture in pictures:
+        path = place.folder / f"{picture.name}.png"
+        write_whole(path, _drawer(picture))
+        written.append(path)
+    page = place.folder / PAGE
+    write_text_whole(page, render_page(views, pictures, lineage))
+    written.append(page)
+    numbers = place.folder / NUMBERS
+    _remove_outdated(place.folder, {path.name for path in written})
+    document = integration_document(views, lineage, _hashes(written))
+    check(document, "integration", numbers)
+    write_text_whole(numbers, json.dumps(document, indent=2, ensure_ascii=False) + "\n")
+    return [page, *written[:-1], numbers]
+
+
+def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | None:
+    """Return why a report must be made; None if it is up to date.
+
+    Parameters
+    ----------
+    roots, out_dir
+        As for `write_report`.
+
+    Returns
+    -------
+    str or None
+        One line, such as ``missing`` or ``input scores/000180.parquet is new``.
+    """
+    place = _place(roots, out_dir)
+    numbers = place.folder / NUMBERS
+    reason = stale_reason([numbers], _lineage(roots, place))
+    if reason is not None:
+        return reason
+    for name, digest in read_json(numbers)["files"].items():
+        path = place.folder / name
+        if not path.is_file():
+            return f"{name} is missing"
+        if sha256_of(path) != digest:
+            return f"{name} was changed"
+    return None
+
+
+def report_files(roots: Sequence[Path], out_dir: Path | None = None) -> list[Path]:
+    """Return the files of a report that is up to date, the page first."""
+    place = _place(roots, out_dir)
+    names = list(read_json(place.folder / NUMBERS)["files"])
+    ordered = [PAGE, *(name for name in names if name != PAGE), NUMBERS]
+    return [place.folder / name for name in ordered]
+
+
+def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
+    if not roots:
+        raise InputError("A report needs at least one trial.")
+    if len(roots) == 1:
+        folder = out_dir if out_dir is not None else roots[0] / FOLDER
+        return _Place(folder=folder, base=roots[0])
+    if out_dir is None:
+        raise InputError(
+            f"A report over {len(roots)} trials belongs to none of them: it needs a folder.",
+            hint="Say where it goes: zfcal report TRIAL... --out FOLDER",
+        )
+    if len({root.resolve() for root in roots}) < len(roots):
+        raise InputError("The same trial is named twice: it would count twice in every mean.")
+    return _Place(folder=out_dir, base=out_dir)
+
+
+def _lineage(roots: Sequence[Path], place: _Place) -> Lineage:
+    files = [path for root in roots for path in input_files(root)]
+    # The order of the trials bears on the order of the tables.
+    names: list[JSON] = [root.resolve().name for root in roots]
+    return Lineage(
+        schema=SCHEMA,
+        command="report",
+        options={"trials": names},
+        inputs=hash_inputs(place.base, files),
+    )
+
+
+def _check_one_arena(views: Sequence[TrialView]) -> None:
+    for view in views[1:]:
+        if view.arena.zone_names != views[0].arena.zone_names:
+            raise InputError(
+                f"{view.root} has the zones {', '.join(view.arena.zone_names)}, {views[0].root} "
+                f"has {', '.join(views[0].arena.zone_names)}.",
+                hint="Only trials in the same arena make one figure; report them apart.",
+            )
+
+
+def _drawer(picture: Picture) -> Callable[[Path], None]:
+    return lambda part: write_picture(picture, part)
+
+
+def _remove_outdated(folder: Path, made: set[str]) -> None:
+    """Remove pictures of the last report that this one has not: they would pass for current."""
+    try:
+        before = read_json(folder / NUMBERS).get("files", {})
+    except (DamagedError, InputError):
+        return
+    for name in set(before) - made:
+        if Path(name).name == name and name.endswith(".png"):
+            try:
+                (folder / name).unlink(missing_ok=True)
+            except OSError as error:
+                raise storage_error(folder / name, error) from error
+
+
+def _hashes(paths: Sequence[Path]) -> dict[str, str]:
+    return {path.name: sha256_of(path) for path in sorted(paths)}
+
+
+def _ignore(_: DamagedError) -> None:
+    """Leave it to the page to name what is damaged."""

@@ -1,0 +1,64 @@
+"""Which pictures a report has, in the order in which they are told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from zfcal.report.arena_figure import arena_picture
+from zfcal.report.panels import Picture
+from zfcal.report.parameters_figure import parameters_picture
+from zfcal.report.scores_figure import scores_picture
+from zfcal.report.statistics_figure import statistics_picture
+from zfcal.report.tracks_figure import tracks_picture
+from zfcal.report.views import MODEL, ROBOT, SOCIAL, TrialView
+from zfcal.units import WINDOW_S
+
+_ARENA_IN = 4.2
+
+
+def pictures_of_trial(view: TrialView) -> list[Picture]:
+    """Return the pictures that a trial has the artifacts for; the arena always."""
+    made = (
+        *_scores([view]),
+        _statistics(view),
+        parameters_picture(view.rounds),
+        None if view.located is None else tracks_picture(view.located),
+        arena_picture(view.arena, width_in=_ARENA_IN),
+    )
+    return [picture for picture in made if picture is not None]
+
+
+def pictures_of_trials(views: Sequence[TrialView]) -> list[Picture]:
+    """Return the pictures over several trials in one arena."""
+    made = (*_scores(views), arena_picture(views[0].arena, width_in=_ARENA_IN))
+    return [picture for picture in made if picture is not None]
+
+
+def _scores(views: Sequence[TrialView]) -> tuple[Picture | None, Picture | None]:
+    return (
+        scores_picture(views, (MODEL,), name="scores", title="Model against fish", short="Model"),
+        scores_picture(
+            views, (SOCIAL, ROBOT), name="integration", title="Robot among the fish", short="Robot"
+        ),
+    )
+
+
+def _statistics(view: TrialView) -> Picture | None:
+    """Return fish, model and robot of the last calibrated window, or of the last one."""
+    if not view.statistics:
+        return None
+    end_s = max(end for end, _ in view.statistics)
+    fish = view.statistics.get((end_s, "control"))
+    if fish is None:
+        return None
+    cases = {"fish": fish}
+    last = view.calibrated
+    if view.model_statistics is not None and last is not None and last.second == end_s:
+        cases["model"] = view.model_statistics
+    robot = view.statistics.get((end_s, "robot"))
+    if robot is not None:
+        cases["robot"] = robot
+    who = "Fish of the control trials" if view.has_control_trials else "Fish"
+    title = " and ".join([who, *(case for case in cases if case != "fish")])
+    window = f"{max(end_s - int(WINDOW_S), 0)} to {end_s} s"
+    return statistics_picture(cases, view.arena, title=f"{title}, {window}")

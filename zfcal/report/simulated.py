@@ -1,0 +1,47 @@
+"""What the calibrated model does, over a time long enough to leave no noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from zfcal.arena import Arena
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.objective import Purpose, SeedSource, as_statistics, pool_runs
+from zfcal.calibrate.task import Settings
+from zfcal.model.simulate import pack, simulate_counts
+from zfcal.report.views import Round
+from zfcal.trial import Trial
+
+
+def long_run(
+    champion: Round, trial: Trial, arena: Arena, *, settings: Settings | None = None
+) -> Statistics:
+    """Simulate a round's model as the round itself did for its confirmation.
+
+    Parameters
+    ----------
+    champion
+        The round; its seeds follow from the trial's and its window.
+    trial
+        Gives the agents, all driven by the model and all counted.
+    arena
+        Where they swim.
+    settings
+        How many runs, and how long; None for the default, 10 x 1800 s.
+
+    Returns
+    -------
+    Statistics
+        The runs pooled.
+    """
+    settings = settings or Settings()
+    source = SeedSource(trial_seed=trial.seed, window_end_s=champion.second)
+    counts = simulate_counts(
+        pack([champion.parameters], arena),
+        arena,
+        n_agents=trial.n_agents,
+        n_counted=trial.n_agents,
+        n_steps=max(1, round(settings.long_s / trial.dt_s)),
+        seeds=np.asarray(source.seeds(Purpose.CONFIRMATION, settings.long_runs)),
+    )
+    return as_statistics(pool_runs(counts), 0, arena.zone_names)

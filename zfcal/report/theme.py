@@ -1,0 +1,227 @@
+"""Colours and lettering that all figures share, on light and on dark ground.
+
+One colour per zone and one per case in every figure. A colour is never the only
+mark: cases also differ by dash and marker, zones by marker and by name. Apart
+for red-, green- and blue-blind readers as well (the tests measure how far).
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
+
+INK = "#1b1f24"
+MUTED = "#59636e"
+GRID = "#dde2e8"
+GROUND = "#ffffff"
+BAND = "#8b95a1"
+"""The ceiling, its interval and the spread over trials."""
+
+FISH = "#16497a"
+MODEL = "#d55e00"
+ROBOT = "#bd5bdb"
+GROUP = "#00a078"
+"""Fish and robot together."""
+
+ZONES = ("#bd7a00", "#2a8c8c", "#5a1f99", "#7d2a35", "#f0308a", "#2f5bea")
+
+THEME: Mapping[str, tuple[str, str, str]] = MappingProxyType(
+    {
+        INK: ("ink", INK, "#e8ebef"),
+        MUTED: ("muted", MUTED, "#a3adb8"),
+        GRID: ("grid", GRID, "#343b43"),
+        GROUND: ("ground", GROUND, "#16191d"),
+        BAND: ("band", BAND, "#7d8793"),
+        FISH: ("fish", FISH, "#a9cdec"),
+        MODEL: ("model", MODEL, "#e8701a"),
+        ROBOT: ("robot", ROBOT, "#cf52f2"),
+        GROUP: ("group", GROUP, "#4fe39a"),
+        ZONES[0]: ("zone-0", ZONES[0], "#db8f1c"),
+        ZONES[1]: ("zone-1", ZONES[1], "#74dede"),
+        ZONES[2]: ("zone-2", ZONES[2], "#9d6bf2"),
+        ZONES[3]: ("zone-3", ZONES[3], "#ffe375"),
+        ZONES[4]: ("zone-4", ZONES[4], "#f04769"),
+        ZONES[5]: ("zone-5", ZONES[5], "#2a93bb"),
+    }
+)
+"""For each colour of a figure: its name on the page, light and dark."""
+
+ZONE_MARKERS = ("o", "s", "D", "^", "v", "P")
+MARKER_OF = MappingProxyType({FISH: "o", MODEL: "^", ROBOT: "s", GROUP: "D"})
+
+_KNOWN_ZONES = {"corridor": 0, "walls": 1, "centre": 2, "inner": 0, "middle": 1, "outer": 2}
+
+_STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.linewidth": 0.8,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": GROUND,
+    "lines.linewidth": 1.6,
+    "lines.markersize": 4,
+    # A zone may be named with a dollar sign.
+    "text.parse_math": False,
+    # Text stays text: it can be searched, read aloud and takes the page's colour.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "zfcal",
+}
+
+PNG_DPI = 150
+
+_LETTERS_PER_PANEL = 44
+_REM_PER_PT = 1 / 11.6
+"""A letter of 12 points is a little larger than one of 16 pixels."""
+
+
+def zone_numbers(names: Sequence[str]) -> dict[str, int]:
+    """Return for each zone the number of its colour and marker.
+
+    Zones of the arenas that come with zfcal keep theirs in every arena; others
+    take what is left, in the arena's order, and begin again after six.
+    """
+    numbers: dict[str, int] = {}
+    for name in names:
+        if (number := _KNOWN_ZONES.get(name, -1)) >= 0 and number not in numbers.values():
+            numbers[name] = number
+    free = [number for number in range(len(ZONES)) if number not in numbers.values()]
+    others = [name for name in names if name not in numbers]
+    for index, name in enumerate(others):
+        numbers[name] = free[index] if index < len(free) else index % len(ZONES)
+    return {name: numbers[name] for name in names}
+
+
+def zone_colours(names: Sequence[str]) -> dict[str, str]:
+    """Return the colour of each zone, in the order given."""
+    return {name: ZONES[number] for name, number in zone_numbers(names).items()}
+
+
+def zone_markers(names: Sequence[str]) -> dict[str, str]:
+    """Return the marker of each zone, in the order given."""
+    return {name: ZONE_MARKERS[number] for name, number in zone_numbers(names).items()}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Draw and save in the report's style, whatever a person's own settings are."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        # A zone may be named in letters that the font lacks; on the page they are shown.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+        yield
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure that no window manager knows of.
+
+    Parameters
+    ----------
+    width_in, height_in
+        Size in inches.
+    """
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07)
+    figure = Figure(figsize=(width_in, height_in), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def wrapped(name: str) -> str:
+    """Return a name on lines of at most eleven letters, where it can be broken."""
+    return "\n".join(textwrap.wrap(name.replace("_", " "), 11, break_long_words=False)) or name
+
+
+def name_ticks(
+    axes: Axes, at: NDArray[np.int64] | NDArray[np.floating], names: Sequence[str]
+) -> None:
+    """Put names below an x axis, slanted where they would run into each other."""
+    labels = [wrapped(name) for name in names]
+    longest = max(len(line) for label in labels for line in label.split("\n"))
+    if longest * len(names) > _LETTERS_PER_PANEL:
+        axes.set_xticks(at, labels, rotation=30, ha="right", rotation_mode="anchor")
+    else:
+        axes.set_xticks(at, labels)
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Write the figure as a PNG that holds nothing of the day or the machine."""
+    figure.savefig(path, format="png", dpi=PNG_DPI, metadata={"Software": None})
+
+
+def to_svg(figure: Figure, *, prefix: str, alt: str) -> str:
+    """Return the figure as an ``<svg>`` element for a page, coloured by the page.
+
+    Parameters
+    ----------
+    figure
+        Drawn with colours of `THEME`; these become ``var(--NAME, colour)``, so
+        that the page sets them for light and dark.
+    prefix
+        Unique on the page; the element's ids begin with it.
+    alt
+        What the figure shows, for those who cannot see it.
+    """
+    buffer = BytesIO()
+    figure.savefig(
+        buffer,
+        format="svg",
+        dpi=PNG_DPI,
+        transparent=True,
+        metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
+    )
+    text = buffer.getvalue().decode("utf-8")
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)
+    text = _label(text, alt)
+    for colour, (name, light, _) in THEME.items():
+        text = re.sub(colour, f"var(--{name}, {light})", text, flags=re.IGNORECASE)
+    return text.strip()
+
+
+def _label(svg: str, alt: str) -> str:
+    """Let the element take the width it is given, and say what it shows."""
+    head, body = svg.split(">", 1)
+    width = re.search(r'\bwidth="([0-9.]+)pt"', head)
+    head = re.sub(r'\s(width|height)="[^"]*"', "", head)
+    # Little more than the size for which the letters were chosen; less where there is no room.
+    size = "" if width is None else f' style="width: {float(width.group(1)) * _REM_PER_PT:.4g}rem"'
+    quoted = alt.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
+    return f'{head}{size} role="img" aria-label="{quoted}">{body}'
