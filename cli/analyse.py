@@ -1,0 +1,69 @@
+"""`zfcal analyse`: statistics and scores of a trial's windows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .options import EXISTING, makes_artifacts, speaks, takes_trials
+from .output import Output
+from .streams import each_trial
+
+if TYPE_CHECKING:
+    from zfcal.online.streams import Work
+
+
+@click.command("analyse")
+@takes_trials
+@click.option(
+    "--control",
+    type=EXISTING,
+    multiple=True,
+    metavar="TRIAL",
+    help="A robot-free trial whose fish are the control; repeat it to pool several.",
+)
+@click.option(
+    "--scoring",
+    type=click.Choice(["paper", "legacy"]),
+    default="paper",
+    show_default=True,
+    help="legacy: as the authors' published scripts compute the score.",
+)
+@makes_artifacts
+@speaks
+def command(
+    out: Output,
+    trials: tuple[str, ...],
+    *,
+    control: tuple[Path, ...],
+    scoring: str,
+    dry_run: bool,
+    force: bool,
+) -> None:
+    r"""Make statistics and scores of each window of 120 s, every 60 s.
+
+    Writes stats/E.parquet and scores/E.parquet for each second E at which a
+    window ends: the distances between agents, to the wall, occupation,
+    transitions and speeds, and how alike the group with the robot is to the
+    fish alone, and the robot to a fish.
+
+    \b
+    Example:
+        zfcal analyse trial
+        zfcal analyse day1 day2 --control alone1 --control alone2
+        zfcal import tracks.csv trial --format csv | zfcal analyse -
+    """
+    from zfcal.online.analyse import AnalyseOptions, analyse
+    from zfcal.online.opening import Task
+    from zfcal.online.segments import Segments
+
+    options = AnalyseOptions(scoring=scoring, control=control)
+    segments = Segments()
+
+    def work(found: Work) -> None:
+        task = Task(dry_run=dry_run, force=force, ends_s=found.ends_s)
+        analyse(found.root, options, out.tell, task=task, segments=segments)
+
+    each_trial(out, trials, work)

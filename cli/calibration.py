@@ -1,0 +1,82 @@
+"""What the options of `zfcal calibrate` come to; its command is in ``calibrate``."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .output import Output
+
+if TYPE_CHECKING:
+    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.opening import Task
+
+    MakeTask = Callable[[frozenset[int] | None], Task]
+
+
+def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
+    """Return how to calibrate, and what makes a task of the windows that are asked for.
+
+    Raises
+    ------
+    click.UsageError
+        Two options contradict each other, or one could not take effect.
+    """
+    from zfcal.calibrate.task import Settings
+    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.opening import Task
+
+    _check_together(options)
+    settings = Settings(
+        population=options["population"],
+        generations=options["generations"],
+        runs=options["runs"],
+        steps=options["steps"],
+        optimiser=options["optimiser"],
+    )
+    chosen = CalibrateOptions(
+        settings=settings,
+        budget_s=options["budget_s"],
+        seed=options["seed"],
+        n_workers=options["workers"],
+        baselines=options["baselines"],
+        seed_likelihood=options["seed_likelihood"],
+    )
+
+    def task(ends_s: frozenset[int] | None) -> Task:
+        return Task(dry_run=options["dry_run"], force=options["force"], ends_s=ends_s)
+
+    return chosen, task
+
+
+def _check_together(options: Mapping[str, Any]) -> None:
+    if options["generations"] is not None and options["budget_s"] is not None:
+        raise click.UsageError("A round ends after --generations or with its --budget: give one.")
+    if options["window"] is None:
+        for name in ("held_out", "output"):
+            if options[name] is not None:
+                option = "-o" if name == "output" else "--held-out"
+                raise click.UsageError(f"{option} belongs to --window, which is not given.")
+    elif options["output"] is None:
+        raise click.UsageError("--window needs -o FILE: its model is none of the trial's rounds.")
+
+
+def span_task(
+    out: Output,
+    trials: tuple[str, ...],
+    options: Mapping[str, Any],
+    chosen: tuple[CalibrateOptions, MakeTask],
+) -> None:
+    """Calibrate one pooled window of one trial."""
+    from zfcal.online.holdout import Span, calibrate_span
+
+    if len(trials) != 1 or trials[0] == "-":
+        raise click.UsageError("--window takes one trial, since -o names one file.")
+    span = Span(train_s=options["window"], held_out_s=options["held_out"], output=options["output"])
+    calibration, task = chosen
+    work = functools.partial(calibrate_span, Path(trials[0]), span, calibration, out.tell)
+    out.attempt(lambda: work(task=task(None)))

@@ -1,0 +1,195 @@
+"""The `zfcal` command: finds the subcommand, and turns errors into text once.
+
+Subcommands are imported when they are asked for, and they import what is heavy
+when they run: `zfcal --help` loads neither numpy nor pandas.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
+
+import click
+from click.shell_completion import get_completion_class
+
+from .options import laid_out
+from .output import EXIT_INTERRUPTED, ReaderGoneError, complain
+
+COMMANDS = {
+    "demo": "demo",
+    "init": "init",
+    "import": "import_",
+    "simulate": "simulate",
+    "analyse": "analyse",
+    "calibrate": "calibrate",
+    "report": "report",
+    "inspect": "inspect",
+    "check": "check",
+}
+"""Each command and the module that holds it, in the order of a day's work."""
+
+EXIT_USAGE = 2
+EXIT_READER_GONE = 141
+_BUG_HINT = "Run it again with --traceback to see where, and report it."
+
+
+class Terminated(BaseException):
+    """SIGTERM came; like `KeyboardInterrupt`, nothing but the top catches it."""
+
+    exit_code = 143
+
+
+class LazyGroup(click.Group):
+    """A group that imports a subcommand when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return the names, in the order of `COMMANDS`."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Return a command; None if there is none of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f".{COMMANDS[cmd_name]}", __package__)
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that is meant, or say which one may be."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            meant = f" Did you mean {near[0]!r}?" if near else ""
+            raise click.UsageError(f"No command {args[0]!r}.{meant}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        from importlib.metadata import version
+
+        click.echo(f"zfcal {version('zfcal')}")
+        ctx.exit()
+
+
+def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None) -> None:
+    if shell and not ctx.resilient_parsing:
+        made = get_completion_class(shell)
+        if made is None:
+            raise click.UsageError(f"no completion for {shell!r}")
+        click.echo(made(group, {}, "zfcal", "_ZFCAL_COMPLETE").source())
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_print_version,
+    help="Show the version and leave.",
+)
+@click.option(
+    "--completion",
+    type=click.Choice(["bash", "zsh", "fish"]),
+    expose_value=False,
+    is_eager=True,
+    callback=_print_completion,
+    help="Print the completion script of a shell and leave.",
+)
+@laid_out
+def group() -> None:
+    r"""Analyse and calibrate: a robot among zebrafish.
+
+    Every command reads files of a trial directory and writes files into it.
+    It makes what is missing or stale, and nothing else. The paths of the files
+    go to standard output, one a line; a command given - instead of a trial
+    reads such paths, so commands are joined with a pipe.
+
+    \b
+    Example:
+        zfcal init trial --arena two-rooms --fish 4 --robot --fps 15
+        zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
+        eval "$(zfcal --completion bash)"
+    """
+
+
+def main() -> NoReturn:
+    """Run the command line and leave with its exit code."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(argv: Sequence[str]) -> int:
+    """Return the exit code of a command line.
+
+    Parameters
+    ----------
+    argv
+        What follows ``zfcal``.
+
+    Returns
+    -------
+    int
+        As `docs/commands.md` lists them.
+    """
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        code = group.main(args=list(argv), prog_name="zfcal", standalone_mode=False)
+        sys.stdout.flush()
+    except (KeyboardInterrupt, click.Abort):
+        return EXIT_INTERRUPTED
+    except Terminated as error:
+        return error.exit_code
+    except (BrokenPipeError, ReaderGoneError):
+        return _reader_gone()
+    except click.ClickException as error:
+        return _explain_usage(error)
+    except Exception as error:  # noqa: BLE001 - the one place where what escaped becomes text
+        return _explain(error, argv)
+    return code if isinstance(code, int) else 0
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signal's signature
+    raise Terminated
+
+
+def _reader_gone() -> int:
+    """Leave quietly when nobody reads standard output any more."""
+    # What is still buffered would raise once more when the interpreter closes the stream.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return EXIT_READER_GONE
+
+
+def _explain_usage(error: click.ClickException) -> int:
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "zfcal"
+    complain(error.format_message(), hint=f"See: {path} --help")
+    return EXIT_USAGE
+
+
+def _explain(error: Exception, argv: Sequence[str]) -> int:
+    from zfcal.errors import ZfcalError
+
+    if isinstance(error, ZfcalError):
+        complain(str(error), hint=error.hint)
+        return error.exit_code
+    if "--traceback" in argv or "-vv" in argv:
+        traceback.print_exception(error)
+    if isinstance(error, OSError) and error.filename is not None:
+        complain(f"{error.filename}: {error.strerror or error}.")
+    else:
+        complain(f"a bug in zfcal: {type(error).__name__}: {error}", hint=_BUG_HINT)
+    return 1
+
+
+if __name__ == "__main__":
+    main()

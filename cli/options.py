@@ -1,0 +1,95 @@
+"""Options that several commands share, so that each means the same everywhere."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .output import Output
+
+Command = Callable[..., None]
+
+EXISTING = click.Path(exists=True, path_type=Path)
+PLACE = click.Path(path_type=Path)
+
+
+def laid_out(command: Command) -> Command:
+    """Keep the lines of the example in the help as they are.
+
+    click knows such a paragraph by a backspace, which a raw docstring spells out.
+    """
+    command.__doc__ = (command.__doc__ or "").replace("\\b\n", "\b\n")
+    return command
+
+
+def speaks(command: Command) -> Command:
+    """Give a command its voice: ``out``, and --json, -v, -q, --traceback."""
+
+    @click.option("--json", "as_json", is_flag=True, help="One JSON document instead of paths.")
+    @click.option("-v", "--verbose", count=True, help="Say why each file was made; -vv traces.")
+    @click.option("-q", "--quiet", is_flag=True, help="Only errors and files left out.")
+    @click.option("--traceback", is_flag=True, expose_value=False, help="Show where a bug arose.")
+    @functools.wraps(command)
+    def run(*, as_json: bool, verbose: int, quiet: bool, **options: Any) -> None:
+        context = click.get_current_context()
+        if quiet and verbose:
+            raise click.UsageError("--quiet and --verbose contradict each other.")
+        name = context.info_name or ""
+        with Output(name, as_json=as_json, verbose=verbose, quiet=quiet) as out:
+            command(out, **options)
+        context.exit(out.exit_code)
+
+    return laid_out(run)
+
+
+def makes_artifacts(command: Command) -> Command:
+    """Add --dry-run and --force."""
+    command = click.option(
+        "--force", is_flag=True, help="Make it again, even if it is up to date."
+    )(command)
+    return click.option(
+        "-n", "--dry-run", is_flag=True, help="Say what would be made and why; write nothing."
+    )(command)
+
+
+def takes_trials(command: Command) -> Command:
+    """Add the argument TRIAL..., or - for paths of artifacts on standard input."""
+    return click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")(command)
+
+
+def seed_option(text: str) -> Callable[[Command], Command]:
+    """Add --seed, a non-negative whole number."""
+    return click.option("--seed", type=click.IntRange(min=0), default=None, help=text)
+
+
+def arena_options(command: Command) -> Command:
+    """Add what describes the tank and who swims in it."""
+    for option in reversed(
+        (
+            click.option(
+                "--arena",
+                metavar="NAME|FILE",
+                help="An arena by name, or a GeoJSON file in metres.",
+            ),
+            click.option("--radius-m", type=float, help="Radius of a circular arena, in metres."),
+            click.option("--side-m", type=float, help="Side of an open-square arena, in metres."),
+            click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Number of fish."),
+            click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
+            click.option(
+                "--robots", "n_robots", type=click.IntRange(min=0), help="Number of robots."
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def count_robots(*, robot: bool, n_robots: int | None) -> int | None:
+    """Return the number of robots that --robot and --robots ask for; None if neither does."""
+    if robot and n_robots not in (None, 1):
+        raise click.UsageError(f"--robot means one robot, --robots says {n_robots}.")
+    return 1 if robot else n_robots

@@ -1,0 +1,231 @@
+"""What a command says, and where: paths or one JSON document out, all talk to stderr.
+
+The only place that writes to the two streams. What happened comes as the
+events of `zfcal.online.events`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, final
+
+import click
+
+from .progress import Bars
+
+if TYPE_CHECKING:
+    from zfcal.errors import ZfcalError
+    from zfcal.online.events import Event, LeftOut
+
+EXIT_DAMAGED = 3
+EXIT_INTERRUPTED = 130
+_SEVERITY = (0, EXIT_DAMAGED, 75, 1)
+"""Exit codes from the best to the worst: of several trials the worst one counts."""
+
+
+def complain(message: str, *, hint: str = "") -> None:
+    """Write an error, and what to do about it, to standard error."""
+    say(f"{paint('zfcal: error:', 'red')} {message}")
+    if hint:
+        say(f"{paint('hint:', 'cyan')} {hint}")
+
+
+def say(text: str) -> None:
+    """Write a line to standard error."""
+    click.echo(text, err=True)
+
+
+def paint(text: str, colour: str) -> str:
+    """Return the text in a colour where standard error is a terminal that wants it."""
+    wanted = sys.stderr.isatty() and not os.environ.get("NO_COLOR")
+    return click.style(text, fg=colour, bold=True) if wanted else text
+
+
+class ReaderGoneError(BaseException):
+    """Nobody reads standard output any more.
+
+    A name of its own, since click turns a `BrokenPipeError` into exit code 1.
+    """
+
+
+@final
+class Output:
+    """The voice of one run of a command, and its exit code.
+
+    Parameters
+    ----------
+    command
+        Its name.
+    as_json
+        Whether standard output gets one JSON document instead of paths.
+    verbose
+        0, or 1 for the reason of each artifact.
+    quiet
+        Whether only errors and left-out files are told.
+    """
+
+    def __init__(self, command: str, *, as_json: bool, verbose: int, quiet: bool) -> None:
+        self.command = command
+        self.as_json = as_json
+        self.verbose = verbose
+        self.quiet = quiet
+        self.exit_code = 0
+        self._bars = Bars(shown=sys.stderr.isatty() and not quiet)
+        self._artifacts: dict[Path, dict[str, str]] = {}
+        self._left_out: dict[tuple[str, str], dict[str, str]] = {}
+        self._messages: list[dict[str, str]] = []
+        self._errors: list[dict[str, str]] = []
+        self._results: list[Any] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bars.close()
+        if isinstance(error, BrokenPipeError):
+            raise ReaderGoneError from error
+        if error is not None:
+            self._record(error)
+        if self.as_json:
+            self._print_document()
+        if error is None and not self.quiet:
+            self._summarise()
+
+    def tell(self, event: Event) -> None:
+        """Take one event of a stage."""
+        from zfcal.online import events as of
+
+        match event:
+            case of.Made():
+                self._artifact(event.path, "made", event.reason)
+            case of.UpToDate():
+                self._artifact(event.path, "up to date", "")
+            case of.Planned():
+                self._plan(event.path, event.reason)
+            case of.LeftOut():
+                self._leave_out(event)
+            case of.Note():
+                self._talk("warning" if event.warning else "note", event.text)
+            case of.Progress():
+                self._bars.show(event.stage, event.done, event.total)
+            case of.Result():
+                self._results.append(event.value)
+
+    def attempt(self, work: Callable[[], object]) -> None:
+        """Do a part of the work; an error that a person can mend ends that part alone."""
+        from zfcal.errors import ZfcalError
+
+        try:
+            work()
+        except ZfcalError as error:
+            self._fail(error)
+
+    def result(self, value: Any, *, text: str | None = None) -> None:
+        """Give a result that is no file: into the document, or as text to standard output."""
+        self._results.append(value)
+        if text is not None and not self.as_json:
+            self._bars.clear()
+            click.echo(text)
+
+    def note(self, text: str) -> None:
+        """Tell something worth knowing."""
+        self._talk("note", text)
+
+    def _record(self, error: BaseException) -> None:
+        """Put into the document what `main` will say to the person."""
+        text = {"message": str(error) or type(error).__name__, "hint": getattr(error, "hint", "")}
+        self._errors.append(text)
+        self.exit_code = EXIT_INTERRUPTED if isinstance(error, KeyboardInterrupt) else 1
+        self.exit_code = getattr(error, "exit_code", self.exit_code)
+
+    def left_out(self, path: Path, problem: str) -> None:
+        """Tell of a file that is damaged."""
+        from zfcal.online.events import LeftOut
+
+        self._leave_out(LeftOut(path=path, problem=problem))
+
+    def worsen(self, code: int = EXIT_DAMAGED) -> None:
+        """Take an exit code, unless there is a worse one."""
+        self.exit_code = max(self.exit_code, code, key=_SEVERITY.index)
+
+    def _fail(self, error: ZfcalError) -> None:
+        self.worsen(error.exit_code)
+        text = {"message": str(error), "hint": error.hint}
+        if text in self._errors:
+            # A pipe meets the same obstacle with every line.
+            return
+        self._errors.append(text)
+        self._bars.clear()
+        complain(str(error), hint=error.hint)
+
+    def _plan(self, path: Path, reason: str) -> None:
+        self._artifacts[path] = {"path": str(path), "state": "planned", "reason": reason}
+        self._bars.clear()
+        say(f"would make {path}: {reason}")
+
+    def _leave_out(self, event: LeftOut) -> None:
+        key = (str(event.path), event.problem)
+        if event.damaged:
+            self.worsen(EXIT_DAMAGED)
+        if key in self._left_out:
+            return
+        self._left_out[key] = {"path": key[0], "problem": key[1]}
+        self._bars.clear()
+        say(f"{paint('zfcal: left out:', 'yellow')} {event.problem}")
+        if event.hint:
+            say(f"{paint('hint:', 'cyan')} {event.hint}")
+
+    def _talk(self, level: str, text: str) -> None:
+        if {"level": level, "text": text} in self._messages:
+            return
+        self._messages.append({"level": level, "text": text})
+        if not self.quiet:
+            self._bars.clear()
+            say(f"{paint('warning:', 'yellow')} {text}" if level == "warning" else text)
+
+    def _artifact(self, path: Path, state: str, reason: str) -> None:
+        known = self._artifacts.get(path)
+        self._artifacts[path] = {"path": str(path), "state": state, "reason": reason}
+        if known is not None and (state == "up to date" or known["state"] == "made"):
+            # Met again on a later line of standard input: it stays what it was.
+            self._artifacts[path] = known
+            return
+        self._bars.clear()
+        if self.verbose:
+            say(f"{path}: {state}" + (f" ({reason})" if reason else ""))
+        if not self.as_json:
+            click.echo(str(path))
+            sys.stdout.flush()
+
+    def _summarise(self) -> None:
+        states = [artifact["state"] for artifact in self._artifacts.values()]
+        made, fresh, planned = (states.count(s) for s in ("made", "up to date", "planned"))
+        if planned:
+            say(f"{self.command}: {planned} to make, {fresh} up to date; nothing was written.")
+        elif made:
+            say(f"{self.command}: {made} made, {fresh} up to date.")
+        elif fresh and not self._errors:
+            say(f"{self.command}: nothing to do, {fresh} up to date.")
+
+    def _print_document(self) -> None:
+        document = {
+            "command": self.command,
+            "exit_code": self.exit_code,
+            "artifacts": list(self._artifacts.values()),
+            "left_out": list(self._left_out.values()),
+            "messages": self._messages,
+            "errors": self._errors,
+            "results": self._results,
+        }
+        click.echo(json.dumps(document, indent=2, ensure_ascii=False))
+        sys.stdout.flush()

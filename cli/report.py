@@ -1,0 +1,73 @@
+"""`zfcal report`: one page with its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .options import PLACE, makes_artifacts, speaks, takes_trials
+from .output import Output
+from .streams import each_trial
+
+if TYPE_CHECKING:
+    from zfcal.errors import DamagedError
+    from zfcal.online.opening import Task
+    from zfcal.online.streams import Work
+
+
+@click.command("report")
+@takes_trials
+@click.option("-o", "--out", "folder", type=PLACE, help="Where it goes.  [default: TRIAL/report]")
+@makes_artifacts
+@speaks
+def command(
+    out: Output, trials: tuple[str, ...], *, folder: Path | None, dry_run: bool, force: bool
+) -> None:
+    r"""Write a page with figures: one trial, or several in one report.
+
+    The page holds its figures and can be sent by itself; they lie beside it as
+    PNG too. Over several trials it shows mean and standard deviation per window.
+
+    \b
+    Example:
+        zfcal report trial
+        zfcal report day1 day2 day3 --out together
+    """
+    from zfcal.online.opening import Task
+
+    roots: dict[Path, None] = {}
+
+    def collect(found: Work) -> None:
+        roots[found.root] = None
+
+    each_trial(out, trials, collect)
+    if roots and not out.exit_code:
+        task = Task(dry_run=dry_run, force=force)
+        out.attempt(lambda: write_page(out, list(roots), folder, task))
+
+
+def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) -> None:
+    """Write the report of trials, unless it is up to date."""
+    from zfcal.online.events import Made, Planned, UpToDate
+    from zfcal.online.opening import at_work
+    from zfcal.report.page import PAGE, report_files, report_reason, write_report
+
+    with at_work(roots[0], "report", task):
+        reason = report_reason(roots, folder) or ("forced" if task.force else None)
+        if reason is None:
+            for path in report_files(roots, folder):
+                out.tell(UpToDate(path=path))
+        elif task.dry_run:
+            out.tell(Planned(path=(folder or roots[0] / "report") / PAGE, reason=reason))
+        else:
+            for path in write_report(roots, folder, on_damage=_damage(out)):
+                out.tell(Made(path=path, reason=reason))
+
+
+def _damage(out: Output) -> Callable[[DamagedError], None]:
+    from zfcal.online.events import LeftOut
+
+    return lambda error: out.tell(LeftOut(path=Path(), problem=str(error), hint=error.hint))

@@ -1,0 +1,71 @@
+"""The trials that a command is given: as arguments, or as paths on standard input."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import click
+
+from .output import Output
+
+if TYPE_CHECKING:
+    from zfcal.online.streams import Work
+
+STDIN = "-"
+
+
+def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], None]) -> None:
+    """Work on each trial in turn; where one fails, the others still have theirs.
+
+    Parameters
+    ----------
+    out
+        Takes the errors.
+    trials
+        Directories, or ``-`` for paths of artifacts on standard input, which
+        are worked on as they come.
+    work
+        What to do with one.
+    """
+    if STDIN in trials and len(trials) > 1:
+        raise click.UsageError("- stands alone: the trials come on standard input.")
+    if trials == (STDIN,):
+        _each_line(out, sys.stdin, work)
+        return
+    for trial in trials:
+        out.attempt(functools.partial(_one, Path(trial), work))
+
+
+def _one(path: Path, work: Callable[[Work], None]) -> None:
+    from zfcal.online.streams import work_of
+
+    work(work_of(path))
+
+
+def _each_line(out: Output, stream: TextIO, work: Callable[[Work], None]) -> None:
+    from zfcal.online.streams import Work, work_of
+
+    roots: dict[Path, None] = {}
+
+    def at(path: Path) -> None:
+        found = work_of(path)
+        roots[found.root] = None
+        work(found)
+
+    for path in _paths(stream):
+        out.attempt(functools.partial(at, path))
+    if not roots:
+        out.note("No artifact came on standard input: nothing to do.")
+    for root in roots:
+        # The lines were hints; the directory is the truth.
+        out.attempt(functools.partial(work, Work(root=root)))
+
+
+def _paths(stream: TextIO) -> Iterable[Path]:
+    for line in stream:
+        if text := line.rstrip("\n"):
+            yield Path(text)

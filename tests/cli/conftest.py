@@ -1,0 +1,102 @@
+"""Commands, in this process and as processes of their own."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from zfcal_cli.main import run
+
+COMMAND = [sys.executable, "-m", "zfcal_cli.main"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command left: its exit code, and what it wrote where."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def lines(self):
+        """The lines of standard output."""
+        return self.out.splitlines()
+
+
+@pytest.fixture
+def zfcal(capsys, monkeypatch, tmp_path):
+    """Run a command in this process, standing in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*argv):
+        capsys.readouterr()
+        code = run([str(word) for word in argv])
+        captured = capsys.readouterr()
+        return Outcome(code, captured.out, captured.err)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def command():
+    """Return the words that start zfcal as a process."""
+    return COMMAND
+
+
+@pytest.fixture
+def process(tmp_path):
+    """Run a command as a process of its own, without a terminal, in an empty folder."""
+
+    def call(*argv, stdin=None, env=None):
+        done = subprocess.run(
+            [*COMMAND, *map(str, argv)],
+            cwd=tmp_path,
+            input=stdin,
+            stdin=subprocess.DEVNULL if stdin is None else None,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+            env=os.environ | (env or {}),
+        )
+        return Outcome(done.returncode, done.stdout, done.stderr)
+
+    return call
+
+
+@pytest.fixture
+def tracks_csv(tmp_path):
+    """Write the tracks of 3 fish and a robot that wander in a square metre, 5 Hz, as CSV."""
+
+    def write(name="tracks.csv", *, seconds=200, seed=1):
+        rng = np.random.default_rng(seed)
+        n = round(seconds * 5)
+        steps = rng.normal(0, 0.02, size=(n, 4, 2)).cumsum(axis=0)
+        phase = (steps + rng.random((4, 2))) % 1.8
+        xy_m = 0.05 + np.where(phase > 0.9, 1.8 - phase, phase)
+        lines = ["time_s,agent,kind,x_m,y_m"]
+        for frame in range(n):
+            for agent in range(4):
+                kind = "robot" if agent == 3 else "fish"
+                x, y = xy_m[frame, agent]
+                lines.append(f"{frame / 5:.1f},{agent},{kind},{x:.4f},{y:.4f}")
+        path = tmp_path / name
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def trial(tmp_path, tracks_csv, monkeypatch):
+    """Return a trial of 200 s in a square metre, imported; the test stands beside it."""
+    monkeypatch.chdir(tmp_path)
+    tracks_csv()
+    words = ["trial", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5", "-q"]
+    assert run(["init", *words]) == 0
+    assert run(["import", "tracks.csv", "trial", "--format", "csv", "-q"]) == 0
+    return tmp_path / "trial"

@@ -1,0 +1,280 @@
+"""Each command once on a small trial, and what it says when something is wrong."""
+
+import json
+
+import pytest
+
+from zfcal.artifacts import foreign
+from zfcal.artifacts.lock import lock
+from zfcal_cli.foreign import FORMATS, import_options
+
+ROUND = ("--generations", "1", "--population", "4", "--steps", "20")
+
+
+def test_init_makes_a_trial_and_says_where(zfcal):
+    """Two files, one a line; the second time there is nothing to do."""
+    words = ("init", "trial", "--arena", "two-rooms", "--fish", "4", "--robot", "--fps", "15")
+    done = zfcal(*words)
+    assert done.code == 0
+    assert done.lines == ["trial/models/000000.toml", "trial/trial.toml"]
+    again = zfcal(*words)
+    assert again.lines == done.lines
+    assert "nothing to do" in again.err
+
+
+def test_init_refuses_a_trial_that_differs(zfcal):
+    """With exit code 1 and what to do."""
+    zfcal("init", "trial", "--arena", "ring", "--fish", "6")
+    done = zfcal("init", "trial", "--arena", "ring", "--fish", "5")
+    assert done.code == 1
+    assert "n_fish = 6, asked for 5" in done.err
+    assert "--force" in done.err
+    assert zfcal("init", "trial", "--arena", "ring", "--fish", "5", "--force").code == 0
+
+
+def test_import_takes_options_in_the_units_of_people(zfcal):
+    """Millimetres become metres; what is not given is not passed on."""
+    given = {"fps": None, "mm_per_px": 0.5, "noise_mm": 2.0, "flip_y": False, "origin": (0.0, 9.0)}
+    assert import_options(given) == {"m_per_px": 0.0005, "noise_m": 0.002, "origin": (0.0, 9.0)}
+    assert import_options({"robots": (), "first_frame": 0}) == {"robots": (), "first_frame": 0}
+
+
+def test_the_formats_are_those_of_the_library():
+    """Written out in the command, which must not load the library for its help."""
+    assert set(FORMATS) == set(foreign.FORMATS)
+
+
+@pytest.mark.parametrize(
+    ("option", "text"),
+    [("--origin", "5"), ("--origin", "a,b"), ("--columns", "x_m"), ("--body-axis", "head")],
+)
+def test_import_options_of_another_form_are_wrong_usage(zfcal, trial, option, text):
+    """Pairs and lists are checked before anything is read."""
+    assert zfcal("import", "tracks.csv", "trial", option, text).code == 2
+
+
+def test_pixels_are_imported_with_a_scale_and_y_up(zfcal, tmp_path):
+    """(500, 200) px at 1 mm a pixel, from a lower left corner at (0, 1000), is (0.5, 0.8) m."""
+    zfcal("init", "trial", "--side-m", "1", "--fish", "1", "--fps", "5")
+    (tmp_path / "px.csv").write_text("time_s,agent,x_px,y_px\n0,0,500,200\n0.2,0,500,200\n")
+    refused = zfcal("import", "px.csv", "trial")
+    assert refused.code == 1
+    assert "--mm-per-px" in refused.err
+    scale = ("--mm-per-px", "1", "--origin", "0,1000", "--flip-y")
+    assert zfcal("import", "px.csv", "trial", *scale).code == 0
+    (seen,) = json.loads(zfcal("inspect", "trial/tracks/000000.parquet", "--json").out)["results"]
+    head = seen["contents"]["head"][0]
+    assert (head["x_m"], head["y_m"]) == pytest.approx((0.5, 0.8))
+
+
+def test_analyse_makes_statistics_and_scores(zfcal, trial):
+    """200 s have two windows; a dry run says so before, JSON after."""
+    planned = zfcal("analyse", "trial", "--dry-run")
+    assert planned.out == ""
+    assert "would make trial/stats/000120.parquet: missing" in planned.err
+    done = zfcal("analyse", "trial")
+    assert done.code == 0
+    assert done.lines == [
+        f"trial/{folder}/{end}.parquet"
+        for end in ("000120", "000180")
+        for folder in ("stats", "scores")
+    ]
+    document = json.loads(zfcal("analyse", "trial", "--json").out)
+    assert [a["path"] for a in document["artifacts"]] == done.lines
+    assert {a["state"] for a in document["artifacts"]} == {"up to date"}
+
+
+def test_calibrate_makes_models(zfcal, trial):
+    """Three files a window; the result of each round is in the JSON document."""
+    zfcal("analyse", "trial")
+    document = json.loads(zfcal("calibrate", "trial", *ROUND, "--json").out)
+    assert [a["path"] for a in document["artifacts"]][:3] == [
+        "trial/models/000120.parquet",
+        "trial/scores/000120-model.parquet",
+        "trial/models/000120.toml",
+    ]
+    assert [result["window_end_s"] for result in document["results"]] == [120, 180]
+    assert all(0 <= result["S"] <= 1 and result["ceiling"] for result in document["results"])
+    assert "nothing to do, 6 up to date" in zfcal("calibrate", "trial", *ROUND).err
+
+
+def test_calibrate_a_stretch_into_a_file_of_its_own(zfcal, trial):
+    """With its score on what was held out."""
+    words = ("--window", "0:120", "--held-out", "120:200", "-o", "half.toml")
+    done = zfcal("calibrate", "trial", *ROUND, *words)
+    assert (done.code, done.lines) == (0, ["half.toml"])
+    (seen,) = json.loads(zfcal("inspect", "half.toml", "--json").out)["results"]
+    assert set(seen["contents"]["result"]["held_out"]) == {"window", "before", "after"}
+
+
+def test_simulate_a_model_into_a_new_trial(zfcal, trial):
+    """With the arena and the agents of the trial in which the model lies."""
+    words = ("simulate", "other", "--model", "trial/models/000000.toml", "--duration", "2min")
+    done = zfcal(*words, "--seed", "2")
+    assert done.code == 0
+    assert done.lines[-2:] == ["other/tracks/000000.parquet", "other/tracks/000060.parquet"]
+    assert zfcal("analyse", "other").code == 0
+
+
+def test_report_writes_a_page_once(zfcal, trial):
+    """The second time there is nothing to do."""
+    zfcal("analyse", "trial")
+    done = zfcal("report", "trial")
+    assert done.code == 0
+    assert done.lines[0] == "trial/report/index.html"
+    assert "nothing to do" in zfcal("report", "trial").err
+    assert (
+        "would make trial/report/index.html: forced"
+        in zfcal("report", "trial", "-n", "--force").err
+    )
+
+
+def test_a_report_over_several_trials_needs_a_place(zfcal, trial):
+    """It belongs to none of them."""
+    zfcal("analyse", "trial")
+    zfcal("init", "other", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
+    done = zfcal("report", "trial", "other")
+    assert done.code == 1
+    assert "--out" in done.err
+
+
+def test_inspect_shows_text_or_json(zfcal, trial):
+    """Schema, lineage and contents."""
+    text = zfcal("inspect", "trial/tracks/000000.parquet").out
+    assert "schema: zfcal.tracks/1" in text
+    assert "tracks.csv" in text
+    (seen,) = json.loads(zfcal("inspect", "trial/trial.toml", "--json").out)["results"]
+    assert seen["contents"]["n_fish"] == 3
+
+
+def test_inspect_draws_an_arena(zfcal, trial):
+    """As a PNG, whose path is told."""
+    done = zfcal("inspect", "trial/arena.geojson", "--png", "tank.png")
+    assert done.code == 0
+    assert done.lines[-1] == "tank.png"
+    assert (trial.parent / "tank.png").read_bytes().startswith(b"\x89PNG")
+    assert zfcal("inspect", "trial/trial.toml", "--png", "tank.png").code == 2
+
+
+def test_check_finds_a_trial_sound(zfcal, trial):
+    """Everything is whole."""
+    done = zfcal("check", "trial")
+    assert done.code == 0
+    assert "tracks: 4 whole and valid" in done.out
+
+
+def test_a_file_cut_in_half_is_named_by_all_and_the_rest_goes_on(zfcal, trial):
+    """Exit code 3 from inspect, check and analyse; the other window is made."""
+    path = trial / "tracks" / "000120.parquet"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    for words in (
+        ("inspect", "trial/tracks/000120.parquet"),
+        ("check", "trial"),
+        ("analyse", "trial"),
+    ):
+        done = zfcal(*words)
+        assert done.code == 3, words
+        assert "was cut short" in done.out + done.err
+        assert "Traceback" not in done.err
+    assert (trial / "stats" / "000120.parquet").exists()
+    assert not (trial / "stats" / "000180.parquet").exists()
+
+
+@pytest.mark.parametrize("name", ["import", "analyse", "calibrate", "report"])
+def test_the_second_of_the_same_command_ends_with_75(zfcal, trial, name):
+    """And says that it is one; other commands may go on."""
+    words = {"import": ("tracks.csv", "trial"), "calibrate": ("trial", *ROUND)}
+    zfcal("analyse", "trial")
+    with lock(trial, name):
+        done = zfcal(name, *words.get(name, ("trial",)))
+        assert done.code == 75
+        assert f"another zfcal {name} is at work" in done.err
+        assert zfcal("check", "trial").code == 0
+
+
+def test_of_several_trials_one_that_is_wrong_does_not_stop_the_others(zfcal, trial):
+    """Exit code 1, and the good one is analysed."""
+    done = zfcal("analyse", "nowhere", "trial")
+    assert done.code == 1
+    assert "nowhere: is not in a trial" in done.err
+    assert len(done.lines) == 4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("n_fish = 3", "n_fihs = 3", "n_fihs"),
+        ("fps = 5.0", "fps = nan", "fps"),
+        ("fps = 5.0", "fps = 7.0", "dt_s"),
+        ('arena = "arena.geojson"', 'arena = "rinng"', "Did you mean 'ring'"),
+        ("seed = 0", "seed = ", "trial.toml"),
+    ],
+)
+def test_a_wrong_trial_toml_is_one_line_and_a_hint(zfcal, trial, old, new, says):
+    """An unknown key, a rate that is none, a step between frames, an arena nobody has, no TOML."""
+    config = trial / "trial.toml"
+    text = config.read_text()
+    assert old in text
+    config.write_text(text.replace(old, new))
+    done = zfcal("analyse", "trial")
+    assert done.code in {1, 3}
+    assert done.err.startswith("zfcal: error: ")
+    assert says in done.err
+    assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "empty"),
+        ("time_s,agent,x_m\n0,0,0.5\n", "y_m"),
+        ("time_s,agent,x_m,y_m\n0,0,500,500\n0.2,0,501,500\n", "span x 500.000 to 501.000 m"),
+        ("time_s,agent,x_m,y_m\n0,0,inf,0.5\n0.2,0,0.5,0.5\n", "inf"),
+        ("time_s,agent,x_m,y_m\n0,0,nan,nan\n0.2,0,nan,nan\n", "missing"),
+        ("time_s,agent,x_m,y_m\n0.2,0,0.5,0.5\n0.0,0,0.5,0.5\n", "backwards"),
+        ("time_s,agent,x_m,y_m\n0,0,0.5,0.5\n0.1,0,0.5,0.5\n0.2,0,0.5,0.5\n", "Hz"),
+    ],
+)
+def test_a_wrong_csv_is_one_line_and_nothing_is_written(zfcal, trial, text, says):
+    """Empty, a column short, millimetres, infinite, all lost, time running backwards, 10 Hz."""
+    path = trial.parent / "wrong.csv"
+    path.write_text(text)
+    before = sorted(trial.rglob("*"))
+    done = zfcal("import", "wrong.csv", "trial", "--format", "csv", "--force")
+    assert done.code == 1
+    assert says in done.err
+    assert len(done.err.splitlines()) <= 2
+    assert sorted(trial.rglob("*")) == before
+
+
+def test_a_full_disk_is_said_and_loses_nothing(process, trial):
+    """A limit on the size of files stands for the full disk: nothing half-written stays."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (3000, hard))
+    try:
+        done = process("analyse", "trial")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert done.code == 1
+    assert "cannot be written" in done.err
+    assert "ulimit" in done.err
+    assert not list((trial / "stats").iterdir())
+    assert process("analyse", "trial").code == 0
+
+
+def test_a_demo_ends_with_figures(zfcal, monkeypatch):
+    """A shorter one than people get; its second run does nothing."""
+    from zfcal.calibrate.task import Settings
+
+    quick = Settings(
+        population=4, generations=1, steps=20, n_confirmed=1, long_runs=1, long_s=20, n_windows=4
+    )
+    monkeypatch.setattr("zfcal.online.demo.DURATION_S", 180.0)
+    monkeypatch.setattr("zfcal.online.demo.SETTINGS", quick)
+    done = zfcal("demo", "here")
+    assert done.code == 0
+    assert "Figures: here/trial/report" in done.err
+    assert "here/trial/models/000180.toml" in done.lines
+    assert "nothing to do" in zfcal("demo", "here").err

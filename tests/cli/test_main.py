@@ -1,0 +1,223 @@
+"""The group: help, completion, and how errors and signals end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import click
+import pytest
+
+from zfcal.errors import DamagedError, InputError, LockedError, StorageError, ZfcalError
+from zfcal_cli import main as main_module
+from zfcal_cli.main import COMMANDS, group, run
+
+
+def all_commands():
+    """Return every command by its name."""
+    context = click.Context(group)
+    return {name: group.get_command(context, name) for name in group.list_commands(context)}
+
+
+def test_help_lists_every_command(zfcal):
+    """In the order of a day's work."""
+    done = zfcal("--help")
+    shown = [line.split()[0] for line in done.out.partition("Commands:")[2].splitlines() if line]
+    assert shown == list(COMMANDS)
+    assert done.code == 0
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_with_an_example(zfcal, name):
+    """The example is kept line by line, and calls that command."""
+    done = zfcal(name, "--help")
+    example = done.out.partition("Example:\n")[2].partition("\n\n")[0]
+    assert f"zfcal {name}" in example
+    assert all(line.startswith("      ") for line in example.splitlines())
+    assert done.code == 0
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_says_what_it_does(name):
+    """No option without a help text."""
+    for parameter in all_commands()[name].params:
+        if isinstance(parameter, click.Option):
+            assert parameter.help, parameter.name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_speaks_json_and_keeps_quiet(name):
+    """The options that are the same everywhere are there everywhere."""
+    options = {word for parameter in all_commands()[name].params for word in parameter.opts}
+    assert {"--json", "--verbose", "--quiet", "--traceback"} <= options
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_stands_in_the_documentation(repository, name):
+    """docs/commands.md has its usage, and every long option that is not everywhere."""
+    text = (repository / "docs" / "commands.md").read_text(encoding="utf-8")
+    section = text.partition(f"\n## zfcal {name}")[2].partition("\n## ")[0]
+    assert section, f"no section on zfcal {name}"
+    common = {"--json", "--verbose", "--quiet", "--traceback"}
+    for parameter in all_commands()[name].params:
+        for word in set(parameter.opts) - common:
+            if word.startswith("--"):
+                assert f"`{word}" in section, f"{name} {word}"
+
+
+def test_help_loads_nothing_heavy_and_answers_at_once(command):
+    """numpy, pandas and the like stay out; a quarter of a second is plenty."""
+    code = (
+        "import sys; from zfcal_cli.main import run; run(['--help']);"
+        "print([m for m in ('numpy', 'pandas', 'pyarrow', 'numba', 'scipy', 'shapely', 'rich') "
+        "if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+    times = []
+    for _ in range(3):
+        start = time.perf_counter()
+        subprocess.run([*command, "--help"], capture_output=True, check=True)
+        times.append(time.perf_counter() - start)
+    # The best of three: other work on the machine is not the command's.
+    assert min(times) < 0.3
+
+
+def test_the_version_is_the_package_s(zfcal):
+    """As the metadata says."""
+    assert zfcal("--version").out.startswith("zfcal 0.")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_scripts_can_be_printed(zfcal, shell):
+    """To be evaluated by the shell."""
+    assert "_ZFCAL_COMPLETE" in zfcal("--completion", shell).out
+
+
+def test_commands_are_completed(process):
+    """What bash asks for after `zfcal an`."""
+    words = {"_ZFCAL_COMPLETE": "bash_complete", "COMP_WORDS": "zfcal an", "COMP_CWORD": "1"}
+    assert "analyse" in process(env=words).out
+
+
+def test_a_mistyped_command_is_guessed(zfcal):
+    """Wrong usage ends with 2, in two lines and without a traceback."""
+    done = zfcal("analyze", "trial")
+    assert done.code == 2
+    assert done.err.splitlines() == [
+        "zfcal: error: No command 'analyze'. Did you mean 'analyse'?",
+        "hint: See: zfcal --help",
+    ]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["analyse"],
+        ["analyse", "t", "--nonsense"],
+        ["analyse", "t", "-q", "-v"],
+        ["analyse", "-", "t"],
+        ["calibrate", "t", "--budget", "soon"],
+        ["calibrate", "t", "--budget", "5s", "--generations", "3"],
+        ["calibrate", "t", "--window", "900:0", "-o", "m.toml"],
+        ["calibrate", "t", "--window", "0:900"],
+        ["calibrate", "t", "--held-out", "0:900"],
+        ["calibrate", "t", "-o", "m.toml"],
+        ["calibrate", "-", "--window", "0:900", "-o", "m.toml"],
+        ["init", "t", "--arena", "two-rooms"],
+        ["init", "t", "--arena", "two-rooms", "--fish", "3", "--robot", "--robots", "2"],
+        ["simulate", "t", "--duration", "60"],
+        ["simulate", "t", "--model", "nowhere.toml", "--duration", "60"],
+        ["import", "nowhere.csv", "t"],
+        ["inspect", "nowhere.parquet"],
+    ],
+)
+def test_wrong_usage_ends_with_2_and_names_the_help(zfcal, words):
+    """Of the command that was called; nothing is written."""
+    done = zfcal(*words)
+    assert done.code == 2
+    assert done.out == ""
+    assert done.err.splitlines()[-1] == f"hint: See: zfcal {words[0]} --help"
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ZfcalError("wrong", hint="mend it"), 1),
+        (InputError("wrong", hint="mend it"), 1),
+        (DamagedError("wrong", hint="mend it"), 3),
+        (StorageError("wrong", hint="mend it"), 1),
+        (LockedError("wrong", hint="mend it"), 75),
+        (KeyboardInterrupt(), 130),
+        (main_module.Terminated(), 143),
+    ],
+)
+def test_each_error_has_its_exit_code(monkeypatch, capsys, error, code):
+    """Ours are two lines: what, and what to do. Signals are silent."""
+
+    def fail(**_):
+        raise error
+
+    monkeypatch.setattr(main_module.group, "main", fail)
+    assert run([]) == code
+    ours = isinstance(error, ZfcalError)
+    assert capsys.readouterr().err == ("zfcal: error: wrong\nhint: mend it\n" if ours else "")
+
+
+def test_a_bug_is_one_line_unless_its_trace_is_asked_for(monkeypatch, capsys):
+    """A KeyError is nobody's input."""
+
+    def fail(**_):
+        raise KeyError("oops")
+
+    monkeypatch.setattr(main_module.group, "main", fail)
+    assert run([]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("zfcal: error: a bug in zfcal: KeyError: 'oops'\nhint: ")
+    assert run(["--traceback"]) == 1
+    assert "Traceback (most recent call last)" in capsys.readouterr().err
+
+
+def test_a_file_that_may_not_be_read_is_no_bug(monkeypatch, capsys):
+    """The operating system's own words, with the file."""
+
+    def fail(**_):
+        raise PermissionError(13, "Permission denied", "trial/trial.toml")
+
+    monkeypatch.setattr(main_module.group, "main", fail)
+    assert run([]) == 1
+    assert capsys.readouterr().err == "zfcal: error: trial/trial.toml: Permission denied.\n"
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_waiting_command_quietly(command, trial, number, code):
+    """It waits for paths that do not come; nothing but the exit code tells."""
+    with subprocess.Popen(
+        [*command, "analyse", "-"],
+        cwd=trial.parent,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    ) as waiting:
+        waiting.stdin.write(b"trial/tracks/000060.parquet\n")
+        waiting.stdin.flush()
+        # Its first line says that it is at work: the handlers are in place.
+        assert waiting.stdout.readline() == b"trial/stats/000120.parquet\n"
+        waiting.send_signal(number)
+        assert waiting.wait(timeout=20) == code
+        assert b"Traceback" not in waiting.stderr.read()
+
+
+def test_a_reader_that_goes_away_ends_it_quietly(command, trial):
+    """As `| head -1` does."""
+    with subprocess.Popen(
+        [*command, "analyse", "trial"],
+        cwd=trial.parent,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as writing:
+        writing.stdout.close()
+        assert writing.wait(timeout=60) == 141
+        assert writing.stderr.read() == b""

@@ -1,0 +1,141 @@
+"""The likelihood estimate of a window: from its tracks into the round and the model file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.models import read_model_for, read_result
+from zfcal.artifacts.tables import read_tracks, write_tracks
+from zfcal.model.simulate import simulate_tracks
+from zfcal.online.analyse import AnalyseOptions, analyse
+from zfcal.online.calibrate import calibrate
+from zfcal.online.events import Note, say_nothing
+from zfcal.online.likelihood import estimate
+from zfcal.online.opening import open_trial
+from zfcal.parameters import to_genes
+
+
+def swim(root, seed=5):
+    """Put fish that its own starting model drives in place of a trial's tracks."""
+    opened = open_trial(root)
+    trial = opened.trial
+    model = read_model_for(root / trial.model, opened.arena, dt_s=trial.dt_s)
+    xy, _ = simulate_tracks(model, opened.arena, n_agents=3, n_steps=1200, seed=seed)
+    for start in range(0, 240, 60):
+        path = root / "tracks" / f"{start:06d}.parquet"
+        rows = read_tracks(path)
+        part = xy[start * 5 : (start + 60) * 5].reshape(-1, 2)
+        moved = replace(rows, x_m=part[:, 0].copy(), y_m=part[:, 1].copy())
+        write_tracks(path, moved, read_lineage(path))
+    return opened, model
+
+
+def test_the_estimate_of_a_window_is_near_the_truth(make_trial):
+    """Four minutes of three fish: concentrations of the centre within a fifth."""
+    opened, model = swim(make_trial())
+
+    found = estimate(opened, model, (0, 240), say_nothing)
+
+    truth, centre = model.zones[-1], found.found.parameters.zones[-1]
+    assert centre.kappa_0 == pytest.approx(truth.kappa_0, rel=0.2)
+    assert centre.kappa_f == pytest.approx(truth.kappa_f, rel=0.2)
+    assert found.genes.shape == (1, len(to_genes(model)))
+    part = found.table["parameters"]["centre.kappa_0"]
+    assert part["low"] < part["value"] < part["high"]
+    assert part["identified"]
+
+
+def test_uncertain_positions_make_no_steps(make_trial):
+    """A third of the rows thrown anywhere, with a confidence that says so: the same estimate."""
+    root = make_trial()
+    opened, model = swim(root)
+    rng = np.random.default_rng(0)
+    clean = estimate(opened, model, (0, 240), say_nothing).found
+    for path in (root / "tracks").glob("*.parquet"):
+        rows = read_tracks(path)
+        bad = rng.random(len(rows)) < 0.1
+        thrown = replace(
+            rows,
+            x_m=np.where(bad, rng.uniform(0.1, 0.9, len(rows)), rows.x_m),
+            confidence=np.where(bad, 0.2, 1.0).astype(np.float32),
+        )
+        write_tracks(path, thrown, read_lineage(path))
+
+    found = estimate(opened, model, (0, 240), say_nothing).found
+
+    # Each lost position takes the three steps that touch it.
+    assert 0.6 < found.n_steps / clean.n_steps < 0.8
+    low, high = clean.interval["centre.kappa_0"]
+    wide = high - low
+    assert low - wide / 2 < found.parameters.zones[-1].kappa_0 < high + wide / 2
+
+
+def test_the_robot_is_a_neighbour_but_not_a_sample(make_trial):
+    """With a robot in the tank the fish alone make steps."""
+    root = make_trial(n_fish=2, n_robots=1)
+    opened = open_trial(root)
+    model = read_model_for(root / opened.trial.model, opened.arena, dt_s=opened.trial.dt_s)
+
+    found = estimate(opened, model, (0, 120), say_nothing)
+
+    assert found.found.n_steps <= 2 * 600
+
+
+def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, quick):
+    """[result.likelihood] is there, and the window's segments are inputs."""
+    root = make_trial()
+    swim(root)
+    analyse(root, AnalyseOptions(), say_nothing)
+
+    calibrate(root, quick, say_nothing)
+
+    model = root / "models" / "000180.toml"
+    assert read_result(model)["likelihood"]["n_steps"] > 500
+    inputs = read_lineage(model).inputs
+    assert {"tracks/000060.parquet", "tracks/000120.parquet"} <= set(inputs)
+    assert "tracks/000000.parquet" not in inputs
+
+
+def test_the_papers_way_reads_no_tracks(make_trial, quick):
+    """Without the estimate: no table, no segments among the inputs, another lineage."""
+    root = make_trial()
+    analyse(root, AnalyseOptions(), say_nothing)
+
+    calibrate(root, replace(quick, seed_likelihood=False), say_nothing)
+
+    model = root / "models" / "000120.toml"
+    assert "likelihood" not in read_result(model)
+    assert not any("tracks" in name for name in read_lineage(model).inputs)
+    assert read_lineage(model).options["seed_likelihood"] is False
+
+
+def test_without_tracks_the_round_goes_on_and_says_so(make_trial, quick, heard):
+    """Another computer may have the statistics alone."""
+    root = make_trial()
+    analyse(root, AnalyseOptions(), say_nothing)
+    for path in (root / "tracks").glob("*.parquet"):
+        path.unlink()
+
+    calibrate(root, quick, heard.append)
+
+    assert (root / "models" / "000240.toml").exists()
+    notes = [event.text for event in heard if isinstance(event, Note)]
+    assert any("no tracks, so no likelihood estimate" in text for text in notes)
+
+
+def test_a_damaged_segment_costs_the_estimate_alone(make_trial, quick, heard):
+    """The statistics were whole: the round is made, without the estimate."""
+    root = make_trial()
+    analyse(root, AnalyseOptions(), say_nothing)
+    path = root / "tracks" / "000060.parquet"
+    path.write_bytes(path.read_bytes()[:1000])
+
+    calibrate(root, quick, heard.append)
+
+    notes = [event.text for event in heard if isinstance(event, Note)]
+    assert any("000060.parquet" in text and "no likelihood estimate" in text for text in notes)
+    assert (root / "models" / "000120.toml").exists()

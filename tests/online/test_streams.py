@@ -1,0 +1,49 @@
+"""Which windows a path speaks of."""
+
+from pathlib import Path
+
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.online.streams import Work, work_of
+
+
+@pytest.fixture
+def trial(tmp_path, monkeypatch):
+    """Stand beside a folder with a trial.toml."""
+    (tmp_path / "day" / "tracks").mkdir(parents=True)
+    (tmp_path / "day" / "trial.toml").write_text("")
+    monkeypatch.chdir(tmp_path)
+    return Path("day")
+
+
+def test_a_segment_bears_on_the_two_windows_that_hold_it(trial):
+    """The minute from 120 s is in the windows to 180 and to 240 s."""
+    work = work_of(trial / "tracks" / "000120.parquet")
+    assert work == Work(root=Path("day"), ends_s=frozenset({180, 240}))
+
+
+@pytest.mark.parametrize("folder", ["stats", "scores"])
+def test_statistics_bear_on_their_own_window(trial, folder):
+    """The number of the file is the end of the window."""
+    assert work_of(trial / folder / "000180.parquet").ends_s == {180}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "trial.toml", "models/000120.toml", "scores/000120-model.parquet"]
+)
+def test_any_other_path_bears_on_all_windows(trial, name):
+    """A trial, its settings, a model."""
+    assert work_of(trial / name) == Work(root=Path("day"))
+
+
+def test_a_relative_path_gives_a_relative_trial(trial):
+    """So that the paths that come out of a pipe look like those that go in."""
+    assert not work_of(trial / "tracks" / "000000.parquet").root.is_absolute()
+
+
+def test_a_path_below_no_trial_is_refused(trial):
+    """The hint says how to make one."""
+    with pytest.raises(InputError, match="not in a trial") as error:
+        work_of(Path("elsewhere/tracks/000000.parquet"))
+    assert "zfcal init" in error.value.hint

@@ -1,0 +1,293 @@
+"""The files of a calibration round: what it starts from, what it leaves, and its checkpoint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.artifacts.atomic import write_whole
+from zfcal.artifacts.lineage import JSON, Lineage, to_json
+from zfcal.artifacts.models import write_model
+from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
+from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
+from zfcal.behaviour.scores import Scores
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.checkpoint import from_bytes, to_bytes
+from zfcal.calibrate.rounds import RoundResult
+from zfcal.calibrate.search import Progress
+from zfcal.calibrate.task import Previous
+from zfcal.errors import DamagedError
+from zfcal.parameters import gene_names
+
+MODEL = "zfcal.model/1"
+POPULATION = "zfcal.population/1"
+SCORES = "zfcal.scores/1"
+STATS = "zfcal.stats/1"
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoundPlaces:
+    """Where the files of the round of one window are.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    end_s
+        Where the window ends, in seconds since trial start.
+    """
+
+    root: Path
+    end_s: int
+
+    @property
+    def stats(self) -> Path:
+        """The statistics that it starts from."""
+        return self._at("stats", ".parquet")
+
+    @property
+    def population(self) -> Path:
+        """The last population, from which the next round starts."""
+        return self._at("models", ".parquet")
+
+    @property
+    def scores(self) -> Path:
+        """How alike the champion is to the window."""
+        return self._at("scores", "-model.parquet")
+
+    @property
+    def model(self) -> Path:
+        """The champion."""
+        return self._at("models", ".toml")
+
+    @property
+    def checkpoint(self) -> Path:
+        """Where a killed round was; a dot-file, which nobody mirrors or reads."""
+        return self.root / "models" / f".{self.end_s:06d}.checkpoint"
+
+    @property
+    def artifacts(self) -> tuple[tuple[Path, str], ...]:
+        """The files and their schemas, in the order in which they are written.
+
+        The model is last: whoever finds it finds the others too.
+        """
+        return (self.population, POPULATION), (self.scores, SCORES), (self.model, MODEL)
+
+    def _at(self, folder: str, ending: str) -> Path:
+        return self.root / folder / f"{self.end_s:06d}{ending}"
+
+
+def read_control(path: Path, zone_names: tuple[str, ...]) -> Statistics:
+    """Return the control case of a window's statistics.
+
+    Raises
+    ------
+    DamagedError
+        The file is damaged, has no control case, or is of other zones.
+    """
+    table = read_table(path, STATS).to_pydict()
+    cases = {case: counts for (_, case), counts in statistics_from_rows(table).items()}
+    control = cases.get("control")
+    if control is None or control.zone_names != zone_names:
+        found = "no control case" if control is None else f"zones {', '.join(control.zone_names)}"
+        raise DamagedError(
+            f"{path}: holds {found}, expected a control case of zones {', '.join(zone_names)}.",
+            hint="Make it again: zfcal analyse TRIAL --force",
+        )
+    return control
+
+
+def read_previous(path: Path) -> Previous:
+    """Return what a round left for the next one.
+
+    Raises
+    ------
+    DamagedError
+        The file is damaged, or its extra metadata is not what `write_round` writes.
+    """
+    table = read_table(path, POPULATION)
+    extra = read_extra(path)
+    champion, noise = extra.get("champion"), extra.get("noise")
+    if not isinstance(champion, list):
+        raise DamagedError(
+            f"{path}: does not say which genome was the champion.",
+            hint="Make it again: zfcal calibrate TRIAL --force",
+        )
+    scores = table.column("S").to_numpy()
+    return Previous(
+        genes=np.array(table.column("genes").to_pylist(), dtype=np.float64),
+        scores=np.asarray(scores, dtype=np.float64),
+        champion=np.array(champion, dtype=np.float64),
+        noise=float(noise) if isinstance(noise, int | float) else math.nan,
+    )
+
+
+def write_round(
+    places: RoundPlaces,
+    result: RoundResult,
+    lineages: dict[str, Lineage],
+    table: dict[str, JSON],
+) -> None:
+    """Write what a round has found, the model last.
+
+    Parameters
+    ----------
+    places
+        Where it goes.
+    result
+        What was found.
+    lineages
+        The lineage of each file, by its schema.
+    table
+        The model's table ``[result]``, from `result_table`.
+    """
+    _write_population(places.population, result, lineages[POPULATION])
+    rows = scores_to_rows(
+        result.scores,
+        window_end_s=places.end_s,
+        compared="model-vs-control",
+        ceiling=result.ceiling,
+    )
+    write_table(places.scores, make_table(SCORES, rows), lineages[SCORES])
+    write_model(places.model, result.champion, lineages[MODEL], table)
+
+
+def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
+    state = result.population
+    features = dict(zip(("I_D", "I_W", "I_O", "I_T"), state.features.T, strict=True))
+    columns = {
+        "individual": np.arange(len(state.genes), dtype=np.int32),
+        "rank": state.rank.astype(np.int32),
+        "S": state.scores,
+        "genotypic_diversity": state.objectives[:, 1],
+        "behavioural_diversity": state.objectives[:, 2],
+        **features,
+        "genes": state.genes.tolist(),
+    }
+    extra: dict[str, JSON] = {
+        "gene_names": list(gene_names(result.champion.zone_names)),
+        "champion": result.genes.tolist(),
+        "noise": _number(result.as_previous.noise),
+        "generations": result.generations,
+    }
+    write_table(path, make_table(POPULATION, columns), lineage, extra=extra)
+
+
+def result_table(
+    result: RoundResult,
+    baselines: dict[str, JSON],
+    likelihood: dict[str, JSON] | None = None,
+) -> dict[str, JSON]:
+    """Return the table ``[result]`` of a calibrated model.
+
+    Parameters
+    ----------
+    result
+        Of the round.
+    baselines
+        S of each baseline.
+    likelihood
+        The window's maximum-likelihood estimate; None without one.
+
+    Returns
+    -------
+    dict
+        S stands with its ceiling; a value that is NaN is None.
+    """
+    last = result.history[-1]
+    return {
+        "generations": result.generations,
+        "evaluations": result.evaluations,
+        **score_table(result.scores, result.ceiling),
+        "optimiser_S": _number(result.optimiser_score),
+        "hypervolume": [_number(line.hypervolume) for line in result.history],
+        "best_S_in_population": _number(last.best_score),
+        "world_changed": result.world_changed,
+        "n_renewed": result.n_renewed,
+        "baselines": baselines or None,
+        "likelihood": likelihood,
+        "intervals": {
+            "threshold": _number(result.intervals.threshold),
+            "n_compatible": result.intervals.n_compatible,
+            "within_ceiling": result.intervals.within_ceiling,
+            "parameters": {
+                part.name: {"value": part.value, "low": part.low, "high": part.high,
+                            "identified": part.identified}
+                for part in result.intervals.parameters
+            },
+        },
+    }  # fmt: skip
+
+
+def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
+    """Return S, its features and its ceiling as the entries of a table."""
+    mean, low, high = ceiling.of("S")
+    return {
+        "S": _number(scores.S),
+        "ceiling": _number(mean),
+        "ceiling_low": _number(low),
+        "ceiling_high": _number(high),
+        "n_windows": ceiling.n_windows,
+        "against_ceiling": _number(scores.S / mean if mean > 0 else math.nan),
+        "features": {
+            field.name: _number(getattr(scores, field.name))
+            for field in fields(scores)
+            if field.name.startswith("I_")
+        },
+        "n_features": scores.n_features,
+    }
+
+
+def save_checkpoint(path: Path, progress: Progress, key: str) -> None:
+    """Write where a search is, whole or not at all."""
+    data = to_bytes(progress, key=key)
+
+    def write(part: Path) -> None:
+        part.write_bytes(data)
+
+    write_whole(path, write)
+
+
+def load_checkpoint(path: Path, key: str, *, at_most: int | None) -> Progress | None:
+    """Return where a killed round was; None to start anew.
+
+    Parameters
+    ----------
+    path
+        The checkpoint.
+    key
+        Of the round that wants to go on.
+    at_most
+        Generations that are asked for: one that is farther is of no use.
+    """
+    try:
+        progress = from_bytes(path.read_bytes(), key=key)
+    except (FileNotFoundError, DamagedError):
+        # Starting anew ends in the same result; the next generation replaces the file.
+        return None
+    if progress is None or (at_most is not None and progress.state.generation > at_most):
+        return None
+    return progress
+
+
+def checkpoint_key(lineage: Lineage) -> str:
+    """Return what a checkpoint must agree in to be of use: all but the generations."""
+    said = lineage.as_dict()
+    del said["schema"]
+    said["options"] = {
+        name: value
+        for name, value in said["options"].items()
+        if name not in {"generations", "baselines"}
+    }
+    return to_json(said)
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)

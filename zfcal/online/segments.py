@@ -1,0 +1,127 @@
+"""The closed track segments of a trial, located in its arena.
+
+Windows overlap, and a pipe visits the same segments again and again, so what was
+located is remembered, by the content of the file.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from pathlib import Path
+from typing import final
+
+from zfcal.arena import Arena
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.tables import read_extra, read_tracks
+from zfcal.behaviour.located import Located, locate
+from zfcal.behaviour.sampling import sample
+from zfcal.errors import DamagedError, InputError
+from zfcal.online.events import LeftOut, Tell
+from zfcal.online.opening import OpenTrial, open_trial
+from zfcal.trial import second_of
+from zfcal.units import SEGMENT_S
+
+STEP_S = int(SEGMENT_S)
+END_KEY = "end_s"
+"""Extra metadata of a segment: the second up to which the recording filled it."""
+
+_REMEMBERED = 512
+"""Segments kept in memory: a working day, some 100 MB with five agents at 5 Hz."""
+
+
+def segment_path(root: Path, start_s: int) -> Path:
+    """Return the place of the segment that starts at a second."""
+    return root / "tracks" / f"{start_s:06d}.parquet"
+
+
+def segment_starts(root: Path) -> list[int]:
+    """Return the seconds at which the segments of a trial start, in order.
+
+    Segments start on whole minutes; other files in ``tracks/`` are none.
+    """
+    found = (second_of(path) for path in (root / "tracks").glob("*.parquet"))
+    return sorted(second for second in found if second is not None and second % STEP_S == 0)
+
+
+@final
+class Segments:
+    """Reads the segments of trials, each once.
+
+    A trial's settings may change between two questions; what depends on them is
+    then located anew.
+    """
+
+    def __init__(self) -> None:
+        self._located: OrderedDict[tuple[str, ...], Located] = OrderedDict()
+        self._arenas: dict[tuple[str, str], Arena] = {}
+
+    def open(self, root: Path) -> OpenTrial:
+        """Open a trial; as long as its arena file stays, it is the very same arena."""
+        opened = open_trial(root)
+        hashes = hash_inputs(root, opened.arena_files)
+        key = (str(root.absolute()), "".join(hashes.values()) or opened.trial.arena)
+        arena = self._arenas.setdefault(key, opened.arena)
+        return OpenTrial(trial=opened.trial, arena=arena)
+
+    def read(self, opened: OpenTrial, start_s: int) -> Located:
+        """Return where everybody was in a segment.
+
+        Raises
+        ------
+        DamagedError
+            The file is damaged, of another schema, or holds what no tracker writes.
+        """
+        trial = opened.trial
+        path = segment_path(trial.root, start_s)
+        content = hash_inputs(trial.root, [path])
+        clock = (str(trial.fps), str(trial.dt_s), str(id(opened.arena)))
+        key = (str(path.absolute()), *content.values(), *clock)
+        if key not in self._located:
+            self._located[key] = _locate(opened, path, start_s)
+            if len(self._located) > _REMEMBERED:
+                self._located.popitem(last=False)
+        return self._located[key]
+
+    def read_or_tell(self, opened: OpenTrial, start_s: int, tell: Tell) -> Located | None:
+        """Return what `read` does; None for a segment that is left out, which is told."""
+        try:
+            return self.read(opened, start_s)
+        except (DamagedError, InputError) as error:
+            path = segment_path(opened.trial.root, start_s)
+            tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+            return None
+
+
+def _locate(opened: OpenTrial, path: Path, start_s: int) -> Located:
+    trial = opened.trial
+    tracks = read_tracks(path)
+    end_s = start_s + SEGMENT_S
+    if len(tracks) and not (tracks.time_s[0] >= start_s and tracks.time_s[-1] < end_s):
+        raise DamagedError(
+            f"{path}: holds the times {tracks.time_s[0]:.6g} s to {tracks.time_s[-1]:.6g} s, "
+            f"expected {start_s} s to {end_s:.6g} s.",
+            hint="The name says where a segment starts: give the file its own name back.",
+        )
+    try:
+        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
+    except InputError as error:
+        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
+    return locate(samples, opened.arena)
+
+
+def is_whole(root: Path, start_s: int, *, fps: float) -> bool:
+    """Return whether the recording went on to the end of a segment.
+
+    The importer writes down where it ended; without that a segment is whole when
+    its last row lies within two frames of the end. A damaged one counts as whole:
+    whoever reads it says what is wrong.
+    """
+    path = segment_path(root, start_s)
+    try:
+        end_s = read_extra(path).get(END_KEY)
+        if not isinstance(end_s, int | float):
+            time_s = read_tracks(path).time_s
+            end_s = time_s[-1] + 2 / fps if len(time_s) else start_s
+    except (DamagedError, InputError):
+        return True
+    return bool(end_s >= start_s + SEGMENT_S - 0.5 / fps)
