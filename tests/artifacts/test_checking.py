@@ -120,6 +120,14 @@ def test_an_input_that_is_gone_is_noted(trial, tracks):
     assert found_in(trial, "tracks/000000.parquet") == [(NOTE, "its input ../raw.csv is gone")]
 
 
+def test_a_source_outside_the_trial_is_not_looked_for(trial, tracks):
+    """It is known by its bare name: that it does not lie in the trial says nothing."""
+    lineage = Lineage(schema=TRACKS, command="import", inputs={"raw.csv": "0" * 64})
+    write_tracks(trial.path("tracks", 0, ".parquet"), tracks, lineage)
+
+    assert troubles(trial) == []
+
+
 def test_artifacts_of_another_version_are_noted(trial, tracks):
     """No reason to worry, and none to recompute."""
     lineage = Lineage(schema=TRACKS, command="import", version="0.0.1")

@@ -228,6 +228,9 @@ def _lineage(place: _Place, path: Path, name: str) -> Iterator[Finding]:
     again = f"Make it again with: zfcal {lineage.command} {place.root}"
     for source, sha256 in lineage.inputs.items():
         origin = place.root / source
+        if not origin.is_file() and "/" not in source:
+            # What lay outside the trial is known by its bare name, wherever it is now.
+            continue
         if not origin.is_file():
             yield Finding(level=NOTE, where=name, says=f"its input {source} is gone")
         elif hash_inputs(place.root, [origin]) != {source: sha256}:
