@@ -21,6 +21,10 @@ KAPPA_0_MAX = 30.0
 KAPPA_F_MAX = 30.0
 ALPHA_MAX = 50.0
 
+KAPPA_LIMIT = 1000.0
+"""A larger concentration is no behaviour (it spreads by less than 2 degrees) and no law
+that a density on 360 angles can hold."""
+
 SPEED_BINS = 10
 
 
@@ -63,6 +67,11 @@ class ZoneParameters:
         for key, value in numbers.items():
             if not 0 <= value < math.inf:
                 raise InputError(f"{where}: {key} must be finite and not negative, got {value!r}.")
+            if key.startswith("kappa") and value > KAPPA_LIMIT:
+                raise InputError(
+                    f"{where}: {key} must be at most {KAPPA_LIMIT:g}, got {value!r}.",
+                    hint="It is a von Mises concentration; real fish have 1 to 30.",
+                )
         _check_frequencies(where, self.speed_frequency)
         if not any(value > 0 for value in self.gamma.values()):
             raise InputError(f"{where}: gamma needs one positive value, got {self.gamma!r}.")
@@ -158,14 +167,27 @@ def from_genes(genes: ArrayLike, template: Parameters) -> Parameters:
     Parameters
     ----------
     genes : array_like, shape (gene,)
-        In [0, 1], in the order of `gene_names`.
+        In [0, 1], in the order of `gene_names`. A row of gamma that is all zero
+        prefers nothing and becomes a row of ones.
     template
         Gives the step, the field of view, the speeds and the effects.
+
+    Raises
+    ------
+    InputError
+        The genome is of another length, or a value is none of a model.
     """
     n_zones = len(template.zones)
-    values = np.asarray(genes, dtype=np.float64) * gene_scales(n_zones)
+    values = np.array(genes, dtype=np.float64)
+    if values.shape != (n_genes(n_zones),):
+        raise InputError(
+            f"A genome of {n_zones} zones has {n_genes(n_zones)} genes, "
+            f"got an array of shape {values.shape}."
+        )
+    values *= gene_scales(n_zones)
     own = values[: 3 * n_zones].reshape(n_zones, 3)
     gamma = values[3 * n_zones :].reshape(n_zones, n_zones)
+    gamma[(gamma == 0).all(axis=1)] = 1.0
     zones = tuple(
         ZoneParameters(
             name=zone.name,

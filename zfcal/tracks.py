@@ -53,7 +53,7 @@ class Tracks:
 
     def __post_init__(self) -> None:
         sizes = {field.name: getattr(self, field.name).shape for field in fields(self)}
-        if len(set(sizes.values())) != 1:
+        if len(set(sizes.values())) != 1 or self.frame.ndim != 1:
             raise InputError(f"Tracks need columns of one length, got {sizes}.")
 
     def __len__(self) -> int:

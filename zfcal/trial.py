@@ -60,6 +60,8 @@ class Trial:
                 f"{where}: needs at least one agent, got n_fish = {self.n_fish} and "
                 f"n_robots = {self.n_robots}."
             )
+        if self.seed < 0:
+            raise InputError(f"{where}: seed must be a whole number from 0 on, got {self.seed!r}.")
         frames = self.dt_s * self.fps
         if not (
             math.isfinite(frames) and round(frames) >= 1 and abs(frames - round(frames)) < 1e-3

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 
+from zfcal.errors import InputError
+
 WINDOW_S = 120.0
 """Length of an analysis window (Cazenille et al., data analysis)."""
 
@@ -28,7 +30,9 @@ M_PER_MM = 0.001
 
 def wrap_angle(angle_rad: float) -> float:
     """Return the same direction in ``[-pi, pi)``, in radians."""
-    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
+    turned = (angle_rad + math.pi) % (2 * math.pi) - math.pi
+    # Just below -pi the remainder rounds up to a whole turn.
+    return -math.pi if turned >= math.pi else turned
 
 
 def default_dt_s(fps: float) -> float:
@@ -43,5 +47,12 @@ def default_dt_s(fps: float) -> float:
     -------
     float
         The step in seconds, at least one frame.
+
+    Raises
+    ------
+    InputError
+        The rate is none.
     """
+    if not 0 < fps < math.inf:
+        raise InputError(f"fps must be a positive rate in hertz, got {fps!r}.")
     return max(1, round(STEP_S * fps)) / fps

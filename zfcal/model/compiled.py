@@ -3,8 +3,9 @@
 Numba looks only at a function's own file to see whether a kept version still
 holds, so a change in a file that it calls would go unnoticed. Here the place
 itself is named after all sources of the model. It is in the user's cache
-folder, since an installed package may not be writable. ``NUMBA_CACHE_DIR``
-overrules it.
+folder, since an installed package may not be writable, or in the folder that
+``NUMBA_CACHE_DIR`` names. Where neither can be written nothing is kept, and
+every start compiles anew.
 """
 
 from __future__ import annotations
@@ -16,34 +17,53 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba import njit
+from numba import cfunc, njit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _config: Any = numba.config
 
 
-def cache_folder() -> Path:
-    """Return the folder that belongs to this very version of the model's sources."""
+def cache_folder() -> Path | None:
+    """Return the folder for this very version of the model's sources; None without a home."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "zfcal" / f"kernels-{digest.hexdigest()[:16]}"
+    here = Path(__file__).parent
+    for path in sorted(here.rglob("*.py")):
+        digest.update(f"{path.relative_to(here).as_posix()}\0".encode() + path.read_bytes())
+    asked = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        home = Path(asked) if asked else Path.home() / ".cache"
+    except RuntimeError:
+        return None
+    return home / "zfcal" / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def keeps(folder: Path | None) -> bool:
+    """Tell whether kernels can be kept in a folder, which is made if need be."""
+    try:
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return folder is not None and os.access(folder, os.W_OK | os.X_OK)
 
 
 def is_warm() -> bool:
     """Tell whether kernels were compiled before, so that a start takes no half minute."""
-    return any(Path(_config.CACHE_DIR).rglob("*.nbi"))
+    return KEPT and any(Path(_config.CACHE_DIR).rglob("*.nbi"))
 
 
-if not _config.CACHE_DIR:
-    _config.CACHE_DIR = str(cache_folder())
+_folder = cache_folder()
+KEPT = keeps(_folder)
+"""Whether compiled kernels outlast the process."""
+
+if KEPT:
+    _config.CACHE_DIR = str(_folder)
 
 
 def kernel(function: F) -> F:
     """Compile a function by itself."""
-    compiled: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy")(function)
     return compiled
 
 
@@ -54,7 +74,7 @@ def lean(function: F) -> F:
     a step three times as slow. Products and sums may be fused.
     """
     options: dict[str, Any] = {"fastmath": {"contract"}, "_nrt": False}
-    compiled: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy", **options)(function)
     return compiled
 
 
@@ -62,3 +82,15 @@ def inlined(function: F) -> F:
     """Make a function a part of its callers."""
     compiled: Any = njit(inline="always")(function)
     return compiled
+
+
+def hook(signature: Any) -> Callable[[F], Any]:
+    """Return what compiles an effect's function, to be called by its address.
+
+    Parameters
+    ----------
+    signature
+        One of `zfcal.model.kernels.hooks`.
+    """
+    made: Any = cfunc(signature, cache=KEPT, error_model="numpy")
+    return made

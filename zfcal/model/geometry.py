@@ -25,6 +25,11 @@ _ASK = 255
 
 _BLOCK = 16
 _ON_WALL_M = 1e-9
+_SINGLE_M = 1e-6
+"""More than what a length in a tank loses in single precision."""
+
+_TOUCH_M = 1e-12
+"""A point so near to the wall is on it, hence inside; rounding is far smaller."""
 
 Floats = NDArray[np.float64]
 
@@ -34,9 +39,10 @@ class Tank(NamedTuple):
 
     Attributes
     ----------
-    walls : ndarray, shape (segment, 6)
-        Start x, y, direction x, y (not scaled), one over squared length, length.
-    edges : ndarray, shape (edge, 6)
+    walls : ndarray, shape (segment, 7)
+        Start x, y, direction x, y (not scaled), one over squared length, length,
+        end y.
+    edges : ndarray, shape (edge, 7)
         Edges of the zones' polygons, likewise.
     edge_of : ndarray of int64, shape (polygon + 1,)
         Where each polygon's edges start.
@@ -48,6 +54,8 @@ class Tank(NamedTuple):
         Whether fish follow walls, by zone id.
     cells : ndarray of uint8, shape (row, column)
         Zone id of a cell, 255 where a border crosses it.
+    clear_m : ndarray of float32, shape (row, column)
+        From no point of the cell is a border of a zone nearer than this.
     nearest : ndarray of int32, shape (row, column)
         The one nearest wall segment, or minus the place in ``lists`` less one.
     lists : ndarray of int32
@@ -66,6 +74,7 @@ class Tank(NamedTuple):
     y0_m: float
     per_m: float
     cells: NDArray[np.uint8]
+    clear_m: NDArray[np.float32]
     nearest: NDArray[np.int32]
     lists: NDArray[np.int32]
     distance_low_m: float
@@ -90,7 +99,8 @@ def segment_distance2(x: float, y: float, pieces: Floats, s: int) -> float:
 def _crosses(x: float, y: float, pieces: Floats, s: int) -> bool:
     """Tell whether a ray from the point to the right crosses a piece."""
     x0, y0 = pieces[s, 0], pieces[s, 1]
-    y1 = y0 + pieces[s, 3]
+    # Start plus direction can round to beside the end, where the next piece starts.
+    y1 = pieces[s, 6]
     return (y0 > y) != (y1 > y) and x < pieces[s, 2] * (y - y0) / (y1 - y0) + x0
 
 
@@ -103,28 +113,41 @@ def zone_exact(x: float, y: float, tank: Tank) -> int:
         if _crosses(x, y, tank.walls, s):
             inside = not inside
         nearest2 = min(nearest2, segment_distance2(x, y, tank.walls, s))
-    if not inside:
+    on_wall = nearest2 <= _TOUCH_M**2
+    if not inside and not on_wall:
         return 0
     for p in range(tank.polygon_zone.size):
         within = False
         for e in range(tank.edge_of[p], tank.edge_of[p + 1]):
             if _crosses(x, y, tank.edges, e):
                 within = not within
-        if within:
+        if within or (on_wall and _touches(x, y, p, tank)):
             return tank.polygon_zone[p]
     rest = tank.near_zone if nearest2 < tank.wall_zone_m**2 else tank.far_zone
-    return rest if rest > 0 else _nearest_polygon(x, y, tank)
+    return rest if rest > 0 else _beside_crack(x, y, math.sqrt(nearest2), tank)
 
 
 @kernel
-def _nearest_polygon(x: float, y: float, tank: Tank) -> int:
-    """Return the zone beside a point in the crack between two polygons."""
-    best2, zone = math.inf, 0
+def _touches(x: float, y: float, p: int, tank: Tank) -> bool:
+    """Tell whether a point is on an edge of a polygon."""
+    for e in range(tank.edge_of[p], tank.edge_of[p + 1]):
+        if segment_distance2(x, y, tank.edges, e) <= _TOUCH_M**2:
+            return True
+    return False
+
+
+@kernel
+def _beside_crack(x: float, y: float, wall_m: float, tank: Tank) -> int:
+    """Return the nearest zone to a point in none, by the rule of `zfcal.arena`."""
+    best, zone = math.inf, 0
     for p in range(tank.polygon_zone.size):
         for e in range(tank.edge_of[p], tank.edge_of[p + 1]):
-            away2 = segment_distance2(x, y, tank.edges, e)
-            if away2 < best2:
-                best2, zone = away2, tank.polygon_zone[p]
+            away = math.sqrt(segment_distance2(x, y, tank.edges, e))
+            if away < best:
+                best, zone = away, tank.polygon_zone[p]
+    rest = max(tank.near_zone, tank.far_zone)
+    if rest > 0 and abs(wall_m - tank.wall_zone_m) < best:
+        zone = rest
     return zone
 
 
@@ -138,6 +161,12 @@ def zone_of(x: float, y: float, tank: Tank) -> int:
         if zone == _ASK:
             zone = zone_exact(x, y, tank)
     return zone
+
+
+@inlined
+def clearance(x: float, y: float, tank: Tank) -> float:
+    """Return a distance within which all points are in the zone of a point inside, in metres."""
+    return tank.clear_m[int((y - tank.y0_m) * tank.per_m), int((x - tank.x0_m) * tank.per_m)]
 
 
 @inlined
@@ -217,6 +246,7 @@ def _mark(
     """Mark a cell with its zone if no border can cross it."""
     if not border_m > half_diagonal_m:
         return
+    tank.clear_m[row, column] = border_m - half_diagonal_m - _SINGLE_M
     # Two marked cells side by side share an edge, so they share the zone.
     left = tank.cells[row, column - 1] if column > 0 else _ASK
     tank.cells[row, column] = left if left != _ASK else zone_exact(xy[0], xy[1], tank)
@@ -277,43 +307,44 @@ def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:
     """
     edges, edge_of, polygon_zone = _polygons(arena)
     rest = {zone.near_wall: i for i, zone in enumerate(arena.zones, 1) if zone.polygon is None}
-    # A tank all of which is near the wall, or none of it, has one of the two.
-    only = next(iter(rest.values()), 0)
     x0, y0, x1, y1 = arena.outline.bounds
     per_m = cells / (arena.extent_m * (1 + 1e-9))
     shape = (int((y1 - y0) * per_m) + 1, int((x1 - x0) * per_m) + 1)
     bins = arena.bins
     tank = Tank(
-        walls=_pieces(arena.segments_m),
+        walls=_pieces(np.concatenate([_sides(ring) for ring in arena.rings_m])),
         edges=edges,
         edge_of=edge_of,
         polygon_zone=polygon_zone,
-        near_zone=rest.get(True, only),
-        far_zone=rest.get(False, only),
-        wall_zone_m=arena.wall_zone_m,
+        near_zone=rest.get(True, 0),
+        far_zone=rest.get(False, 0),
+        wall_zone_m=float(arena.wall_zone_m),
         follows=np.array([False, *(zone.follows_walls for zone in arena.zones)]),
         x0_m=x0,
         y0_m=y0,
         per_m=per_m,
         cells=np.full(shape, _ASK, dtype=np.uint8),
+        clear_m=np.zeros(shape, dtype=np.float32),
         nearest=np.zeros(shape, dtype=np.int32),
         lists=np.empty(0, dtype=np.int32),
-        distance_low_m=bins.distance_m[0],
+        distance_low_m=float(bins.distance_m[0]),
         distance_per_m=10 / (bins.distance_m[1] - bins.distance_m[0]),
-        wall_low_m=bins.wall_distance_m[0],
+        wall_low_m=float(bins.wall_distance_m[0]),
         wall_per_m=10 / (bins.wall_distance_m[1] - bins.wall_distance_m[0]),
-        speed_low=bins.speed_m_s[0],
-        speed_high=bins.speed_m_s[1],
+        speed_low=float(bins.speed_m_s[0]),
+        speed_high=float(bins.speed_m_s[1]),
     )
     half_diagonal_m = math.sqrt(0.5) / per_m * (1 + 1e-9) + 1e-12
     return tank._replace(lists=_fill(tank, half_diagonal_m))
 
 
 def _pieces(segments: Floats) -> Floats:
-    """Return segments (start, end) as start, direction, one over squared length, length."""
+    """Return segments (start, end) as the rows of `Tank.walls`."""
     along = segments[:, 2:] - segments[:, :2]
     squared = (along**2).sum(axis=1)
-    return np.column_stack([segments[:, :2], along, 1.0 / squared, np.sqrt(squared)])
+    return np.column_stack(
+        [segments[:, :2], along, 1.0 / squared, np.sqrt(squared), segments[:, 3]]
+    )
 
 
 def _polygons(arena: Arena) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
@@ -322,7 +353,7 @@ def _polygons(arena: Arena) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64
     for number, zone in enumerate(arena.zones, start=1):
         if zone.polygon is None:
             continue
-        edges += [np.hstack([ring[:-1], ring[1:]]) for ring in _rings(zone.polygon)]
+        edges += [_sides(ring) for ring in _rings(zone.polygon)]
         starts.append(sum(map(len, edges)))
         zones.append(number)
     joined = np.concatenate(edges) if edges else np.empty((0, 4))
@@ -333,3 +364,9 @@ def _rings(polygon: shapely.Polygon | shapely.MultiPolygon) -> list[Floats]:
     parts = shapely.get_parts(polygon)
     lines = [ring for part in parts for ring in (part.exterior, *part.interiors)]
     return [np.asarray(ring.coords, dtype=np.float64)[:, :2] for ring in lines]
+
+
+def _sides(ring: Floats) -> Floats:
+    """Return the pieces of a closed ring, shape (side, 4); repeated corners make none."""
+    sides = np.hstack([ring[:-1], ring[1:]])
+    return sides[(sides[:, :2] != sides[:, 2:]).any(axis=1)]

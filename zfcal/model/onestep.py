@@ -27,7 +27,7 @@ from zfcal.model.kernels.world import (
     settle,
 )
 from zfcal.model.packing import pack
-from zfcal.model.simulate import tank_of
+from zfcal.model.simulate import check_sampler, tank_of
 from zfcal.parameters import Parameters
 
 Floats = NDArray[np.float64]
@@ -60,7 +60,7 @@ def heading_density(
         Per radian, with trapezoidal integral one; all zero where no direction
         is admissible.
     """
-    state, packed, tank = _prepare(parameters, arena, xy_m, heading_rad)
+    state, packed, tank = _prepare(parameters, arena, xy_m, heading_rad, agent)
     work = make_work(state.shape[1], len(packed.components), GRID)
     density = _density(agent, speed_m_s, state, packed, tank, work, make_sight(state.shape[1] ** 2))
     theta = np.linspace(-np.pi, np.pi, GRID + 1)
@@ -91,9 +91,8 @@ def draw_headings(
     ndarray, shape (n,)
         Radians; NaN where no direction is admissible.
     """
-    if sampler not in {"exact", "grid"}:
-        raise InputError(f"Sampler must be 'exact' or 'grid', got {sampler!r}.")
-    state, packed, tank = _prepare(parameters, arena, xy_m, heading_rad)
+    check_sampler(sampler, grid)
+    state, packed, tank = _prepare(parameters, arena, xy_m, heading_rad, agent)
     word = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
     work = make_work(state.shape[1], len(packed.components), grid)
     sight = make_sight(state.shape[1] ** 2)
@@ -101,10 +100,17 @@ def draw_headings(
 
 
 def _prepare(
-    parameters: Parameters, arena: Arena, xy_m: ArrayLike, heading_rad: ArrayLike
+    parameters: Parameters, arena: Arena, xy_m: ArrayLike, heading_rad: ArrayLike, agent: int
 ) -> tuple[Floats, Packed, Tank]:
     xy = np.asarray(xy_m, dtype=np.float64)
     heading = np.asarray(heading_rad, dtype=np.float64)
+    if xy.shape != (*heading.shape, 2) or heading.ndim != 1 or not 0 <= agent < len(xy):
+        raise InputError(
+            f"One step of agent {agent} needs positions (agent, 2) and headings (agent,), "
+            f"got shapes {xy.shape} and {heading.shape}."
+        )
+    if not np.isfinite(heading).all():
+        raise InputError("One step needs a heading of every agent; leave out whose is unknown.")
     tank = tank_of(arena)
     state = np.zeros((STATES, len(xy)))
     state[X], state[Y] = xy.T
@@ -145,7 +151,7 @@ def _draw(
     density_on_grid(i, speed, state, 0, packed, tank, sight, work)
     for k in range(n):
         if grid:
-            drawn = draw_on_grid(i, speed, state, 0, packed, tank, random, work)
+            drawn = draw_on_grid(i, speed, state, 0, packed, tank, sight, random, work)
         else:
             drawn = draw_exact(i, speed, state, 0, packed, tank, sight, random, work, count, total)
         theta[k] = np.arctan2(work.moves[i, 1], work.moves[i, 0]) if drawn else np.nan

@@ -13,7 +13,7 @@ from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, build
 from zfcal.model.kernels.world import KAPPA_BASE, KAPPA_F, LAWS, ZONE_COLUMNS, Packed
-from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales
+from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales, n_genes
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +47,8 @@ def pack(models: Sequence[Parameters], arena: Arena) -> Packed:
     InputError
         Zones, steps or effects do not fit together.
     """
+    if not models:
+        raise InputError("There is no model to pack; expected at least one.")
     first = models[0]
     for parameters in models:
         check_model(parameters, arena)
@@ -66,10 +68,23 @@ def pack_genes(genes: ArrayLike, template: Parameters, arena: Arena) -> Packed:
         In [0, 1], in the order of `zfcal.parameters.gene_names`.
     template
         Gives all that is not calibrated.
+
+    Raises
+    ------
+    InputError
+        The template is not for the arena, or the genes are none: a NaN would
+        keep the sampler waiting for ever.
     """
     check_model(template, arena)
     n_zones = len(template.zones)
-    values = np.asarray(genes, dtype=np.float64) * gene_scales(n_zones)
+    table = np.asarray(genes, dtype=np.float64)
+    if table.shape[1:] != (n_genes(n_zones),) or not ((table >= 0) & (table <= 1)).all():
+        raise InputError(
+            f"Genomes of {n_zones} zones need {n_genes(n_zones)} genes in [0, 1], got an array "
+            f"of shape {table.shape} from {np.min(table, initial=1):g} to "
+            f"{np.max(table, initial=0):g}."
+        )
+    values = table * gene_scales(n_zones)
     own = values[:, : 3 * n_zones].reshape(-1, n_zones, 3)
     gamma = values[:, 3 * n_zones :].reshape(-1, n_zones, n_zones)
     return _packed(own, gamma, [template], arena)
@@ -102,7 +117,8 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         gamma=attraction,
         speed_take=take,
         speed_other=other,
-        cos_fov=np.ascontiguousarray(np.broadcast_to(cos_fov, (n_models,))),
+        # A copy: a read-only array is another type, for which all would be compiled again.
+        cos_fov=np.broadcast_to(cos_fov, (n_models,)).copy(),
         dt_s=float(models[0].dt_s),
         components=_hooks(effects, "component"),
         factors=_hooks(effects, "factor"),

@@ -22,12 +22,15 @@ __all__ = [
     "Counts",
     "Packed",
     "burn_in_steps",
+    "check_sampler",
     "pack",
     "pack_genes",
     "simulate_counts",
     "simulate_tracks",
     "tank_of",
 ]
+
+_LEAST_GRID = 36
 
 _JOB_STEPS = 20_000
 """Agent-steps in a piece of work: some milliseconds, much more than a call costs."""
@@ -92,7 +95,7 @@ def simulate_counts(
     jobs = len(packed.zones) * len(seeds)
     # Pieces of some milliseconds, so that the last one is short on every core.
     per_piece = max(1, _JOB_STEPS // (n_agents * (n_steps + sizes[2])))
-    words = np.ascontiguousarray(seeds, dtype=np.uint64)
+    words = np.array(seeds, dtype=np.uint64)
 
     def work(first: int) -> None:
         count_runs(first, min(first + per_piece, jobs), words, sizes, packed, tank, counts)
@@ -100,6 +103,14 @@ def simulate_counts(
     with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
         list(pool.map(work, range(0, jobs, per_piece)))
     return counts
+
+
+def check_sampler(sampler: str, grid: int) -> None:
+    """Raise an `InputError` unless it is a sampler's name and a grid that carries a density."""
+    if sampler not in {"exact", "grid"}:
+        raise InputError(f"Sampler must be 'exact' or 'grid', got {sampler!r}.")
+    if grid < _LEAST_GRID:
+        raise InputError(f"The sampler's grid needs {_LEAST_GRID} angles or more, got {grid}.")
 
 
 def _zeros(n_models: int, n_runs: int, n_zones: int) -> Counts:
@@ -137,8 +148,12 @@ def simulate_tracks(
     heading_rad : ndarray, shape (step, agent)
         Direction of the step that led there.
     """
-    if sampler not in {"exact", "grid"}:
-        raise InputError(f"Sampler must be 'exact' or 'grid', got {sampler!r}.")
+    check_sampler(sampler, grid)
+    if n_agents < 1 or n_steps < 1 or seed < 0:
+        raise InputError(
+            f"A simulation needs agents, steps and a seed from 0 on; got {n_agents} agents, "
+            f"{n_steps} steps, seed {seed}."
+        )
     packed = pack([parameters], arena)
     word = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
     record = record_run(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import cfunc
-
+from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.kernels.hooks import COMPONENT
 from zfcal.model.kernels.world import HX, HY
 
 
-@cfunc(COMPONENT, cache=True)
+@hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
     """Add a component about the neighbours' mean heading, weighted by solid angle."""
     x, y, seen = 0.0, 0.0, 0.0

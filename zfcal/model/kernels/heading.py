@@ -15,6 +15,7 @@ from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_
 from zfcal.model.kernels.staircase import staircase_turn
 from zfcal.model.kernels.world import (
     ALPHA,
+    CLEAR,
     HX,
     HY,
     KAPPA_BASE,
@@ -178,12 +179,12 @@ def draw_from_grid(
         holds the unit vector x, y and the landing zone.
     """
     density_on_grid(i, speed, state, model, packed, tank, sight, work)
-    return draw_on_grid(i, speed, state, model, packed, tank, random, work)
+    return draw_on_grid(i, speed, state, model, packed, tank, sight, random, work)
 
 
 @kernel
 def draw_on_grid(
-    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank,
+    i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
     random: Random, work: Work,
 ) -> bool:  # fmt: skip
     """Draw as `draw_from_grid` does, with ``work.density`` at hand."""
@@ -207,10 +208,44 @@ def draw_on_grid(
         theta = -math.pi + 2.0 * math.pi * (k + share) / grid
         ux, uy = math.cos(theta), math.sin(theta)
         landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
-        if packed.gamma[model, zone, landing] > 0.0:
+        allowed = packed.gamma[model, zone, landing]
+        if packed.factors.shape[0] > 0 and allowed > 0.0:
+            allowed *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+        if allowed > 0.0:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
     return False
+
+
+@inlined
+def _draw_mixture(
+    i: int, state: Floats, model: int, packed: Packed, tank: Tank, random: Random, work: Work,
+    count: int, total: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the unit vector of a heading drawn from the mixture that `gather` wrote."""
+    zone = int(state[ZONE, i])
+    level = uniform(random) * total
+    if level < 1.0:
+        law, r, kappa = LAW_BASE, _TABLE, packed.zones[model, zone, KAPPA_BASE]
+        if tank.follows[zone]:
+            cx, cy = state[TAU_X, i], state[TAU_Y, i]
+            if next_word(random) >> np.uint64(63):
+                cx, cy = -cx, -cy
+        else:
+            cx, cy = state[HX, i], state[HY, i]
+    else:
+        level -= 1.0
+        k = 0
+        while k < count - 1 and level >= work.parts[k, 0]:
+            level -= work.parts[k, 0]
+            k += 1
+        law, cx, cy = LAW_F, work.parts[k, 1], work.parts[k, 2]
+        kappa, r = work.parts[k, 3], work.parts[k, 4]
+    if r == _TABLE:
+        cosine, sine = staircase_turn(kappa, packed.turns, (model, zone, law), random)
+    else:
+        cosine, sine = vonmises_turn(kappa, r, random)
+    return cx * cosine - cy * sine, cx * sine + cy * cosine
 
 
 @inlined
@@ -225,33 +260,17 @@ def draw_exact(
     """
     zone = int(state[ZONE, i])
     reach = speed * packed.dt_s
-    follows = tank.follows[zone]
     x, y = state[X, i], state[Y, i]
+    # Where no border is within reach there is nothing to choose, be the attraction ever so small.
+    sure = reach < state[CLEAR, i]
+    if sure and packed.gamma[model, zone, zone] == 0.0:
+        return False
     for _ in range(_REJECTIONS):
-        level = uniform(random) * total
-        if level < 1.0:
-            law, r, kappa = LAW_BASE, _TABLE, packed.zones[model, zone, KAPPA_BASE]
-            if follows:
-                cx, cy = state[TAU_X, i], state[TAU_Y, i]
-                if next_word(random) >> np.uint64(63):
-                    cx, cy = -cx, -cy
-            else:
-                cx, cy = state[HX, i], state[HY, i]
-        else:
-            level -= 1.0
-            k = 0
-            while k < count - 1 and level >= work.parts[k, 0]:
-                level -= work.parts[k, 0]
-                k += 1
-            law, cx, cy = LAW_F, work.parts[k, 1], work.parts[k, 2]
-            kappa, r = work.parts[k, 3], work.parts[k, 4]
-        if r == _TABLE:
-            cosine, sine = staircase_turn(kappa, packed.turns, (model, zone, law), random)
-        else:
-            cosine, sine = vonmises_turn(kappa, r, random)
-        ux, uy = cx * cosine - cy * sine, cx * sine + cy * cosine
-        landing = zone_of(x + reach * ux, y + reach * uy, tank)
-        accept = packed.gamma[model, zone, landing]
+        ux, uy = _draw_mixture(i, state, model, packed, tank, random, work, count, total)
+        landing, accept = zone, 1.0
+        if not sure:
+            landing = zone_of(x + reach * ux, y + reach * uy, tank)
+            accept = packed.gamma[model, zone, landing]
         if packed.factors.shape[0] > 0 and accept > 0.0:
             accept *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
         if accept >= 1.0 or uniform(random) < accept:

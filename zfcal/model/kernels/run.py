@@ -130,8 +130,10 @@ def count_runs(
         random = seeded(seeds[run])
         state[:] = 0.0
         place(state, tank, random)
+        state[TIME] = -burn_in * packed.dt_s
         for _ in range(burn_in):
             advance(state, model, packed, tank, sight, random, work, False)
+        state[TIME] = 0.0
         _count_state(state, n_counted, tank, model, run, counts)
         for _ in range(samples - 1):
             for i in range(n_counted):
@@ -163,8 +165,10 @@ def record_run(
     sight = make_sight(n * n)
     random = seeded(seed)
     place(state, tank, random)
+    state[TIME] = -burn_in * packed.dt_s
     for _ in range(burn_in):
         advance(state, 0, packed, tank, sight, random, work, grid > 0)
+    state[TIME] = 0.0
     record = np.empty((samples, n, 5))
     for k in range(samples):
         if k > 0:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel
-from zfcal.model.geometry import Tank, nearest_wall, zone_of
+from zfcal.model.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.hooks import call_sight
 from zfcal.model.kernels.perception import Sight, see
 from zfcal.model.kernels.random import uniform
@@ -17,8 +17,8 @@ from zfcal.model.kernels.random import uniform
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Rows of the state, each with a number per agent.
-X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, STATES = range(11)
+# Rows of the state, each with a number per agent. TIME counts from the first sample.
+X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, CLEAR, STATES = range(12)
 
 # Columns of a zone's parameters.
 KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
@@ -103,9 +103,10 @@ def make_work(n: int, n_components: int, grid: int) -> Work:
 
 @inlined
 def settle(i: int, state: Floats, tank: Tank) -> None:
-    """Write an agent's distance to the wall and the direction along it."""
+    """Write an agent's distance to the wall, the direction along it, and its clearance."""
     distance, tau_x, tau_y = nearest_wall(state[X, i], state[Y, i], tank)
     state[WALL, i], state[TAU_X, i], state[TAU_Y, i] = distance, tau_x, tau_y
+    state[CLEAR, i] = clearance(state[X, i], state[Y, i], tank)
 
 
 @kernel
