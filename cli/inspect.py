@@ -33,7 +33,7 @@ def command(out: Output, files: tuple[Path, ...], *, png: Path | None) -> None:
         description = describe(path)
         out.result(description, text="\n".join(as_lines(description)))
         if description["problem"]:
-            out.left_out(path, f"{path}: {description['problem']}.")
+            out.left_out(path, f"{path}: {str(description['problem']).rstrip('.')}.")
 
     for path in files:
         out.attempt(functools.partial(show, path))

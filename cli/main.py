@@ -7,12 +7,14 @@ when they run: `zfcal --help` loads neither numpy nor pandas.
 from __future__ import annotations
 
 import difflib
+import errno
 import importlib
 import os
 import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
@@ -37,6 +39,7 @@ COMMANDS = {
 
 EXIT_USAGE = 2
 EXIT_READER_GONE = 141
+_STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 _BUG_HINT = "Run it again with --traceback to see where, and report it."
 
 
@@ -142,6 +145,7 @@ def run(argv: Sequence[str]) -> int:
         As `docs/commands.md` lists them.
     """
     signal.signal(signal.SIGTERM, _terminate)
+    _open_streams()
     try:
         code = group.main(args=list(argv), prog_name="zfcal", standalone_mode=False)
         sys.stdout.flush()
@@ -158,15 +162,27 @@ def run(argv: Sequence[str]) -> int:
     return code if isinstance(code, int) else 0
 
 
+def _open_streams() -> None:
+    """Put the null device where a standard stream was closed (``<&-``): Python has None there."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            # It lives as long as the process.
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+
+
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signal's signature
     raise Terminated
 
 
 def _reader_gone() -> int:
     """Leave quietly when nobody reads standard output any more."""
-    # What is still buffered would raise once more when the interpreter closes the stream.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    _drop_output()
     return EXIT_READER_GONE
+
+
+def _drop_output() -> None:
+    """Send what is still buffered nowhere: closing the stream would raise once more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _explain_usage(error: click.ClickException) -> int:
@@ -186,6 +202,12 @@ def _explain(error: Exception, argv: Sequence[str]) -> int:
         traceback.print_exception(error)
     if isinstance(error, OSError) and error.filename is not None:
         complain(f"{error.filename}: {error.strerror or error}.")
+    elif isinstance(error, OSError) and error.errno in _STREAM_FULL:
+        complain(
+            f"standard output: cannot be written ({error.strerror}).",
+            hint="The files of the trial are whole; the same command again lists their paths.",
+        )
+        _drop_output()
     else:
         complain(f"a bug in zfcal: {type(error).__name__}: {error}", hint=_BUG_HINT)
     return 1

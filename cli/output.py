@@ -227,5 +227,7 @@ class Output:
             "errors": self._errors,
             "results": self._results,
         }
-        click.echo(json.dumps(document, indent=2, ensure_ascii=False))
+        text = json.dumps(document, indent=2, ensure_ascii=False)
+        # A path that is no UTF-8 would make it no JSON.
+        click.echo(text.encode(errors="surrogateescape").decode(errors="replace"))
         sys.stdout.flush()

@@ -221,3 +221,17 @@ def test_a_reader_that_goes_away_ends_it_quietly(command, trial):
         writing.stdout.close()
         assert writing.wait(timeout=60) == 141
         assert writing.stderr.read() == b""
+
+
+@pytest.mark.parametrize(
+    ("redirection", "code"), [("<&-", 0), (">&-", 0), ("2>&-", 0), (">/dev/full", 1)]
+)
+def test_a_stream_that_is_closed_or_full_is_no_bug(command, trial, redirection, code):
+    """As under a daemon that closes them: the work is done, and a full one is named."""
+    line = f"{' '.join(command)} analyse {'-' if redirection == '<&-' else 'trial'} {redirection}"
+    done = subprocess.run(
+        ["sh", "-c", line], cwd=trial.parent, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    assert "bug" not in done.stderr
+    assert ("standard output: cannot be written" in done.stderr) == (code == 1)

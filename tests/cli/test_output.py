@@ -1,6 +1,7 @@
 """What goes to stdout and what to stderr."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -163,3 +164,11 @@ def test_a_terminal_gets_colour_unless_no_color_is_set(monkeypatch, capsys, no_c
 
     complain("wrong")
     assert ("\x1b[" in capsys.readouterr().err) == coloured
+
+
+def test_a_path_that_is_no_utf_8_still_gives_valid_json(capfdbinary):
+    """The document parses; the byte that is none is replaced."""
+    with Output("analyse", as_json=True, verbose=0, quiet=True) as out:
+        out.left_out(Path(os.fsdecode(b"\xff.parquet")), "odd")
+    document = json.loads(capfdbinary.readouterr().out.decode())
+    assert document["left_out"][0]["path"] == "\ufffd.parquet"

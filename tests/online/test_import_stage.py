@@ -113,7 +113,7 @@ def test_tracks_that_all_lie_outside_are_refused_with_both_ranges(
 
 def test_tracks_that_lie_outside_in_part_are_counted(trial, tmp_path, heard, wandering):
     """Shifted by half a metre about half the walk leaves the tank: a warning with the share."""
-    off = write_csv(tmp_path / "off.csv", wandering(70), shift=0.5)
+    off = write_csv(tmp_path / "off.csv", wandering(70, n_robots=1), shift=0.5)
     import_tracks(trial, csv_source(off), heard.append)
     warnings = [event.text for event in heard if isinstance(event, Note) and event.warning]
     assert len(warnings) == 1
@@ -126,9 +126,9 @@ def test_positions_just_outside_are_counted_as_at_the_wall(trial, tmp_path, hear
     path = tmp_path / "near.csv"
     path.write_text("time_s,agent,x_m,y_m\n0.0,0,0.5,0.5\n0.2,0,1.005,0.5\n")
     import_tracks(trial, csv_source(path), heard.append)
-    notes = [event for event in heard if isinstance(event, Note)]
-    assert notes[-1].text.startswith("1 of 2 positions lie up to 10 mm outside")
-    assert not notes[-1].warning
+    (note,) = [e for e in heard if isinstance(e, Note) and "positions lie" in e.text]
+    assert note.text.startswith("1 of 2 positions lie up to 10 mm outside")
+    assert not note.warning
 
 
 def test_robots_can_come_from_a_file_of_their_own(trial, tmp_path, heard, wandering):
@@ -176,3 +176,12 @@ def test_a_dry_run_says_why_and_writes_nothing(trial, csv, heard):
     planned = [event.reason for event in heard if hasattr(event, "reason")]
     assert planned == ["missing"] * 3
     assert not (trial / "tracks").exists()
+
+
+def test_fewer_agents_than_the_trial_states_are_told(trial, tmp_path, heard, wandering):
+    """Three fish and no robot into a trial of three fish and a robot: only the robot is missed."""
+    source = write_csv(tmp_path / "fish.csv", wandering(70))
+    import_tracks(trial, csv_source(source), heard.append)
+    (warning,) = [event.text for event in heard if isinstance(event, Note) and event.warning]
+    assert "no frame holds more than 0 robots" in warning
+    assert "states 1" in warning

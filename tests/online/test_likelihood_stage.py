@@ -13,7 +13,7 @@ from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.model.simulate import simulate_tracks
 from zfcal.online.analyse import AnalyseOptions, analyse
 from zfcal.online.calibrate import calibrate
-from zfcal.online.events import Note, say_nothing
+from zfcal.online.events import LeftOut, Note, say_nothing
 from zfcal.online.likelihood import estimate
 from zfcal.online.opening import open_trial
 from zfcal.parameters import to_genes
@@ -128,7 +128,7 @@ def test_without_tracks_the_round_goes_on_and_says_so(make_trial, quick, heard):
 
 
 def test_a_damaged_segment_costs_the_estimate_alone(make_trial, quick, heard):
-    """The statistics were whole: the round is made, without the estimate."""
+    """The statistics were whole: the round is made, without the estimate, and exit code 3 tells."""
     root = make_trial()
     analyse(root, AnalyseOptions(), say_nothing)
     path = root / "tracks" / "000060.parquet"
@@ -136,6 +136,6 @@ def test_a_damaged_segment_costs_the_estimate_alone(make_trial, quick, heard):
 
     calibrate(root, quick, heard.append)
 
-    notes = [event.text for event in heard if isinstance(event, Note)]
-    assert any("000060.parquet" in text and "no likelihood estimate" in text for text in notes)
+    left_out = [event.problem for event in heard if isinstance(event, LeftOut)]
+    assert any("000060.parquet" in text and "no likelihood estimate" in text for text in left_out)
     assert (root / "models" / "000120.toml").exists()

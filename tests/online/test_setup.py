@@ -1,6 +1,7 @@
 """Making a trial directory."""
 
 import json
+import math
 from importlib.resources import files
 
 import pytest
@@ -9,7 +10,7 @@ from zfcal.artifacts.arenas import read_arena
 from zfcal.artifacts.models import read_model
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.online.events import Made, Planned, UpToDate
+from zfcal.online.events import Made, Planned, UpToDate, say_nothing
 from zfcal.online.opening import Task, open_trial
 from zfcal.online.setup import NewTrial, create_trial
 
@@ -123,3 +124,11 @@ def test_the_settings_appear_last(tmp_path):
 
     create_trial(root, TWO_ROOMS, tell)
     assert order == [("000000.toml", False), ("trial.toml", True)]
+
+
+@pytest.mark.parametrize("fps", [0.0, -15.0, math.nan, math.inf])
+def test_a_frame_rate_of_no_camera_is_refused(tmp_path, fps):
+    """Before the step is derived from it, and before anything is written."""
+    with pytest.raises(InputError, match="fps must be"):
+        create_trial(tmp_path / "trial", NewTrial(n_fish=2, fps=fps, arena="ring"), say_nothing)
+    assert not (tmp_path / "trial").exists()

@@ -152,3 +152,11 @@ def test_a_duration_is_a_positive_time(home, duration):
     """Nothing else can be simulated."""
     with pytest.raises(InputError, match="positive duration"):
         options_of(home, duration_s=duration)
+
+
+def test_a_model_of_other_zones_leaves_no_trial_behind(home, tmp_path, heard):
+    """A model of two rooms in a ring is refused before anything is written."""
+    root = tmp_path / "new"
+    with pytest.raises(InputError, match="'inner' of arena 'ring' is missing"):
+        simulate(root, options_of(home, arena="ring", n_fish=2), heard.append)
+    assert not root.exists()

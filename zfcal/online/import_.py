@@ -24,7 +24,7 @@ from zfcal.online.recording import (
     write_segments,
 )
 from zfcal.online.segments import segment_path
-from zfcal.tracks import ROBOT, Tracks, concatenate
+from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
 _LIMITS = {"n_fish", "n_robots"}
 """Options that come from trial.toml and change no number."""
@@ -92,6 +92,7 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
             return
         tracks = _read(source, name, options, tell)
         tell_outside(opened, tracks, tell)
+        tell_missing(opened, tracks, tell)
         recording = Recording(
             tracks=tracks,
             end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
@@ -159,6 +160,21 @@ def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Trac
         kind=np.full(len(robots), ROBOT, dtype=np.int8),
     )
     return concatenate([found.tracks, robots])
+
+
+def tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
+    """Warn of fish or robots that trial.toml states and no frame of the tracks shows."""
+    trial = opened.trial
+    for kind, word, stated in ((FISH, "fish", trial.n_fish), (ROBOT, "robots", trial.n_robots)):
+        _, counts = np.unique(tracks.frame[tracks.kind == kind], return_counts=True)
+        most = int(counts.max(initial=0))
+        if most < stated:
+            text = (
+                f"{trial.root}: no frame holds more than {most} {word}, {trial.config} states "
+                f"{stated}; models are simulated with those of trial.toml. Correct it, or name "
+                "the robots with --robots."
+            )
+            tell(Note(text=text, warning=True))
 
 
 def tell_outside(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:

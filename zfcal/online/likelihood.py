@@ -15,7 +15,7 @@ from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError
 from zfcal.model.likelihood import Fit, fit
 from zfcal.model.steps import steps_of
-from zfcal.online.events import Note, Tell
+from zfcal.online.events import LeftOut, Note, Tell
 from zfcal.online.opening import OpenTrial
 from zfcal.online.segments import STEP_S, segment_path, segment_starts
 from zfcal.parameters import Parameters, to_genes
@@ -121,7 +121,11 @@ def estimate(
         steps = steps_of(samples, opened.arena, fov_rad=template.fov_rad)
         fish = samples.agent[samples.kind == FISH]
         found = fit(steps.take(np.isin(steps.agent, fish)), opened.arena, template)
-    except (DamagedError, InputError) as error:
+    except DamagedError as error:
+        problem = f"{where}: no likelihood estimate joins the search: {error}"
+        tell(LeftOut(path=files[0].parent, problem=problem, hint=error.hint))
+        return None
+    except InputError as error:
         tell(Note(text=f"{where}: no likelihood estimate joins the search: {error}"))
         return None
     return Estimate(found=found) if math.isfinite(found.nats_per_step) else None

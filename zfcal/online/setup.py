@@ -29,6 +29,9 @@ from zfcal.units import default_dt_s
 
 ARENA_FILE = "arena.geojson"
 
+MIN_FPS, MAX_FPS = 1e-3, 1e6
+"""Frame rates outside these, in hertz, are no camera's."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewTrial:
@@ -95,6 +98,11 @@ def create_trial(
     """
     task = task or Task()
     arena, name, document = _arena(root, new)
+    if not MIN_FPS <= new.fps <= MAX_FPS:
+        raise InputError(
+            f"{root}: fps must be {MIN_FPS:g} to {MAX_FPS:g} Hz, got {new.fps!r}.",
+            hint="Give the frame rate of the tracks with --fps.",
+        )
     dt_s = default_dt_s(new.fps) if new.dt_s is None else new.dt_s
     trial = Trial(
         root=root,

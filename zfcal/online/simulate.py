@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model, read_model_for
@@ -85,7 +86,10 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
     task = task or Task()
     new = not (root / "trial.toml").exists()
     if new:
-        made = create_trial(root, new_trial(root, options), tell, task=task)
+        asked = new_trial(root, options)
+        # A model that does not fit must not leave half a trial behind.
+        read_model_for(options.model, load_arena(str(asked.arena), Path()), dt_s=1 / asked.fps)
+        made = create_trial(root, asked, tell, task=task)
         if task.dry_run:
             for start in starts_between(0.0, options.duration_s):
                 tell(Planned(path=segment_path(root, start), reason="missing"))

@@ -123,10 +123,11 @@ def test_infinite_positions_are_refused():
         assemble(HERE, _rows(x=np.array([1.0, np.inf, 1.0])), _options())
 
 
-def test_agent_numbers_beyond_32_bits_are_refused():
-    """They would wrap round without a word."""
-    with pytest.raises(InputError, match="agent numbers must fit 32 bits"):
-        assemble(HERE, _rows(agent=np.array([2**40, 2, 3])), _options())
+@pytest.mark.parametrize("number", [2**40, -3])
+def test_agent_numbers_beyond_31_bits_are_refused(number):
+    """They would wrap round without a word, or fail only when the artifact is written."""
+    with pytest.raises(InputError, match=f"{HERE}: agent numbers must be 0 to 2147483647"):
+        assemble(HERE, _rows(agent=np.array([number, 2, 5])), _options())
 
 
 def test_mirrored_tracks_are_noted_once_y_is_left_down():

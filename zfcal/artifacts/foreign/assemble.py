@@ -185,9 +185,11 @@ def _axes(rows: Rows, options: ImportOptions) -> tuple[str, ...]:
 
 
 def _narrow(path: Path, agent: NDArray[np.int64]) -> NDArray[np.int32]:
-    if agent.size and not (_INT32.min <= agent.min() and agent.max() <= _INT32.max):
+    if agent.size and not (agent.min() >= 0 and agent.max() <= _INT32.max):
         raise InputError(
-            f"{path}: agent numbers must fit 32 bits, got {int(agent.min())} to {int(agent.max())}."
+            f"{path}: agent numbers must be 0 to {_INT32.max}, got {int(agent.min())} to "
+            f"{int(agent.max())}.",
+            hint="Number the agents from 0, or give them names.",
         )
     return agent.astype(np.int32)
 
