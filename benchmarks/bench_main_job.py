@@ -10,31 +10,40 @@ from __future__ import annotations
 import json
 import os
 import platform
-import resource
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.behaviour.statistics import measure
 from zfcal.calibrate.objective import Group, SeedSource, express
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.task import Settings, Task
-from zfcal.behaviour.statistics import measure
 from zfcal.model.likelihood import fit
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
 from zfcal.model.steps import steps_of
-from zfcal.parameters import Parameters, gene_names, natural
+from zfcal.parameters import Parameters, gene_names, natural, to_genes
 from zfcal.tracks import Samples
 
 ROOT = Path(__file__).resolve().parent.parent
-ZFCAL = [str(Path(sys.executable).parent / "zfcal")]
+ZFCAL = str(Path(sys.executable).parent / "zfcal")
 ARENA = load_arena("two-rooms", Path())
 TRUTH = natural(tuple((zone.name, zone.follows_walls) for zone in ARENA.zones), dt_s=0.2)
+
+
+def _zfcal(*words: str | Path) -> None:
+    subprocess.run(
+        [ZFCAL, *map(str, words)],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 def start_up() -> dict[str, float]:
@@ -42,7 +51,7 @@ def start_up() -> dict[str, float]:
     times = []
     for _ in range(11):
         begin = time.perf_counter()
-        subprocess.run([*ZFCAL, "--help"], stdout=subprocess.DEVNULL, check=True)
+        _zfcal("--help")
         times.append(time.perf_counter() - begin)
     return {"help_s": statistics.median(times)}
 
@@ -51,22 +60,28 @@ def analyse() -> dict[str, float]:
     """Return time and peak memory of analyse on 30 min of 5 agents at 15 Hz."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial"
-        quiet = {"check": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        subprocess.run(
-            [*ZFCAL, "init", trial, "--arena", "two-rooms", "--fish", "4", "--robot", "--fps", "15"],
-            **quiet,
+        tank = ("--arena", "two-rooms", "--fish", "4", "--robot", "--fps", "15")
+        model = trial / "models" / "000000.toml"
+        _zfcal("init", trial, *tank)
+        # In a process of its own, or its memory would count for that of analyse.
+        script = "import sys; from zfcal_cli.main import main; sys.argv[0] = 'zfcal'; main()"
+        words = ["simulate", trial, "--model", model, "--duration", "30min", "-q"]
+        pid = os.posix_spawn(
+            sys.executable, [sys.executable, "-c", script, *map(str, words)], os.environ
         )
-        subprocess.run(
-            [*ZFCAL, "simulate", trial, "--model", trial / "models/000000.toml", "--duration", "1800"],
-            **quiet,
-        )
-        times = []
+        os.waitpid(pid, 0)
+        times, peaks = [], []
         for _ in range(3):
             begin = time.perf_counter()
-            subprocess.run([*ZFCAL, "analyse", trial, "--force"], **quiet)
+            peaks.append(_peak_kb(script, ["analyse", str(trial), "--force", "-q"]))
             times.append(time.perf_counter() - begin)
-    peak_kb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return {"wall_s": statistics.median(times), "peak_mb": peak_kb / 1024}
+    return {"wall_s": statistics.median(times), "peak_mb": max(peaks) / 1024}
+
+
+def _peak_kb(script: str, words: list[str]) -> int:
+    arguments = [sys.executable, "-c", script, *words]
+    pid = os.posix_spawn(sys.executable, arguments, os.environ)
+    return os.wait4(pid, 0)[2].ru_maxrss
 
 
 def kernel() -> dict[str, float]:
@@ -77,9 +92,7 @@ def kernel() -> dict[str, float]:
         seeds = np.arange(20, dtype=np.uint64)
 
         def run(threads: int = threads, seeds: np.ndarray = seeds) -> None:
-            simulate_counts(
-                packed, ARENA, n_agents=5, n_steps=9000, seeds=seeds, n_threads=threads
-            )
+            simulate_counts(packed, ARENA, n_agents=5, n_steps=9000, seeds=seeds, n_threads=threads)
 
         found[f"exact_{threads}_core_ns"] = _best(run) / (20 * 9300 * 5) * 1e9
 
@@ -90,7 +103,7 @@ def kernel() -> dict[str, float]:
     return found
 
 
-def _best(run) -> float:
+def _best(run: Callable[[], None]) -> float:
     run()
     times = []
     for _ in range(5):
@@ -152,7 +165,7 @@ def recovery() -> list[dict[str, object]]:
         )
         score_s = time.perf_counter() - begin
         intervals = {part.name: part for part in by_score.intervals.parameters}
-        truth = _scaled(express(_genes(TRUTH), TRUTH))
+        truth = _scaled(express(to_genes(TRUTH), TRUTH))
         likely = _scaled(by_likelihood.parameters)
         for name in gene_names(ARENA.zone_names):
             part = intervals[name]
@@ -172,12 +185,6 @@ def recovery() -> list[dict[str, object]]:
                 }
             )
     return rows
-
-
-def _genes(parameters: Parameters) -> np.ndarray:
-    from zfcal.parameters import to_genes
-
-    return to_genes(parameters)
 
 
 def _scaled(parameters: Parameters) -> dict[str, float]:
@@ -206,7 +213,7 @@ def _markdown(found: dict[str, object]) -> str:
         "## Parameters recovered from simulated half hours",
         "",
         "Five fish in two rooms, natural parameters. By one-step likelihood, and by the score S",
-        "(60 generations, one pooled window); 95 % intervals; `-` where the recording does not tell.",
+        "(60 generations, one pooled window). 95 % intervals, `-` where the recording is silent.",
         "",
         "| seed | parameter | true | likelihood | interval | score | interval |",
         "|---|---|---|---|---|---|---|",
@@ -226,7 +233,9 @@ def _markdown(found: dict[str, object]) -> str:
 def main() -> None:
     """Measure all and write both files."""
     found = {
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        "machine": ", ".join(
+            (platform.machine(), f"{os.cpu_count()} cores", f"Python {platform.python_version()}")
+        ),
         "start_up": start_up(),
         "analyse": analyse(),
         "kernel": kernel(),

@@ -76,7 +76,7 @@ def download(recording: Recording, folder: Path) -> Path:
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "download"]
     options = ["--no-deps", "--only-binary=:all:", "--require-hashes"]
     places = ["--dest", str(folder), "--requirement", str(wanted)]
-    if subprocess.run([*pip, *options, *places], check=False).returncode:  # noqa: S603 - fixed words
+    if subprocess.run([*pip, *options, *places], check=False).returncode:
         raise ZfcalError(
             f"{recording.package}: pip could not bring it, see above.",
             hint="It needs the package index that pip is set up with on this machine.",

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from .durations import seconds, span
 from .options import PLACE, makes_artifacts, seed_option, speaks, takes_trials
 from .output import Output
-from .streams import each_trial
-
-if TYPE_CHECKING:
-    from zfcal.online.streams import Work
 
 
 @click.command("calibrate")
@@ -44,6 +40,7 @@ if TYPE_CHECKING:
 @click.option("--baselines", is_flag=True, help="Score random search and the last model too.")
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
+@click.option("--cluster", metavar="ADDRESS", help="Simulate there, such as tcp://host:8786.")
 @click.option("--window", type=span, metavar="START:END", help="One pooled window instead.")
 @click.option("--held-out", type=span, metavar="START:END", help="Score the model there as well.")
 @click.option("-o", "--out", "output", type=PLACE, help="Where the model of --window goes.")
@@ -60,18 +57,14 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
     Example:
         zfcal calibrate trial --generations 20 --seed 1
         zfcal calibrate trial --budget 50s
+        zfcal calibrate trial*/ --cluster tcp://host:8786
         zfcal calibrate trial --window 0:900 --held-out 900:1800 -o first-half.toml
     """
-    from zfcal.online.calibrate import calibrate
-
-    from .calibration import choose, span_task
+    from .calibration import choose, each_round, on_cluster, span_task
 
     chosen, task = choose(options)
-    if options["window"] is not None:
-        span_task(out, trials, options, (chosen, task))
-        return
-
-    def work(found: Work) -> None:
-        calibrate(found.root, chosen, out.tell, task=task(found.ends_s))
-
-    each_trial(out, trials, work)
+    with on_cluster(out, options, chosen) as placed:
+        if options["window"] is not None:
+            span_task(out, trials, options, (placed, task))
+        else:
+            each_round(out, trials, placed, task)

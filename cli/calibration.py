@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .output import Output
+from .streams import STDIN, each_trial, trials_together
 
 if TYPE_CHECKING:
     from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.events import Tell
     from zfcal.online.opening import Task
+    from zfcal.online.streams import Work
 
     MakeTask = Callable[[frozenset[int] | None], Task]
 
@@ -63,6 +68,39 @@ def _check_together(options: Mapping[str, Any]) -> None:
                 raise click.UsageError(f"{option} belongs to --window, which is not given.")
     elif options["output"] is None:
         raise click.UsageError("--window needs -o FILE: its model is none of the trial's rounds.")
+    if options["cluster"] is not None and options["workers"] is not None:
+        raise click.UsageError("--workers are threads of this machine: with --cluster it has none.")
+
+
+@contextmanager
+def on_cluster(
+    out: Output, options: Mapping[str, Any], chosen: CalibrateOptions
+) -> Iterator[CalibrateOptions]:
+    """Give the options the cluster that is asked for; a dry run needs none."""
+    if options["cluster"] is None or options["dry_run"]:
+        yield chosen
+        return
+    from zfcal.calibrate.scheduler import connect
+
+    with connect(options["cluster"]) as cluster:
+        size = f"workers {cluster.n_workers}, threads {cluster.n_threads}"
+        out.note(f"Cluster {cluster.address}: {size}.")
+        yield dataclasses.replace(chosen, cluster=cluster)
+
+
+def each_round(
+    out: Output, trials: tuple[str, ...], chosen: CalibrateOptions, task: MakeTask
+) -> None:
+    """Calibrate trials round by round; on a cluster, several trials at the same time."""
+    from zfcal.online.calibrate import calibrate
+
+    def work(found: Work, tell: Tell) -> None:
+        calibrate(found.root, chosen, tell, task=task(found.ends_s))
+
+    if chosen.cluster is None or STDIN in trials:
+        each_trial(out, trials, functools.partial(work, tell=out.tell))
+    else:
+        trials_together(out, trials, work, n_threads=chosen.cluster.n_threads)
 
 
 def span_task(

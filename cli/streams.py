@@ -13,6 +13,7 @@ import click
 from .output import Output
 
 if TYPE_CHECKING:
+    from zfcal.online.events import Tell
     from zfcal.online.streams import Work
 
 STDIN = "-"
@@ -38,6 +39,38 @@ def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], None])
         return
     for trial in trials:
         out.attempt(functools.partial(_one, Path(trial), work))
+
+
+def trials_together(
+    out: Output, trials: Sequence[str], work: Callable[[Work, Tell], None], *, n_threads: int
+) -> None:
+    """Work on several trials at the same time; what is said is as if they came in turn.
+
+    Parameters
+    ----------
+    out
+        Takes events and errors.
+    trials
+        Directories. One that is named twice is worked on once.
+    work
+        What to do with one, and who hears of it.
+    n_threads
+        Simulations that can be done at the same time.
+    """
+    from zfcal.online.side_by_side import at_once, side_by_side
+
+    places: dict[Path, Path] = {}
+    for trial in trials:
+        places.setdefault(Path(trial).resolve(), Path(trial))
+    jobs = [functools.partial(_one_of_many, place, work) for place in places.values()]
+    n_at_once = at_once(len(jobs), n_threads)
+    side_by_side(jobs, out.tell, out.attempt, n_at_once=n_at_once)
+
+
+def _one_of_many(path: Path, work: Callable[[Work, Tell], None], tell: Tell) -> None:
+    from zfcal.online.streams import work_of
+
+    work(work_of(path), tell)
 
 
 def _one(path: Path, work: Callable[[Work], None]) -> None:

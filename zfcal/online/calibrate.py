@@ -18,9 +18,11 @@ from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.baselines import random_search, unchanged
-from zfcal.calibrate.objective import Group, SeedSource
+from zfcal.calibrate.cluster import ClusterGroup
+from zfcal.calibrate.objective import Group, SeedSource, Simulator
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.rounds import RoundResult, calibrate_window
+from zfcal.calibrate.scheduler import Cluster
 from zfcal.calibrate.search import Progress as Search
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
 from zfcal.calibrate.task import Task as RoundTask
@@ -64,6 +66,9 @@ class CalibrateOptions:
     seed_likelihood
         Whether the maximum-likelihood estimate from the window's tracks joins the
         first population; False is the paper's way.
+    cluster
+        Who simulates instead of this machine's threads. The numbers do not depend
+        on it.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -72,6 +77,7 @@ class CalibrateOptions:
     n_workers: int | None = None
     baselines: bool = False
     seed_likelihood: bool = True
+    cluster: Cluster | None = None
 
     def __post_init__(self) -> None:
         if self.budget_s is not None and not self.budget_s > 0:
@@ -108,7 +114,7 @@ class _Run:
     options: CalibrateOptions
     task: Task
     tell: Tell
-    group: Group
+    group: Simulator
 
     @property
     def root(self) -> Path:
@@ -180,7 +186,7 @@ def calibrate(
             options=options,
             task=task,
             tell=tell,
-            group=make_group(opened, n_workers=options.workers),
+            group=make_group(opened, options),
         )
         ends = _ends(run)
         previous: Path | None = None
@@ -194,17 +200,18 @@ def calibrate(
         tell(Progress(stage="rounds", done=len(ends), total=len(ends)))
 
 
-def make_group(opened: OpenTrial, *, n_workers: int) -> Group:
-    """Return the trial's agents, driven by its starting model."""
+def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
+    """Return the trial's agents, driven by its starting model, where they are to be simulated."""
     trial = opened.trial
     template = read_model_for(trial.root / trial.model, opened.arena, dt_s=trial.dt_s)
-    return Group(
+    group = Group(
         arena=opened.arena,
         template=template,
         n_fish=trial.n_fish,
         n_robots=trial.n_robots,
-        n_workers=n_workers,
+        n_workers=options.workers,
     )
+    return group if options.cluster is None else ClusterGroup(group=group, cluster=options.cluster)
 
 
 def window_span(end_s: int) -> tuple[int, int]:

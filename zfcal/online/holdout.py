@@ -239,7 +239,7 @@ def calibrate_span(
         if reason is None:
             return
         settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
-        group = make_group(opened, n_workers=options.workers)
+        group = make_group(opened, options)
         estimated = None
         if options.seed_likelihood:
             estimated = estimate(opened, group.template, span.train_s, tell)
