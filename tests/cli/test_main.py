@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import click
 import pytest
@@ -66,8 +65,8 @@ def test_every_command_stands_in_the_documentation(repository, name):
                 assert f"`{word}" in section, f"{name} {word}"
 
 
-def test_help_loads_nothing_heavy_and_answers_at_once(command):
-    """numpy, pandas and the like stay out; a quarter of a second is plenty."""
+def test_help_loads_nothing_heavy():
+    """numpy, pandas and the like stay out: what makes a start slow is loaded by commands."""
     code = (
         "import sys; from zfcal_cli.main import run; run(['--help']);"
         "print([m for m in ('numpy', 'pandas', 'pyarrow', 'numba', 'scipy', 'shapely', 'rich') "
@@ -75,13 +74,6 @@ def test_help_loads_nothing_heavy_and_answers_at_once(command):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-    times = []
-    for _ in range(3):
-        start = time.perf_counter()
-        subprocess.run([*command, "--help"], capture_output=True, check=True)
-        times.append(time.perf_counter() - start)
-    # The best of three: other work on the machine is not the command's.
-    assert min(times) < 0.3
 
 
 def test_the_version_is_the_package_s(zfcal):
