@@ -12,7 +12,7 @@ import pytest
 import shapely
 from scipy import stats
 
-from zfcal.arena import make_arena
+from zfcal.arena import Bins, make_arena
 from zfcal.errors import InputError
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import make_tank
@@ -26,7 +26,6 @@ from zfcal.model.simulate import burn_in_steps, simulate_counts, simulate_tracks
 from zfcal.parameters import to_genes
 
 SAMPLERS = pytest.mark.parametrize("sampler", ["exact", "grid"])
-SLOW = (1.0, *(0.0,) * 9)
 FAST = (*(0.0,) * 9, 1.0)
 
 POND = make_arena(name="pond", outline=shapely.box(0, 0, 0.34, 0.3), wall_zone_m=0.05)
@@ -120,6 +119,18 @@ def test_a_speed_that_leads_nowhere_is_drawn_anew(sampler, make_natural):
 
     assert (speed > 0).all()
     assert speed.max() <= 0.02
+
+
+def test_within_a_bin_all_speeds_are_alike(make_natural):
+    """Bin 2 of ten from 0.02 to 0.19 m/s: 12,000 speeds uniform from 0.054 to 0.071 m/s."""
+    arena = dataclasses.replace(SQUARE, bins=Bins(speed_m_s=(0.02, 0.19)))
+    third = (0.0, 0.0, 1.0, *(0.0,) * 7)
+
+    _, _, speed = recorded(
+        changed(make_natural(arena), speed_frequency=third), arena, n_agents=4, n_steps=3000
+    )
+
+    assert stats.kstest(speed.ravel(), stats.uniform(0.054, 0.017).cdf).pvalue > 1e-4
 
 
 def test_stays_count_as_the_slowest_bin(make_natural):
