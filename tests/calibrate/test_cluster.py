@@ -255,6 +255,24 @@ def test_a_killed_worker_loses_nothing(two, group, genes, undisturbed, n_killed)
 
 
 @pytest.mark.slow
+def test_a_worker_that_dies_while_it_is_asked_is_passed_over(two, monkeypatch):
+    """It is not taken for one that cannot load zfcal."""
+    own = two.client.run(os.getpid)
+    process = next(iter(own.values()))
+
+    def dying():
+        if os.getpid() == process:
+            os.kill(process, signal.SIGKILL)
+        return fingerprint()
+
+    monkeypatch.setattr(scheduling, "fingerprint", dying)
+    assert not two.check()
+    monkeypatch.undo()
+    wait_until(lambda: two.n_threads == 2)
+    assert two.check()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["scheduler", "worker"])
 def test_a_lost_cluster_ends_the_work_in_time(lost, scheduler, worker_of, group, genes, repository):
     """With one line that says how to go on, within the patience."""

@@ -77,16 +77,28 @@ class Cluster:
         """Pieces of work that run at the same time: the threads of all workers there are now."""
         return sum(self._workers().values())
 
-    def check(self) -> None:
+    def check(self) -> bool:
         """Compare all workers with this process.
+
+        Returns
+        -------
+        bool
+            Whether all of them answered; one that is dying does not.
 
         Raises
         ------
         InputError
             One has no zfcal, another version, or a processor that makes other numbers.
         """
+        from distributed.comm.core import CommClosedError
+
         here = fingerprint()
-        found = self.client.run(fingerprint, on_error="return")
+        answers = self.client.run(fingerprint, on_error="return")
+        found = {
+            worker: there
+            for worker, there in answers.items()
+            if not isinstance(there, CommClosedError)
+        }
         for worker, there in found.items():
             refuse_unlike(here, there, worker)
         known = {here.machine} | self._machines
@@ -94,6 +106,7 @@ class Cluster:
         for worker, there in self.client.run(trace, workers=others).items() if others else ():
             refuse_other_bits(there, worker)
         self._machines.update(there.machine for there in found.values())
+        return len(found) == len(answers)
 
     def warm_up(self) -> None:
         """Have every worker compile now what it will need, or load it."""
@@ -157,9 +170,11 @@ class Cluster:
         except (concurrent.futures.CancelledError, OSError) as error:
             raise self._gone() from error
         except Exception:
-            # Such as a worker that joined late and has no zfcal: this says so.
-            self.check()
-            raise
+            # Such as a worker that joined late and has no zfcal: this says so. A worker
+            # that is dying takes results with it: they are made again.
+            if self.check():
+                raise
+            return False, []
         finally:
             coming.cancel()
 
