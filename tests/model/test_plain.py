@@ -12,7 +12,7 @@ import pytest
 
 from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.run import record_run
-from zfcal.model.simulate import pack
+from zfcal.model.simulate import individuals, pack
 
 _PLAIN = """
 import json, sys, warnings
@@ -22,12 +22,13 @@ warnings.simplefilter("ignore", RuntimeWarning)  # words of 64 bits are meant to
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.run import record_run
-from zfcal.model.simulate import pack
+from zfcal.model.simulate import individuals, pack
 from zfcal.parameters import natural
 arena = load_arena("two-rooms", Path())
 model = natural(tuple((z.name, z.follows_walls) for z in arena.zones), dt_s=0.2)
 record = record_run(
-    np.uint64(9), 3, 0, 25, pack([model], arena), make_tank(arena, cells=20), int(sys.argv[1])
+    np.uint64(9), individuals(3, 0), 0, 25, pack([model], arena), make_tank(arena, cells=20),
+    int(sys.argv[1]),
 )
 json.dump(record.tolist(), sys.stdout)
 """
@@ -48,7 +49,8 @@ def test_compiled_and_plain_runs_are_the_same(grid, two_rooms, model):
     )
 
     compiled = record_run(
-        np.uint64(9), 3, 0, 25, pack([model], two_rooms), make_tank(two_rooms, cells=20), grid
-    )
+        np.uint64(9), individuals(3, 0), 0, 25, pack([model], two_rooms),
+        make_tank(two_rooms, cells=20), grid,
+    )  # fmt: skip
 
     assert np.array(json.loads(done.stdout)) == pytest.approx(compiled, abs=1e-9)

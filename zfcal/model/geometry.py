@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.model.compiled import inlined, kernel
+from zfcal.model.rooms import Rooms, make_rooms
 
 _CELLS_LONG_SIDE = 480
 _ASK = 255
@@ -60,6 +61,8 @@ class Tank(NamedTuple):
         The one nearest wall segment, or minus the place in ``lists`` less one.
     lists : ndarray of int32
         A count and then so many segments, again and again.
+    rooms
+        On the grid of the cells; for effects that know of rooms.
     """
 
     walls: Floats
@@ -83,6 +86,7 @@ class Tank(NamedTuple):
     wall_per_m: float
     speed_low: float
     speed_high: float
+    rooms: Rooms
 
 
 @inlined
@@ -333,6 +337,7 @@ def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:
         wall_per_m=10 / (bins.wall_distance_m[1] - bins.wall_distance_m[0]),
         speed_low=float(bins.speed_m_s[0]),
         speed_high=float(bins.speed_m_s[1]),
+        rooms=make_rooms(arena, shape, (x0, y0), per_m),
     )
     half_diagonal_m = math.sqrt(0.5) / per_m * (1 + 1e-9) + 1e-12
     return tank._replace(lists=_fill(tank, half_diagonal_m))

@@ -16,6 +16,10 @@ from zfcal.model.kernels.world import (
     GRID,
     HX,
     HY,
+    LEFT_AT_S,
+    NEVER_S,
+    PAST_HX,
+    PAST_HY,
     STATES,
     ZONE,
     Packed,
@@ -24,6 +28,7 @@ from zfcal.model.kernels.world import (
     Y,
     look,
     make_work,
+    remember,
     settle,
 )
 from zfcal.model.packing import pack
@@ -127,6 +132,9 @@ def _settle_all(state: Floats, tank: Tank) -> bool:
         if state[ZONE, i] == 0:
             return False
         settle(i, state, tank)
+        state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
+        state[LEFT_AT_S, i] = -NEVER_S
+    remember(state, tank)
     return True
 
 

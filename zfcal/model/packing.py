@@ -12,7 +12,14 @@ from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, build
-from zfcal.model.kernels.world import KAPPA_BASE, KAPPA_F, LAWS, ZONE_COLUMNS, Packed
+from zfcal.model.kernels.world import (
+    KAPPA_BASE,
+    KAPPA_F,
+    LAG_MAX,
+    LAWS,
+    ZONE_COLUMNS,
+    Packed,
+)
 from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales, n_genes
 
 Floats = NDArray[np.float64]
@@ -120,6 +127,8 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         # A copy: a read-only array is another type, for which all would be compiled again.
         cos_fov=np.broadcast_to(cos_fov, (n_models,)).copy(),
         dt_s=float(models[0].dt_s),
+        lags=_lags(effects, models, n_models),
+        clock_s=np.array([0.0, 1.0]),
         components=_hooks(effects, "component"),
         factors=_hooks(effects, "factor"),
         speeds=_hooks(effects, "speed"),
@@ -165,6 +174,21 @@ def _hooks(effects: Sequence[Effect], kind: str) -> NDArray[np.int64]:
         if (function := getattr(effect, kind)) is not None
     ]
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+
+def _lags(
+    effects: Sequence[Effect], models: Sequence[Parameters], n_models: int
+) -> NDArray[np.int64]:
+    """Return by how many steps each model responds late."""
+    lags = np.zeros(n_models, dtype=np.int64)
+    for effect in effects:
+        if effect.lag is None:
+            continue
+        for model in range(n_models):
+            given = models[model % len(models)]
+            values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
+            lags[model] = max(lags[model], min(LAG_MAX, round(values[effect.lag] / given.dt_s)))
+    return lags
 
 
 def _effect_parameters(

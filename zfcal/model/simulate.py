@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
@@ -23,6 +24,7 @@ __all__ = [
     "Packed",
     "burn_in_steps",
     "check_sampler",
+    "individuals",
     "pack",
     "pack_genes",
     "simulate_counts",
@@ -59,6 +61,7 @@ def simulate_counts(
     n_steps: int,
     seeds: NDArray[np.uint64],
     n_counted: int | None = None,
+    n_robots: int = 0,
     n_threads: int | None = None,
 ) -> Counts:
     """Simulate every model with every seed and return the histograms.
@@ -75,6 +78,9 @@ def simulate_counts(
         The same for all models: common random numbers.
     n_counted
         How many of the agents count, from the first one; None for all.
+    n_robots
+        How many of the agents are robots, from the last one; the base model treats
+        all alike.
     n_threads
         None for one per core. The numbers do not depend on it.
 
@@ -96,13 +102,32 @@ def simulate_counts(
     # Pieces of some milliseconds, so that the last one is short on every core.
     per_piece = max(1, _JOB_STEPS // (n_agents * (n_steps + sizes[2])))
     words = np.array(seeds, dtype=np.uint64)
+    people = individuals(n_agents, n_robots)
 
     def work(first: int) -> None:
-        count_runs(first, min(first + per_piece, jobs), words, sizes, packed, tank, counts)
+        count_runs(first, min(first + per_piece, jobs), words, sizes, people, packed, tank, counts)
 
     with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
         list(pool.map(work, range(0, jobs, per_piece)))
     return counts
+
+
+def individuals(n_agents: int, n_robots: int) -> NDArray[np.float64]:
+    """Return kind and trait of each agent, shape (2, agent).
+
+    The traits of n fish are the normal quantiles of ``(i + 1/2) / n``, scaled to a
+    variance of one: every simulated group is as mixed as its model says. Robots have
+    the mean.
+    """
+    if not 0 <= n_robots <= n_agents:
+        raise InputError(f"Of {n_agents} agents {n_robots} cannot be robots.")
+    table = np.zeros((2, n_agents))
+    n_fish = n_agents - n_robots
+    table[0, n_fish:] = 1.0
+    if n_fish > 1:
+        quantiles = ndtri((np.arange(n_fish) + 0.5) / n_fish)
+        table[1, :n_fish] = quantiles / quantiles.std()
+    return table
 
 
 def check_sampler(sampler: str, grid: int) -> None:
@@ -126,6 +151,8 @@ def simulate_tracks(
     n_agents: int,
     n_steps: int,
     seed: int,
+    n_robots: int = 0,
+    clock_s: tuple[float, float] = (0.0, 1.0),
     sampler: str = "exact",
     grid: int = GRID,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -137,6 +164,11 @@ def simulate_tracks(
         Samples, after 60 s of burn-in.
     seed
         Not negative; the run's numbers derive from it by `numpy.random.SeedSequence`.
+    n_robots
+        How many of the agents are robots, from the last one.
+    clock_s
+        Time of the trial at the first sample, and seconds of the trial in a second
+        that is simulated.
     sampler
         ``exact``, or ``grid`` for the paper's numeric way.
     grid
@@ -154,10 +186,11 @@ def simulate_tracks(
             f"A simulation needs agents, steps and a seed from 0 on; got {n_agents} agents, "
             f"{n_steps} steps, seed {seed}."
         )
-    packed = pack([parameters], arena)
+    packed = pack([parameters], arena)._replace(clock_s=np.array(clock_s, dtype=np.float64))
     word = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
     record = record_run(
-        word, n_agents, burn_in_steps(packed.dt_s), n_steps, packed, tank_of(arena),
+        word, individuals(n_agents, n_robots), burn_in_steps(packed.dt_s), n_steps, packed,
+        tank_of(arena),
         grid if sampler == "grid" else 0,
     )  # fmt: skip
     return record[:, :, :2], np.arctan2(record[:, :, 3], record[:, :, 2])

@@ -44,13 +44,13 @@ def shun_zone(state, sight, n, i, parameters, ux, uy, speed, landing):
 
 
 @cfunc(SPEED)
-def slower(state, sight, n, i, parameters):
+def slower(state, sight, n, i, parameters, chance):
     """Agents from a given one on swim at a share of their speed."""
     return parameters[1] if i >= parameters[0] else 1.0
 
 
 @cfunc(SPEED)
-def tired(state, sight, n, i, parameters):
+def tired(state, sight, n, i, parameters, chance):
     """Nobody swims from a given time on."""
     return 0.0 if state[TIME * n + i] >= parameters[0] else 1.0
 

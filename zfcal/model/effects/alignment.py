@@ -46,5 +46,9 @@ EFFECT = Effect(
             says="Von Mises concentration about that heading.",
         ),
     ),
+    strength="weight",
+    probe=0.05,
     component=component,
+    shapes=lambda _arena: ({"kappa": 3.0}, {"kappa": 12.0}),
+    lacks=lambda company: None if company.n_fish + company.n_robots > 1 else "a neighbour",
 )

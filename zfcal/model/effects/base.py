@@ -12,18 +12,26 @@ An effect adds to a step, by compiled C functions, any of:
 ``sight``
     a factor on the solid angle at which a neighbour is seen.
 
+``lag``
+    the name of a parameter in seconds: others are seen where they were then.
+
 Each gets the agents' state as numbers in rows of n, one row for each name in
 `zfcal.model.kernels.world` (``state[X * n + i]``), the solid angles that agent
-i sees as ``sight[i * n + j]``, and its parameters in their order.
+i sees as ``sight[i * n + j]``, and its parameters in their order. An agent
+that is not there has zone 0; nobody sees it.
+
+One parameter is the strength: at its null the effect does nothing. The others are
+shapes. Whether a recording shows an effect is asked near the null, at a few shapes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from zfcal.arena import Arena
 from zfcal.errors import InputError
 
 MAX_PARAMETERS = 8
@@ -52,6 +60,37 @@ class EffectParameter:
     says: str
 
 
+Shapes = tuple[dict[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Company:
+    """Whom and what a recording holds; it decides which effects can be asked for.
+
+    Parameters
+    ----------
+    n_fish, n_robots
+        Agents that were seen for more than a moment.
+    has_rooms
+        Whether the arena has rooms, with a zone between them.
+    follows_walls
+        Whether a zone of the arena follows walls.
+    """
+
+    n_fish: int
+    n_robots: int
+    has_rooms: bool
+    follows_walls: bool
+
+
+def _always(_company: Company) -> str | None:
+    return None
+
+
+def _as_it_is(_arena: Arena) -> Shapes:
+    return ({},)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """Something that fish do and that the base model lacks.
@@ -66,18 +105,49 @@ class Effect:
         Where it was described.
     parameters
         At most eight.
+    strength
+        Name of the parameter that is zero where the effect is absent.
+    probe
+        A strength so small that the effect is proportional to it.
     component, factor, speed, sight
         Compiled functions (`numba.cfunc`), None for what it does not touch.
+    lag
+        Name of a parameter in seconds by which agents respond late.
+    shapes
+        Of an arena: values of the other parameters at which the effect is asked for.
+    lacks
+        Of a recording: what it lacks for this effect to show, None if nothing.
+    opposite
+        The sentence where the strength is negative; empty where it cannot be.
+    identity_s
+        Tracks need to be this long under one id for the effect to show.
     """
 
     name: str
     says: str
     reference: str
     parameters: tuple[EffectParameter, ...]
+    strength: str = "strength"
+    probe: float = 0.01
     component: Any = None
     factor: Any = None
     speed: Any = None
     sight: Any = None
+    lag: str | None = None
+    shapes: Callable[[Arena], Shapes] = _as_it_is
+    lacks: Callable[[Company], str | None] = _always
+    opposite: str = ""
+    identity_s: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in their order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def on_speed(self) -> bool:
+        """Whether it changes the speed; otherwise it changes the heading."""
+        return self.speed is not None
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Return the parameters in their order, with defaults for those not given.

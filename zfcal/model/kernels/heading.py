@@ -22,6 +22,8 @@ from zfcal.model.kernels.world import (
     KAPPA_F,
     LAW_BASE,
     LAW_F,
+    PAST_HX,
+    PAST_HY,
     SPEED,
     TAU_X,
     TAU_Y,
@@ -294,9 +296,10 @@ def draw_move(
     for k in range(packed.speeds.shape[0]):
         factor *= call_speed(
             packed.speeds[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, state.shape[1],
-            i, packed.effects[model, packed.speeds[k, 1]].ctypes.data,
+            i, packed.effects[model, packed.speeds[k, 1]].ctypes.data, uniform(random),
         )  # fmt: skip
-    for _ in range(1 + _REDRAWS):
+    # An agent that an effect stops keeps its heading.
+    for _ in range(1 + _REDRAWS if factor > 0.0 else 0):
         speed = factor * draw_speed(i, state, model, packed, tank, random)
         work.moves[i, 3] = speed
         if grid:
@@ -318,6 +321,8 @@ def draw_move(
 @inlined
 def apply_move(i: int, work: Work, dt_s: float, state: Floats) -> None:
     """Move an agent; its wall is looked up later."""
+    if work.moves[i, 3] > 0.0:
+        state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
     state[X, i] += work.moves[i, 3] * dt_s * work.moves[i, 0]
     state[Y, i] += work.moves[i, 3] * dt_s * work.moves[i, 1]
     state[HX, i], state[HY, i] = work.moves[i, 0], work.moves[i, 1]

@@ -23,8 +23,12 @@ COMPONENT = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _POINTER)
 FACTOR = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _F8, _F8, _F8, _I8)
 """``factor(state, sight, n, i, parameters, ux, uy, speed_m_s, landing_zone)`` in [0, 1]."""
 
-SPEED = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER)
-"""``factor(state, sight, n, i, parameters)`` on the drawn speed."""
+SPEED = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _F8)
+"""``factor(state, sight, n, i, parameters, chance)`` on the drawn speed.
+
+``chance`` is uniform in [0, 1) and new for each step; at a factor of zero the agent
+stays and keeps its heading.
+"""
 
 SIGHT = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _I8)
 """``factor(state, sight, n, i, parameters, j)`` on the solid angle of neighbour j."""
@@ -63,7 +67,7 @@ def call_factor(_context, at, state, sight, n, i, parameters, ux, uy, speed, lan
 
 
 @intrinsic
-def call_speed(_context, at, state, sight, n, i, parameters):  # type: ignore[no-untyped-def]
+def call_speed(_context, at, state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]
     """Call a function of kind `SPEED` at an address."""
     return _call(SPEED)
 

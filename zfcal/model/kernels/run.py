@@ -27,8 +27,10 @@ from zfcal.model.kernels.world import (
     X,
     Y,
     look,
+    look_back,
     make_work,
     place,
+    remember,
     settle,
 )
 
@@ -60,14 +62,32 @@ def advance(
     work: Work, grid: bool,
 ) -> None:  # fmt: skip
     """Move all agents at once by one step: each sees where the others were."""
-    look(state, model, packed, sight)
+    if packed.lags[model] > 0:
+        see_late(state, model, packed, sight, work)
+    else:
+        look(state, model, packed, sight)
     n = state.shape[1]
     for i in range(n):
         draw_move(i, state, model, packed, tank, sight, random, work, grid)
     for i in range(n):
         apply_move(i, work, packed.dt_s, state)
         settle(i, state, tank)
-        state[TIME, i] += packed.dt_s
+        state[TIME, i] += packed.dt_s * packed.clock_s[1]
+    if packed.effects.shape[1] > 0:
+        remember(state, tank)
+
+
+@inlined
+def see_late(state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
+    """Look at where the others were some steps ago, and keep where all are now."""
+    slots = work.past.shape[0]
+    step = int(work.steps[0])
+    for i in range(state.shape[1]):
+        work.past[step % slots, 0, i], work.past[step % slots, 1, i] = state[X, i], state[Y, i]
+        work.past[step % slots, 2, i], work.past[step % slots, 3, i] = state[HX, i], state[HY, i]
+    seen = max(0, step - packed.lags[model]) % slots
+    look_back(state, work.past, seen, model, packed, sight)
+    work.steps[0] = step + 1.0
 
 
 @inlined
@@ -107,8 +127,8 @@ def _count_step(
 
 @kernel
 def count_runs(
-    first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], packed: Packed,
-    tank: Tank, counts: Counts,
+    first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], individuals: Floats,
+    packed: Packed, tank: Tank, counts: Counts,
 ) -> None:  # fmt: skip
     """Simulate jobs ``first`` to ``last - 1`` and add up their histograms.
 
@@ -120,6 +140,8 @@ def count_runs(
         One per run, the same for all models (common random numbers).
     sizes
         Agents, agents that count (the first ones), steps of burn-in, samples.
+    individuals : ndarray, shape (2, agent)
+        Kind and trait of each agent.
     """
     n, n_counted, burn_in, samples = sizes
     state = np.zeros((STATES, n))
@@ -129,11 +151,10 @@ def count_runs(
         model, run = job // seeds.size, job % seeds.size
         random = seeded(seeds[run])
         state[:] = 0.0
-        place(state, tank, random)
-        state[TIME] = -burn_in * packed.dt_s
+        start(state, burn_in, packed, tank, individuals, work, random)
         for _ in range(burn_in):
             advance(state, model, packed, tank, sight, random, work, False)
-        state[TIME] = 0.0
+        state[TIME] = packed.clock_s[0]
         _count_state(state, n_counted, tank, model, run, counts)
         for _ in range(samples - 1):
             for i in range(n_counted):
@@ -143,14 +164,28 @@ def count_runs(
             _count_state(state, n_counted, tank, model, run, counts)
 
 
+@inlined
+def start(
+    state: Floats, burn_in: int, packed: Packed, tank: Tank, individuals: Floats, work: Work,
+    random: Random,
+) -> None:  # fmt: skip
+    """Put all agents into the tank, so long before the first sample."""
+    state[TIME] = packed.clock_s[0] - burn_in * packed.dt_s * packed.clock_s[1]
+    place(state, tank, individuals, random)
+    work.steps[0] = 0.0
+
+
 @kernel
 def record_run(
-    seed: np.uint64, n: int, burn_in: int, samples: int, packed: Packed, tank: Tank, grid: int
-) -> Floats:
+    seed: np.uint64, individuals: Floats, burn_in: int, samples: int, packed: Packed, tank: Tank,
+    grid: int,
+) -> Floats:  # fmt: skip
     """Simulate the first model and return its states.
 
     Parameters
     ----------
+    individuals : ndarray, shape (2, agent)
+        Kind and trait of each agent.
     grid
         Angles of the numeric sampler; 0 for the exact one.
 
@@ -160,15 +195,15 @@ def record_run(
         x, y in metres, unit vector x, y of the heading, speed of the step that
         led here in m/s.
     """
+    n = individuals.shape[1]
     state = np.zeros((STATES, n))
     work = make_work(n, packed.components.shape[0], grid if grid > 0 else GRID)
     sight = make_sight(n * n)
     random = seeded(seed)
-    place(state, tank, random)
-    state[TIME] = -burn_in * packed.dt_s
+    start(state, burn_in, packed, tank, individuals, work, random)
     for _ in range(burn_in):
         advance(state, 0, packed, tank, sight, random, work, grid > 0)
-    state[TIME] = 0.0
+    state[TIME] = packed.clock_s[0]
     record = np.empty((samples, n, 5))
     for k in range(samples):
         if k > 0:

@@ -17,8 +17,26 @@ from zfcal.model.kernels.random import uniform
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Rows of the state, each with a number per agent. TIME counts from the first sample.
-X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, CLEAR, STATES = range(12)
+# Rows of the state, each with a number per agent; what effects may ask stands below.
+X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, CLEAR = range(11)
+PAST_HX, PAST_HY, KIND, TRAIT, FOLLOWS = range(11, 16)
+ROOM, MOUTH_X, MOUTH_Y, MOUTH_M, LEFT_S, LEFT_AT_S, LEFT_FROM, STATES = range(16, 24)
+"""State of an agent; rows from PAST_HX on are kept only where a model has effects.
+
+X, Y: metres. HX, HY: unit vector of the heading. SPEED: m/s of the step that led here.
+ZONE: id; 0 for an agent that is not there. WALL: metres to the wall; TAU: unit vector
+along it. TIME: seconds since the trial's start. CLEAR: metres to the nearest border.
+PAST_H: the heading one step ago. KIND: 0 fish, 1 robot. TRAIT: what is lasting about an
+individual, with mean 0 and standard deviation 1 over a group. FOLLOWS: 1 where the zone
+follows walls. ROOM: its number, 0 between rooms and in an arena without. MOUTH: unit
+vector toward the room's way out, and metres to it. LEFT_S: seconds since another agent
+that is still away left this room. LEFT_AT_S, LEFT_FROM: when this agent last left a
+room, and which.
+"""
+
+NEVER_S = 1e9
+LAG_MAX = 10
+"""Steps by which a response can lag."""
 
 # Columns of a zone's parameters.
 KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
@@ -47,6 +65,11 @@ class Packed(NamedTuple):
     cos_fov : ndarray, shape (model,)
     dt_s
         The step, the same for all.
+    lags : ndarray of int64, shape (model,)
+        Steps by which agents respond late: others are seen where they were then.
+    clock_s : ndarray, shape (2,)
+        Time of the trial at the first sample, and seconds of the trial in a second
+        that is simulated; for effects that change over a trial.
     components, factors, speeds, sights : ndarray of int64, shape (hook, 2)
         Address of an effect's function and its row of ``effects``.
     effects : ndarray, shape (model, effect, 8)
@@ -60,6 +83,8 @@ class Packed(NamedTuple):
     speed_other: Ints
     cos_fov: Floats
     dt_s: float
+    lags: Ints
+    clock_s: Floats
     components: Ints
     factors: Ints
     speeds: Ints
@@ -80,6 +105,10 @@ class Work(NamedTuple):
         Zone ids before the step.
     grid_x, grid_y, values, density : ndarray, shape (angle + 1,)
         Unit vectors of the grid's angles, and densities on it.
+    past : ndarray, shape (LAG_MAX + 1, 4, agent)
+        Where all were at former steps; see `look_back`.
+    steps : ndarray, shape (1,)
+        Steps done since the start, for models that respond late.
     """
 
     moves: Floats
@@ -89,6 +118,8 @@ class Work(NamedTuple):
     grid_y: Floats
     values: Floats
     density: Floats
+    past: Floats
+    steps: Floats
 
 
 @kernel
@@ -98,6 +129,7 @@ def make_work(n: int, n_components: int, grid: int) -> Work:
     return Work(
         np.zeros((n, 4)), np.zeros((n + n_components, 5)), np.zeros(n),
         np.cos(angles), np.sin(angles), np.zeros(grid + 1), np.zeros(grid + 1),
+        np.zeros((LAG_MAX + 1, 4, n)), np.zeros(1),
     )  # fmt: skip
 
 
@@ -110,8 +142,14 @@ def settle(i: int, state: Floats, tank: Tank) -> None:
 
 
 @kernel
-def place(state: Floats, tank: Tank, random: NDArray[np.uint64]) -> None:
-    """Put all agents at uniform places inside, with uniform headings."""
+def place(state: Floats, tank: Tank, individuals: Floats, random: NDArray[np.uint64]) -> None:
+    """Put all agents at uniform places inside, with uniform headings.
+
+    Parameters
+    ----------
+    individuals : ndarray, shape (2, agent)
+        Rows KIND and TRAIT of the state.
+    """
     height, width = tank.cells.shape
     for i in range(state.shape[1]):
         zone = 0
@@ -123,6 +161,82 @@ def place(state: Floats, tank: Tank, random: NDArray[np.uint64]) -> None:
         heading = 2.0 * math.pi * uniform(random)
         state[HX, i], state[HY, i] = math.cos(heading), math.sin(heading)
         settle(i, state, tank)
+        state[KIND, i], state[TRAIT, i] = individuals[0, i], individuals[1, i]
+        state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
+        state[LEFT_AT_S, i] = -NEVER_S
+    remember(state, tank)
+
+
+@kernel
+def remember(state: Floats, tank: Tank) -> None:
+    """Write what effects may ask of rooms and walls, for all agents that have moved."""
+    rooms = tank.rooms
+    for i in range(state.shape[1]):
+        zone = int(state[ZONE, i])
+        state[FOLLOWS, i] = 1.0 if tank.follows[zone] else 0.0
+        before, room = state[ROOM, i], 0.0
+        if rooms.exit_zone > 0 and zone > 0 and zone != rooms.exit_zone:
+            room = room_of(state[X, i], state[Y, i], tank)
+        if before > 0.0 and room != before:
+            state[LEFT_AT_S, i], state[LEFT_FROM, i] = state[TIME, i], before
+        state[ROOM, i] = room
+        _find_mouth(i, state, tank)
+    for i in range(state.shape[1]):
+        state[LEFT_S, i] = NEVER_S
+        for j in range(state.shape[1]):
+            away = state[ROOM, j] != state[ROOM, i] and state[ZONE, j] > 0.0
+            if j != i and state[ROOM, i] > 0.0 and state[LEFT_FROM, j] == state[ROOM, i] and away:
+                since_s = state[TIME, i] - state[LEFT_AT_S, j]
+                state[LEFT_S, i] = min(state[LEFT_S, i], since_s)
+
+
+@kernel
+def room_of(x: float, y: float, tank: Tank) -> float:
+    """Return the number of the room that is nearest to a place, 0 in an arena without."""
+    cells = tank.rooms.cells
+    row = min(cells.shape[0] - 1, max(0, int((y - tank.y0_m) * tank.per_m)))
+    column = min(cells.shape[1] - 1, max(0, int((x - tank.x0_m) * tank.per_m)))
+    return float(cells[row, column])
+
+
+@kernel
+def _find_mouth(i: int, state: Floats, tank: Tank) -> None:
+    """Write the direction of the way out of an agent's room; zero vector without one."""
+    mouths = tank.rooms.mouths
+    state[MOUTH_X, i], state[MOUTH_Y, i], state[MOUTH_M, i] = 0.0, 0.0, NEVER_S
+    for m in range(mouths.shape[0]):
+        if mouths[m, 0] == state[ROOM, i]:
+            dx, dy = mouths[m, 1] - state[X, i], mouths[m, 2] - state[Y, i]
+            away = math.sqrt(dx * dx + dy * dy)
+            if 0.0 < away < state[MOUTH_M, i]:
+                state[MOUTH_X, i], state[MOUTH_Y, i] = dx / away, dy / away
+                state[MOUTH_M, i] = away
+
+
+@kernel
+def look_back(
+    state: Floats, past: Floats, slot: int, model: int, packed: Packed, sight: Sight
+) -> None:
+    """Write what each agent sees of where each other one was.
+
+    Parameters
+    ----------
+    past : ndarray, shape (slot, 4, agent)
+        x, y and the unit vector of the heading at former steps.
+    slot
+        The step that is seen.
+    """
+    n = state.shape[1]
+    for i in range(n):
+        for j in range(n):
+            k = i * n + j
+            sight.dx_m[k] = past[slot, 0, j] - state[X, i] if i != j else 0.0
+            sight.dy_m[k] = past[slot, 1, j] - state[Y, i] if i != j else 0.0
+            sight.hx[k], sight.hy[k] = past[slot, 2, j], past[slot, 3, j]
+            sight.ahead_m[k] = sight.dx_m[k] * state[HX, i] + sight.dy_m[k] * state[HY, i]
+    see(sight, packed.cos_fov[model])
+    if packed.sights.shape[0] > 0:
+        _attend(state, model, packed, sight)
 
 
 @inlined
