@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, nearest_wall, zone_of
+from zfcal.model.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.simulate import tank_of
@@ -112,7 +112,7 @@ def steps_of(samples: Samples, arena: Arena, *, fov_rad: float) -> Steps:
     cos_fov = -2.0 if fov_rad >= math.pi else math.cos(fov_rad)
     seen = _see(xy, heading, at, agent, cos_fov, tank)
     reach = length[at, agent]
-    share = _shares(xy[at, agent], reach, tank, len(arena.zones), ANGLES, PER_CELL)
+    share = landing_shares(xy[at, agent], reach, tank, len(arena.zones), ANGLES, PER_CELL)
     return Steps(
         k=samples.k[at],
         agent=samples.agent[agent],
@@ -190,18 +190,23 @@ def _see(
 
 
 @kernel
-def _shares(
+def landing_shares(
     xy: Floats, reach: Floats, tank: Tank, n_zones: int, angles: int, per_cell: int
 ) -> NDArray[np.uint8]:
     """Count the landing zones of each cell; cell g is about the angle 2 pi g / angles."""
     share = np.zeros((len(xy), angles, n_zones), dtype=np.uint8)
     places = angles * per_cell
+    ux, uy = np.empty(places), np.empty(places)
     for p in range(places):
         theta = 2.0 * math.pi * ((p + 0.5) / places - 0.5 / angles)
-        ux, uy = math.cos(theta), math.sin(theta)
-        cell = p // per_cell
-        for s in range(len(xy)):
-            zone = zone_of(xy[s, 0] + reach[s] * ux, xy[s, 1] + reach[s] * uy, tank)
+        ux[p], uy[p] = math.cos(theta), math.sin(theta)
+    for s in range(len(xy)):
+        x, y = xy[s, 0], xy[s, 1]
+        if reach[s] < clearance(x, y, tank):  # no border is that near
+            share[s, :, zone_of(x, y, tank) - 1] = per_cell
+            continue
+        for p in range(places):
+            zone = zone_of(x + reach[s] * ux[p], y + reach[s] * uy[p], tank)
             if zone > 0:
-                share[s, cell, zone - 1] += 1
+                share[s, p // per_cell, zone - 1] += 1
     return share

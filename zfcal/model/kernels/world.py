@@ -169,13 +169,15 @@ def place(state: Floats, tank: Tank, individuals: Floats, random: NDArray[np.uin
 
 @kernel
 def remember(state: Floats, tank: Tank) -> None:
-    """Write what effects may ask of rooms and walls, for all agents that have moved."""
+    """Write what effects may ask of rooms and walls, for all agents that are there."""
     rooms = tank.rooms
     for i in range(state.shape[1]):
         zone = int(state[ZONE, i])
+        if zone == 0:  # who is not seen has not left
+            continue
         state[FOLLOWS, i] = 1.0 if tank.follows[zone] else 0.0
         before, room = state[ROOM, i], 0.0
-        if rooms.exit_zone > 0 and zone > 0 and zone != rooms.exit_zone:
+        if rooms.exit_zone > 0 and zone != rooms.exit_zone:
             room = room_of(state[X, i], state[Y, i], tank)
         if before > 0.0 and room != before:
             state[LEFT_AT_S, i], state[LEFT_FROM, i] = state[TIME, i], before

@@ -1,0 +1,280 @@
+"""Measured positions as the states that agents decided in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.model.compiled import kernel
+from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.hooks import call_component, call_factor, call_sight, call_speed
+from zfcal.model.kernels.perception import make_sight, see
+from zfcal.model.kernels.world import (
+    HX,
+    HY,
+    KIND,
+    LEFT_AT_S,
+    LEFT_FROM,
+    LEFT_S,
+    NEVER_S,
+    PAST_HX,
+    PAST_HY,
+    ROOM,
+    SPEED,
+    STATES,
+    TIME,
+    ZONE,
+    Packed,
+    X,
+    Y,
+    remember,
+    settle,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PART = 4
+"""Columns of a component: weight, unit vector x and y, kappa."""
+
+
+@kernel
+def fill_states(
+    xy_m: Floats, kinds: Floats, clock: tuple[float, float], least_m: float, tank: Tank
+) -> Floats:
+    """Return the state of all agents at all samples.
+
+    Parameters
+    ----------
+    xy_m : ndarray, shape (sample, agent, 2)
+        Inside the tank, or NaN for who is not seen.
+    kinds : ndarray, shape (agent,)
+    clock
+        Time of the first sample, and the step, in seconds.
+    least_m
+        A shorter displacement has no heading.
+
+    Returns
+    -------
+    ndarray, shape (sample, state, agent)
+        Rows as in `zfcal.model.kernels.world`. Zone 0 and the last known place for who
+        is not seen; a heading of (0, 0) and a speed of NaN while they are unknown.
+    """
+    n = xy_m.shape[1]
+    states = np.zeros((xy_m.shape[0], STATES, n))
+    for k in range(xy_m.shape[0]):
+        state = states[k]
+        if k > 0:
+            state[:] = states[k - 1]
+        else:
+            state[LEFT_AT_S], state[LEFT_S] = -NEVER_S, NEVER_S
+            state[KIND] = kinds
+        state[TIME] = clock[0] + k * clock[1]
+        for i in range(n):
+            x, y = xy_m[k, i, 0], xy_m[k, i, 1]
+            zone = 0 if math.isnan(x) else zone_of(x, y, tank)
+            length = math.nan
+            if zone > 0 and k > 0 and states[k - 1, ZONE, i] > 0.0:
+                dx, dy = x - states[k - 1, X, i], y - states[k - 1, Y, i]
+                length = math.sqrt(dx * dx + dy * dy)
+                if length >= least_m:
+                    state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
+                    state[HX, i], state[HY, i] = dx / length, dy / length
+            elif zone > 0:
+                # Whoever comes back may be another one.
+                for row in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM):
+                    state[row, i] = 0.0
+                state[LEFT_AT_S, i] = -NEVER_S
+            state[SPEED, i] = length / clock[1]
+            state[ZONE, i] = zone
+            if zone > 0:
+                state[X, i], state[Y, i] = x, y
+                settle(i, state, tank)
+        remember(state, tank)
+    return states
+
+
+@kernel
+def perceive(
+    states: Floats, at: Ints, who: Ints, lag: int, cos_fov: float
+) -> tuple[Floats, Floats]:
+    """Return unit vectors to neighbours and the solid angles at which they are seen.
+
+    Parameters
+    ----------
+    at, who : ndarray of int64, shape (step,)
+        Sample and agent of each step.
+    lag
+        Steps by which others are seen late.
+
+    Returns
+    -------
+    toward : ndarray, shape (step, agent, 2)
+        Away from a neighbour that is too near.
+    angle_sr : ndarray, shape (step, agent)
+    """
+    n = states.shape[2]
+    toward, angle = np.zeros((at.size, n, 2)), np.zeros((at.size, n))
+    sight = make_sight(n)
+    for s in range(at.size):
+        own, i = states[at[s]], who[s]
+        then = states[max(0, at[s] - lag)]
+        for j in range(n):
+            there = j != i and then[ZONE, j] > 0.0
+            dx = then[X, j] - own[X, i] if there else 0.0
+            dy = then[Y, j] - own[Y, i] if there else 0.0
+            hx, hy = then[HX, j], then[HY, j]
+            if hx == 0.0 and hy == 0.0:  # of unknown heading: it swims straight away
+                away = math.sqrt(dx * dx + dy * dy)
+                hx, hy = (dx / away, dy / away) if away > 0.0 else (1.0, 0.0)
+            sight.dx_m[j], sight.dy_m[j] = dx, dy
+            sight.hx[j], sight.hy[j] = hx, hy
+            sight.ahead_m[j] = dx * own[HX, i] + dy * own[HY, i]
+        see(sight, cos_fov)
+        for j in range(n):
+            if sight.angle_sr[j] > 0.0:
+                angle[s, j] = sight.angle_sr[j]
+                toward[s, j, 0] = sight.dx_m[j] * sight.toward_per_m[j]
+                toward[s, j, 1] = sight.dy_m[j] * sight.toward_per_m[j]
+    return toward, angle
+
+
+@kernel
+def attend(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, changed: Floats
+) -> None:
+    """Write solid angles as effects on sight change them.
+
+    Parameters
+    ----------
+    packed
+        Of the first model.
+    angle_sr, changed : ndarray, shape (step, agent)
+        Given, and received.
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.sights.shape[0]):
+            own = packed.effects[0, packed.sights[h, 1]].ctypes.data
+            for j in range(n):
+                if row[i * n + j] > 0.0:
+                    row[i * n + j] *= call_sight(
+                        packed.sights[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                        own, j,
+                    )  # fmt: skip
+        for j in range(n):
+            changed[s, j] = row[i * n + j]
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_components(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, parts: Floats
+) -> None:
+    """Write the heading components of effects.
+
+    Parameters
+    ----------
+    parts : ndarray, shape (step, component, PART)
+        Receives weight, unit vector and kappa; weight 0 where there is none.
+    """
+    n = states.shape[2]
+    row, out = np.zeros(n * n), np.zeros(3)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.components.shape[0]):
+            out[:] = 0.0
+            weight: float = call_component(
+                packed.components[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.components[h, 1]].ctypes.data, out.ctypes.data,
+            )  # fmt: skip
+            parts[s, h, 0] = max(weight, 0.0)
+            parts[s, h, 1], parts[s, h, 2], parts[s, h, 3] = out[0], out[1], out[2]
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_factors(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
+    speed_m_s: Floats, landing: Ints, share: NDArray[np.uint8], tilt: Floats,
+    tilt_taken: Floats,
+) -> None:  # fmt: skip
+    """Write the product of the effects' factors on each cell of headings.
+
+    Parameters
+    ----------
+    taken : ndarray, shape (step, 2)
+    speed_m_s, landing : ndarray, shape (step,)
+    share : ndarray of uint8, shape (step, cell, zone)
+        A cell that several zones share counts as in the one with most of it.
+    tilt : ndarray, shape (step, cell)
+    tilt_taken : ndarray, shape (step,)
+        At the heading taken.
+    """
+    n, cells = states.shape[2], share.shape[1]
+    row = np.zeros(n * n)
+    gx, gy = np.empty(cells), np.empty(cells)
+    for g in range(cells):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        state = states[at[s]].ctypes.data
+        for g in range(-1, cells):
+            ux, uy, zone = taken[s, 0], taken[s, 1], landing[s]
+            if g >= 0:
+                ux, uy, zone, most = gx[g], gy[g], 0, 0
+                for z in range(share.shape[2]):
+                    if share[s, g, z] > most:
+                        most, zone = share[s, g, z], z + 1
+            product = 1.0
+            if zone > 0:
+                for h in range(packed.factors.shape[0]):
+                    product *= call_factor(
+                        packed.factors[h, 0], state, row.ctypes.data, n, i,
+                        packed.effects[0, packed.factors[h, 1]].ctypes.data,
+                        ux, uy, speed_m_s[s], zone,
+                    )  # fmt: skip
+            if g >= 0:
+                tilt[s, g] = product
+            else:
+                tilt_taken[s] = product
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_speeds(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, factor: Floats
+) -> None:
+    """Write the product of the effects' factors on the speed of each step.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (step,)
+        As for a chance of just less than one: nobody is stopped.
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        factor[s] = 1.0
+        for h in range(packed.speeds.shape[0]):
+            factor[s] *= call_speed(
+                packed.speeds[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.speeds[h, 1]].ctypes.data, 1.0 - 1e-12,
+            )  # fmt: skip
+        for j in range(n):
+            row[i * n + j] = 0.0
