@@ -97,6 +97,8 @@ class Scene:
         Sample numbers.
     states : ndarray, shape (sample, state, column)
         Rows as in `zfcal.model.kernels.world`. Tracks that do not overlap share a column.
+    tracks : ndarray of int32, shape (sample, column)
+        Track ids; -1 where nobody is.
     turns
         Fish that have a heading before and after the step.
     moves
@@ -109,6 +111,7 @@ class Scene:
     dt_s: float
     k: Ints
     states: Floats
+    tracks: NDArray[np.int32]
     turns: Turns
     moves: Moves
     n_fish: int
@@ -170,6 +173,7 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
         dt_s=samples.dt_s,
         k=samples.k.astype(np.int64),
         states=states,
+        tracks=tracks,
         turns=_turns(parts, arena, samples.dt_s),
         moves=_moves(parts),
         n_fish=by_kind[0],

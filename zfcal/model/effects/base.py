@@ -121,6 +121,14 @@ class Effect:
         The sentence where the strength is negative; empty where it cannot be.
     identity_s
         Tracks need to be this long under one id for the effect to show.
+    stops
+        Whether its speed function stops agents by chance: what shows is how long they
+        stay.
+    individual
+        Whether it is a difference between individuals: what shows is how their scores
+        scatter.
+    fixed
+        Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     """
 
     name: str
@@ -138,6 +146,9 @@ class Effect:
     lacks: Callable[[Company], str | None] = _always
     opposite: str = ""
     identity_s: float = 0.0
+    stops: bool = False
+    individual: bool = False
+    fixed: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

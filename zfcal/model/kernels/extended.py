@@ -177,12 +177,12 @@ def cell_table(
 
 
 @kernel
-def social_ratio(
+def social_score(
     toward: Floats, changed_sr: Floats, angle_sr: Floats, taken: Floats, kappa: float,
     scale: float, alpha: float, mixture: Floats, probability: Floats, mixture_taken: Floats,
-    log_ratio: Floats,
+    floor: Floats, score: Floats,
 ) -> None:  # fmt: skip
-    """Write the change of the log density when neighbours are seen otherwise.
+    """Write the scores of neighbours that are seen otherwise.
 
     Parameters
     ----------
@@ -190,16 +190,21 @@ def social_ratio(
         Solid angles after and before.
     mixture, probability : ndarray, shape (step, cell)
         From `cell_table`, before.
-    mixture_taken : ndarray, shape (step,)
-    log_ratio : ndarray, shape (step,)
-        Receives ``log p_after - log p_before`` at the heading taken.
+    mixture_taken, floor : ndarray, shape (step,)
+        The floor is added to the mixture.
+    score : ndarray, shape (step,)
+        Receives the change over the mean of both mixtures and the floor at the heading
+        taken, less the mean of that over headings. The score itself, the change over the
+        mixture, has no variance where the mixture is next to nothing: one heading in ten
+        thousand outweighs all others. This is bounded by two, and as sharp at the
+        strength that is asked for.
     """
     cells = mixture.shape[1]
     gx, gy = np.empty(cells), np.empty(cells)
     for g in range(cells):
         gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
     for s in range(taken.shape[0]):
-        log_ratio[s] = 0.0
+        score[s] = 0.0
         change = 0.0
         for j in range(toward.shape[1]):
             change = max(change, abs(changed_sr[s, j] - angle_sr[s, j]))
@@ -217,18 +222,19 @@ def social_ratio(
                     cosine = x * toward[s, j, 0] + y * toward[s, j, 1]
                     more += by * math.exp(kappa * (cosine - 1.0)) * scale
             if g < 0:
-                here = 1.0 + alpha * more / mixture_taken[s]
+                here = alpha * more / (mixture_taken[s] + 0.5 * alpha * more + floor[s])
             else:
-                mean += probability[s, g] * (1.0 + alpha * more / mixture[s, g])
-        log_ratio[s] = math.log(max(here, 1e-12)) - math.log(max(mean, 1e-12))
+                by = alpha * more / (mixture[s, g] + 0.5 * alpha * more + floor[s])
+                mean += probability[s, g] * by
+        score[s] = here - mean
 
 
 @kernel
-def component_ratio(
+def component_score(
     parts: Floats, taken: Floats, mixture: Floats, probability: Floats, mixture_taken: Floats,
-    log_ratio: Floats,
+    floor: Floats, score: Floats,
 ) -> None:  # fmt: skip
-    """Write the change of the log density when components are added; see `social_ratio`.
+    """Write the scores of components that are added; see `social_score`.
 
     Parameters
     ----------
@@ -238,35 +244,65 @@ def component_ratio(
     gx, gy = np.empty(cells), np.empty(cells)
     for g in range(cells):
         gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    own = np.empty(parts.shape[1])
     for s in range(taken.shape[0]):
-        here, mean = 1.0, 1.0
+        mean, any_ = 0.0, False
         for c in range(parts.shape[1]):
-            weight = parts[s, c, 0]
-            if not weight > 0.0:
+            own[c] = parts[s, c, 0] * _scale(parts[s, c, 3]) if parts[s, c, 0] > 0.0 else 0.0
+            any_ = any_ or own[c] > 0.0
+        score[s] = 0.0
+        if not any_:
+            continue
+        for g in range(-1, cells):
+            if g >= 0 and probability[s, g] <= 0.0:
                 continue
-            kappa = parts[s, c, 3]
-            weight *= _scale(kappa)
-            cosine = taken[s, 0] * parts[s, c, 1] + taken[s, 1] * parts[s, c, 2]
-            here += weight * math.exp(kappa * (cosine - 1.0)) / mixture_taken[s]
-            for g in range(cells):
-                if probability[s, g] > 0.0:
-                    cosine = gx[g] * parts[s, c, 1] + gy[g] * parts[s, c, 2]
-                    value = weight * math.exp(kappa * (cosine - 1.0))
-                    mean += probability[s, g] * value / mixture[s, g]
-        log_ratio[s] = math.log(here) - math.log(mean)
+            x, y = (taken[s, 0], taken[s, 1]) if g < 0 else (gx[g], gy[g])
+            more = 0.0
+            for c in range(parts.shape[1]):
+                if own[c] > 0.0:
+                    cosine = x * parts[s, c, 1] + y * parts[s, c, 2]
+                    more += own[c] * math.exp(parts[s, c, 3] * (cosine - 1.0))
+            if g < 0:
+                score[s] = more / (mixture_taken[s] + 0.5 * more + floor[s])
+            else:
+                mean += probability[s, g] * more / (mixture[s, g] + 0.5 * more + floor[s])
+        score[s] -= mean
 
 
 @kernel
-def factor_ratio(tilt: Floats, tilt_taken: Floats, probability: Floats, log_ratio: Floats) -> None:
-    """Write the change of the log density when headings are tilted; see `social_ratio`.
+def mixture_score(
+    other: Floats, other_taken: Floats, mixture: Floats, probability: Floats,
+    mixture_taken: Floats, floor: Floats, score: Floats,
+) -> None:  # fmt: skip
+    """Write the score of another mixture beside the model's own; see `social_score`.
+
+    Parameters
+    ----------
+    other : ndarray, shape (step, cell)
+    other_taken : ndarray, shape (step,)
+    score : ndarray, shape (step,)
+        Receives the relative change at the heading taken, less its mean over headings.
+    """
+    for s in range(other.shape[0]):
+        mean = 0.0
+        for g in range(other.shape[1]):
+            middle = 0.5 * (other[s, g] + mixture[s, g]) + floor[s]
+            mean += probability[s, g] * (other[s, g] - mixture[s, g]) / middle
+        middle = 0.5 * (other_taken[s] + mixture_taken[s]) + floor[s]
+        score[s] = (other_taken[s] - mixture_taken[s]) / middle - mean
+
+
+@kernel
+def factor_score(tilt: Floats, tilt_taken: Floats, probability: Floats, score: Floats) -> None:
+    """Write the change of the log density when headings are tilted by very little.
 
     Parameters
     ----------
     tilt : ndarray, shape (step, cell)
-    tilt_taken : ndarray, shape (step,)
+    tilt_taken, score : ndarray, shape (step,)
     """
     for s in range(tilt.shape[0]):
         mean = 0.0
         for g in range(tilt.shape[1]):
             mean += probability[s, g] * tilt[s, g]
-        log_ratio[s] = math.log(max(tilt_taken[s], 1e-300)) - math.log(max(mean, 1e-300))
+        score[s] = math.log(max(tilt_taken[s], 1e-300)) - math.log(max(mean, 1e-300))

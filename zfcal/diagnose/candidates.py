@@ -1,0 +1,121 @@
+"""Which effects are asked for on a recording, and at which shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from zfcal.arena import Arena
+from zfcal.model.effects import Effect, all_effects
+from zfcal.model.effects.base import Company
+from zfcal.model.rooms import find_rooms
+from zfcal.model.scene import Scene
+from zfcal.parameters import Parameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """An effect at one shape.
+
+    Parameters
+    ----------
+    effect
+        What is asked for.
+    shape
+        All of its parameters but the strength.
+    """
+
+    effect: Effect
+    shape: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    def values(self, strength: float) -> dict[str, float]:
+        """Return all parameters at a strength."""
+        return {**self.shape, self.effect.strength: strength}
+
+    @property
+    def signed(self) -> bool:
+        """Whether its strength may be negative."""
+        (own,) = (p for p in self.effect.parameters if p.name == self.effect.strength)
+        return own.low < 0.0
+
+    @property
+    def notable(self) -> float:
+        """A strength that one would want to notice."""
+        (own,) = (p for p in self.effect.parameters if p.name == self.effect.strength)
+        return own.default
+
+
+def company_of(scene: Scene) -> Company:
+    """Return whom and what a recording holds."""
+    return Company(
+        n_fish=scene.n_fish,
+        n_robots=scene.n_robots,
+        has_rooms=find_rooms(scene.arena)[0] > 0,
+        follows_walls=any(zone.follows_walls for zone in scene.arena.zones),
+    )
+
+
+def candidates_of(
+    effects: tuple[Effect, ...], arena: Arena, *, without: tuple[str, ...] = ()
+) -> tuple[Candidate, ...]:
+    """Return every effect at each of its shapes.
+
+    Parameters
+    ----------
+    effects
+        To be asked for.
+    arena
+        Decides about shapes such as places.
+    without
+        Names that the model has already.
+    """
+    made = []
+    for effect in effects:
+        if effect.name in without:
+            continue
+        rest = {p.name: p.default for p in effect.parameters if p.name != effect.strength}
+        made += [Candidate(effect=effect, shape=rest | shape) for shape in effect.shapes(arena)]
+    return tuple(made)
+
+
+def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[str, str]]:
+    """Return the listed effects that a recording can show, and what it lacks for others.
+
+    Parameters
+    ----------
+    scene
+        Of the recording.
+    model
+        Effects that it has are left out.
+
+    Returns
+    -------
+    effects : tuple of Effect
+    lacks : dict
+        By name of an effect, such as ``a robot``.
+    """
+    company = company_of(scene)
+    longest_s = _longest_track_s(scene)
+    found, lacks = [], {}
+    for effect in all_effects():
+        if effect.name in model.effects:
+            continue
+        missing = effect.lacks(company)
+        if missing is None and longest_s < effect.identity_s:
+            missing = f"tracks of {effect.identity_s:g} s under one id"
+        if missing is None:
+            found.append(effect)
+        else:
+            lacks[effect.name] = missing
+    return tuple(found), lacks
+
+
+def _longest_track_s(scene: Scene) -> float:
+    counts = np.bincount(np.maximum(scene.tracks.ravel() + 1, 0))[1:]
+    return float(counts.max(initial=0) * scene.dt_s)

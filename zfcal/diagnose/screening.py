@@ -1,0 +1,330 @@
+r"""Efficient scores of candidate effects in a fitted model.
+
+Near its null an effect of strength b changes the density of a step by the factor
+``1 + b s``; s is the effect's score, whose expectation given the past is zero when the
+model is right. What the model's own parameters could explain is projected off, so
+
+    z = sum(s~) / sqrt(sum(s~^2))
+
+is standard normal for a right model, whatever the dependence along the trajectory (a
+martingale; Rao 1948, Mathematical Proceedings of the Cambridge Philosophical Society 44:
+50-57; Neyman 1959, C(alpha) tests). Headings are judged given the speed of the step.
+Speeds are judged given the zone, by the covariance of their response with what the
+effect responds to, within each zone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from zfcal.diagnose.candidates import Candidate
+from zfcal.model.extended import (
+    SCALES,
+    Fitted,
+    components_of,
+    constants,
+    factors_of,
+    view_of,
+    with_effect,
+    without_effects,
+)
+from zfcal.model.kernels.extended import (
+    component_score,
+    factor_score,
+    mixture_score,
+    social_score,
+)
+from zfcal.model.kernels.scene import ask_speeds, attend, perceive
+from zfcal.model.kernels.world import SPEED, TRAIT, Packed
+from zfcal.model.packing import pack
+from zfcal.model.scene import Scene, cos_of
+from zfcal.units import HEADING_MIN_STEP_M
+
+Floats = NDArray[np.float64]
+
+_FLOOR = 0.05
+"""Share of a uniform law that a heading's density is taken to have at least."""
+
+_FAST_QUANTILE = 0.995
+_STEEPEST = 8.0
+"""What a speed responds to counts for no more than so many standard deviations: one
+swapped identity must not look like an effect."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Score:
+    """How strongly a recording asks for an effect at one shape.
+
+    Parameters
+    ----------
+    candidate
+        What was asked for.
+    z
+        Standard normal, analytically, when the model is right.
+    strength
+        One step of Newton from the null.
+    information
+        Of the strength: one over the square of its standard error.
+    steps : ndarray, shape (step,)
+        Efficient scores of the scene's turns, or of its moves for an effect on speed.
+    """
+
+    candidate: Candidate
+    z: float
+    strength: float
+    information: float
+    steps: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Screen:
+    """A fitted model, ready to be asked for effects.
+
+    Parameters
+    ----------
+    scene
+        Measured, or simulated.
+    fitted
+        The model at its maximum likelihood there.
+    """
+
+    scene: Scene
+    fitted: Fitted
+
+    @cached_property
+    def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
+        mixture, probability, taken = self.fitted.tables()
+        return mixture, probability, taken, _FLOOR * mixture.mean(axis=1)
+
+    @cached_property
+    def _bases(self) -> tuple[list[Floats], Floats]:
+        """Return orthonormal bases of the model's own scores: per zone, and of its effects'."""
+        zones = []
+        for x, scores in zip(self.fitted.x, self.fitted.scores, strict=True):
+            # A parameter at its bound explains nothing on the other side.
+            open_ = np.ones(scores.shape[1], dtype=bool)
+            open_[-1] = x[-1] > 2e-6
+            zones.append(_basis(scores[:, open_]))
+        psi = self.fitted.effect_scores.copy()
+        for basis, turns in zip(zones, self.fitted.turns, strict=True):
+            psi[turns.rows] -= basis @ (basis.T @ psi[turns.rows])
+        return zones, _basis(psi)
+
+    def project(self, scores: Floats) -> Floats:
+        """Return scores of turns less what the model's own parameters could explain."""
+        rest = np.where(self.fitted.used, scores * self.fitted.weight, 0.0)
+        zones, psi = self._bases
+        for basis, turns in zip(zones, self.fitted.turns, strict=True):
+            rest[turns.rows] -= basis @ (basis.T @ rest[turns.rows])
+        return np.asarray(rest - psi @ (psi.T @ rest))
+
+    def ask(self, candidate: Candidate) -> Score:
+        """Return the score of one candidate."""
+        effect = candidate.effect
+        if effect.on_speed:
+            return self._ask_speed(candidate)
+        scene = self.scene
+        if effect.individual:
+            # Scores by a trait of one; whoever has which shows in how they scatter.
+            scene = replace(scene, states=scene.states.copy())
+            scene.states[:, TRAIT] = 1.0
+        steps = self.project(self._heading_scores(scene, candidate))
+        if effect.individual:
+            return self._scatter(candidate, steps)
+        return summed(candidate, steps)
+
+    def _heading_scores(self, scene: Scene, candidate: Candidate) -> Floats:
+        effect, fitted = candidate.effect, self.fitted
+        if effect.lag is not None:
+            return self._late_scores(candidate)
+        # Mixtures are compared at a strength worth noticing, tilts next to none.
+        tilts = effect.factor is not None
+        strength = effect.probe if tilts else candidate.notable
+        asked = {effect.name: candidate.values(strength)}
+        packed = pack([replace(without_effects(fitted.parameters), effects=asked)], scene.arena)
+        mixture, probability, taken, floor = self._tables
+        total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
+        angle = fitted.view.angle_sr
+        if len(packed.components):
+            parts = components_of(scene, packed, angle)
+            component_score(parts, scene.turns.taken, mixture, probability, taken, floor, some)
+            total += some
+        if len(packed.factors):
+            tilt, tilt_taken = factors_of(scene, packed, angle)
+            factor_score(tilt, tilt_taken, probability, some)
+            total += some
+        if len(packed.sights):
+            total += self._sight_scores(scene, packed)
+        return total / strength
+
+    def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
+        fitted, turns = self.fitted, scene.turns
+        mixture, probability, taken, floor = self._tables
+        changed = np.empty_like(fitted.view.angle_sr)
+        attend(scene.states, turns.at, turns.who, packed, fitted.view.angle_sr, changed)
+        total = np.zeros(len(turns))
+        for x, zone in zip(fitted.x, fitted.turns, strict=True):
+            rows, own = zone.rows, x[:3] * SCALES
+            some = np.empty(len(rows))
+            social_score(
+                fitted.view.toward[rows], changed[rows], fitted.view.angle_sr[rows], zone.taken,
+                own[1], constants(own[:2])[1], own[2], mixture[rows], probability[rows],
+                taken[rows], floor[rows], some,
+            )  # fmt: skip
+            total[rows] = some
+        return total
+
+    def _late_scores(self, candidate: Candidate) -> Floats:
+        """Return the scores of a mixture with the model that responds late."""
+        fitted, turns = self.fitted, self.scene.turns
+        values = candidate.values(candidate.notable) | candidate.shape
+        late = with_effect(fitted.parameters, candidate.name, values)
+        other, _, other_taken = replace(fitted, view=view_of(self.scene, late)).tables()
+        mixture, probability, taken, floor = self._tables
+        scores = np.empty(len(turns))
+        mixture_score(other, other_taken, mixture, probability, taken, floor, scores)
+        return scores
+
+    def _scatter(self, candidate: Candidate, steps: Floats) -> Score:
+        """Return the scatter of individuals as a normal deviate (Q of Cochran 1954)."""
+        sums, information = by_track(self.scene.turns.track, steps)
+        own = information > 0
+        sums, information = sums[own], information[own]
+        if len(sums) < 2:
+            return Score(candidate=candidate, z=0.0, strength=0.0, information=0.0, steps=steps)
+        mean = sums.sum() / information.sum()
+        q = float(((sums - mean * information) ** 2 / information).sum())
+        each = sums / information
+        spread2 = max(0.0, float(each.var(ddof=1) - (1 / information).mean()))
+        return Score(
+            candidate=candidate,
+            z=normal_deviate(q, len(sums) - 1),
+            strength=float(np.sqrt(spread2)),
+            information=float(information.sum()),
+            steps=steps,
+        )
+
+    @cached_property
+    def _moves(self) -> Packed:
+        return pack([self.fitted.parameters], self.scene.arena)
+
+    @cached_property
+    def _move_angles(self) -> Floats:
+        moves = self.scene.moves
+        cos_fov = cos_of(self.fitted.parameters.fov_rad)
+        return perceive(self.scene.states, moves.at, moves.who, 0, cos_fov)[1]
+
+    @cached_property
+    def own_speeds(self) -> Floats:
+        """Speeds with the model's effects divided out, in m/s, shape (move,)."""
+        return self.scene.moves.speed_m_s / self.speed_factor(self._moves)
+
+    def speed_factor(self, packed: Packed) -> Floats:
+        """Return the factor of a model's effects on the speed of each move."""
+        moves = self.scene.moves
+        factor = np.ones(len(moves))
+        if len(packed.speeds):
+            ask_speeds(self.scene.states, moves.at, moves.who, packed, self._move_angles, factor)
+        return factor
+
+    @cached_property
+    def still(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether each move was none, and whether the one before was none."""
+        least = HEADING_MIN_STEP_M / self.scene.dt_s
+        moves = self.scene.moves
+        before = self.scene.states[moves.at, SPEED, moves.who]
+        return moves.speed_m_s < least, before < least
+
+    def _ask_speed(self, candidate: Candidate) -> Score:
+        effect, moves = candidate.effect, self.scene.moves
+        stopping = any(name == "freezing" for name in self.fitted.parameters.effects)
+        if effect.stops:
+            now, before = self.still
+            cue, response = before.astype(np.float64), now.astype(np.float64)
+            kept = np.ones(len(moves), dtype=bool)
+        else:
+            probe = replace(
+                without_effects(self.fitted.parameters),
+                effects={effect.name: candidate.values(effect.probe)},
+            )
+            factor = self.speed_factor(pack([probe], self.scene.arena))
+            cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
+            response = self.own_speeds
+            response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
+            kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
+        cue, response = centred(cue, moves.zone, kept), centred(response, moves.zone, kept)
+        cue = tame(cue)
+        score, squares = summed(candidate, cue * response), float((cue**2).sum())
+        # A factor exp(s cue) changes the speed by s cue times its mean.
+        unit = 1.0 if effect.stops or not kept.any() else float(self.own_speeds[kept].mean())
+        return replace(
+            score, strength=score.strength * score.information / max(squares * unit, 1e-300)
+        )
+
+
+def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
+    """Return the sums of scores and of their squares for each track, in ascending order."""
+    _, place = np.unique(track, return_inverse=True)
+    sums = np.bincount(place, weights=steps).astype(np.float64)
+    squares = np.bincount(place, weights=steps**2).astype(np.float64)
+    return sums, squares
+
+
+def normal_deviate(chi2: float, df: int) -> float:
+    """Return the normal deviate of the same upper tail as a chi-square."""
+    tail = float(stats.chi2.logsf(chi2, df))
+    return float(stats.norm.isf(np.exp(tail))) if tail > -600 else float(np.sqrt(-2 * tail))
+
+
+def summed(candidate: Candidate, steps: Floats) -> Score:
+    """Return the score of a candidate from its efficient scores."""
+    total, information = float(steps.sum()), float((steps**2).sum())
+    if not information > 0:
+        return Score(candidate=candidate, z=0.0, strength=0.0, information=0.0, steps=steps)
+    return Score(
+        candidate=candidate,
+        z=total / np.sqrt(information),
+        strength=total / information,
+        information=information,
+        steps=steps,
+    )
+
+
+def tame(scores: Floats) -> Floats:
+    """Return values with what lies beyond eight standard deviations set there."""
+    limit = _STEEPEST * float(scores.std()) if scores.size else 0.0
+    return np.clip(scores, -limit, limit)
+
+
+def centred(values: Floats, zone: NDArray[np.int64], kept: NDArray[np.bool_]) -> Floats:
+    """Return values less their mean in each zone; zero for what is not kept."""
+    rest = np.zeros_like(values)
+    for number in np.unique(zone):
+        rows = (zone == number) & kept
+        if rows.any():
+            rest[rows] = values[rows] - values[rows].mean()
+    return rest
+
+
+def _basis(columns: Floats) -> Floats:
+    """Return an orthonormal basis of columns; those that say nothing are left out."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    columns = columns[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
+    if not columns.size:
+        return np.zeros((len(columns), 0))
+    left, values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.ascontiguousarray(left[:, values > 1e-6])
+
+
+def ask_all(screen: Screen, candidates: Sequence[Candidate], n_workers: int) -> list[Score]:
+    """Return the scores of candidates, in their order; the numbers do not depend on workers."""
+    _ = screen.project(np.zeros(len(screen.scene.turns)))
+    with ThreadPoolExecutor(max(1, n_workers)) as pool:
+        return list(pool.map(screen.ask, candidates))
