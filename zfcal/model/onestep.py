@@ -13,6 +13,7 @@ from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_gri
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.world import (
+    DT_S,
     GRID,
     HX,
     HY,
@@ -120,6 +121,7 @@ def _prepare(
     state = np.zeros((STATES, len(xy)))
     state[X], state[Y] = xy.T
     state[HX], state[HY] = np.cos(heading), np.sin(heading)
+    state[DT_S] = parameters.dt_s
     if not _settle_all(state, tank):
         raise InputError("Agents must be inside the arena, got one outside.")
     return state, pack([parameters], arena), tank

@@ -14,6 +14,7 @@ from zfcal.model.kernels.heading import apply_move, draw_move
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.world import (
+    DT_S,
     GRID,
     HX,
     HY,
@@ -171,6 +172,7 @@ def start(
 ) -> None:  # fmt: skip
     """Put all agents into the tank, so long before the first sample."""
     state[TIME] = packed.clock_s[0] - burn_in * packed.dt_s * packed.clock_s[1]
+    state[DT_S] = packed.dt_s
     place(state, tank, individuals, random)
     work.steps[0] = 0.0
 

@@ -12,6 +12,7 @@ from zfcal.model.geometry import Tank, zone_of
 from zfcal.model.kernels.hooks import call_component, call_factor, call_sight, call_speed
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.kernels.world import (
+    DT_S,
     HX,
     HY,
     KIND,
@@ -71,7 +72,7 @@ def fill_states(
         else:
             state[LEFT_AT_S], state[LEFT_S] = -NEVER_S, NEVER_S
             state[KIND] = kinds
-        state[TIME] = clock[0] + k * clock[1]
+        state[TIME], state[DT_S] = clock[0] + k * clock[1], clock[1]
         for i in range(n):
             x, y = xy_m[k, i, 0], xy_m[k, i, 1]
             zone = 0 if math.isnan(x) else zone_of(x, y, tank)

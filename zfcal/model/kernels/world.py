@@ -20,7 +20,8 @@ Ints = NDArray[np.int64]
 # Rows of the state, each with a number per agent; what effects may ask stands below.
 X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, CLEAR = range(11)
 PAST_HX, PAST_HY, KIND, TRAIT, FOLLOWS = range(11, 16)
-ROOM, MOUTH_X, MOUTH_Y, MOUTH_M, LEFT_S, LEFT_AT_S, LEFT_FROM, STATES = range(16, 24)
+ROOM, MOUTH_X, MOUTH_Y, MOUTH_M, LEFT_S, LEFT_AT_S, LEFT_FROM = range(16, 23)
+EXIT, DT_S, STATES = range(23, 26)
 """State of an agent; rows from PAST_HX on are kept only where a model has effects.
 
 X, Y: metres. HX, HY: unit vector of the heading. SPEED: m/s of the step that led here.
@@ -31,7 +32,8 @@ individual, with mean 0 and standard deviation 1 over a group. FOLLOWS: 1 where 
 follows walls. ROOM: its number, 0 between rooms and in an arena without. MOUTH: unit
 vector toward the room's way out, and metres to it. LEFT_S: seconds since another agent
 that is still away left this room. LEFT_AT_S, LEFT_FROM: when this agent last left a
-room, and which.
+room, and which. EXIT: id of the zone between the rooms, 0 in an arena without. DT_S: the
+step, in seconds.
 """
 
 NEVER_S = 1e9
@@ -176,6 +178,7 @@ def remember(state: Floats, tank: Tank) -> None:
         if zone == 0:  # who is not seen has not left
             continue
         state[FOLLOWS, i] = 1.0 if tank.follows[zone] else 0.0
+        state[EXIT, i] = rooms.exit_zone
         before, room = state[ROOM, i], 0.0
         if rooms.exit_zone > 0 and zone != rooms.exit_zone:
             room = room_of(state[X, i], state[Y, i], tank)

@@ -1,0 +1,62 @@
+"""Boldness: individuals differ in how readily they leave."""
+
+from __future__ import annotations
+
+from zfcal.arena import Arena
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
+from zfcal.model.effects.forms import tilt, way_out
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
+from zfcal.model.rooms import find_rooms
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the way out of a room; in a tank without rooms, out of the zone."""
+    own = parameters[0] * state[TRAIT * n + i]
+    if state[EXIT * n + i] > 0.0:
+        if not state[ROOM * n + i] > 0.0:
+            return 1.0
+        return tilt(own, way_out(state, n, i, (ux, uy, landing), parameters[1]), 1.0)
+    if speed * state[DT_S * n + i] < state[CLEAR * n + i]:
+        return 1.0
+    return tilt(own, 1.0 if landing != state[ZONE * n + i] else -1.0, 1.0)
+
+
+def _shapes(arena: Arena) -> Shapes:
+    shares = (1.0, 0.0) if find_rooms(arena)[0] else (1.0,)
+    return tuple({"heading_share": share} for share in shares)
+
+
+def _lacks(company: Company) -> str | None:
+    return None if company.n_fish > 1 else "a second fish"
+
+
+EFFECT = Effect(
+    name="boldness",
+    says="Some fish leave a place far more readily than others, all the time.",
+    reference="Wilson et al. 1994, Trends in Ecology and Evolution 9: 442-446",
+    parameters=(
+        EffectParameter(
+            name="spread",
+            low=0.0,
+            high=3.0,
+            default=0.7,
+            says="Standard deviation between fish of the log preference for the way out.",
+        ),
+        EffectParameter(
+            name="heading_share",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="1: headings toward a room's way out, all over the room; 0: steps across it.",
+        ),
+    ),
+    strength="spread",
+    probe=0.01,
+    factor=factor,
+    shapes=_shapes,
+    lacks=_lacks,
+    identity_s=300.0,
+)

@@ -1,0 +1,63 @@
+"""Collective departure: a fish leaves a room when another has just left."""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import LEFT_S, ROOM
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the way out while another's leaving is fresh."""
+    since_s = state[LEFT_S * n + i]
+    if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
+        return 1.0
+    fresh = 1.0 - beyond(since_s, parameters[1])
+    return tilt(parameters[0] * fresh, way_out(state, n, i, (ux, uy, landing), parameters[2]), 1.0)
+
+
+def _lacks(company: Company) -> str | None:
+    return needs_neighbour(company) if company.has_rooms else "rooms"
+
+
+EFFECT = Effect(
+    name="collective-departure",
+    says="A fish leaves a room when another one has just left it.",
+    opposite="A fish stays in a room when another one has just left it.",
+    reference="Pillot et al. 2011, PLoS ONE 6: e14487",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-3.0,
+            high=5.0,
+            default=1.5,
+            says="Log of the preference for the way out, just after another left.",
+        ),
+        EffectParameter(
+            name="memory_s",
+            low=0.5,
+            high=30.0,
+            default=5.0,
+            says="How long another's leaving has an effect, in seconds.",
+        ),
+        EffectParameter(
+            name="heading_share",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="1: headings toward the way out, all over the room; 0: steps across it.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+    shapes=lambda _arena: tuple(
+        {"memory_s": memory_s, "heading_share": share}
+        for share in (1.0, 0.0)
+        for memory_s in (2.0, 5.0, 12.0)
+    ),
+    lacks=_lacks,
+    identity_s=10.0,
+)

@@ -1,0 +1,56 @@
+"""Crowding: speed changes with local density."""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
+from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
+from zfcal.model.kernels.world import ZONE
+
+
+@hook(SPEED_HOOK)
+def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Return an exponential of the number of others within a radius."""
+    near = 0.0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
+            near += 1.0 - beyond(apart(state, n, i, j), parameters[1])
+    return times_faster(parameters[0] * (near - parameters[2]))
+
+
+EFFECT = Effect(
+    name="crowding",
+    says="Fish swim faster the more others are close by.",
+    opposite="Fish swim more slowly the more others are close by.",
+    reference="Herbert-Read et al. 2011, Proceedings of the National Academy of Sciences 108: "
+    "18726-18731",
+    parameters=(
+        EffectParameter(
+            name="per_neighbour",
+            low=-1.0,
+            high=1.0,
+            default=0.25,
+            says="Log of the change of speed with each neighbour nearby.",
+        ),
+        EffectParameter(
+            name="radius_m",
+            low=0.02,
+            high=0.6,
+            default=0.1,
+            says="Distance within which a neighbour counts as nearby, in metres.",
+        ),
+        EffectParameter(
+            name="usual",
+            low=0.0,
+            high=20.0,
+            default=1.0,
+            says="Number of neighbours nearby at which a fish swims as the base model has it.",
+        ),
+    ),
+    strength="per_neighbour",
+    probe=0.01,
+    speed=speed,
+    shapes=lambda _arena: tuple({"radius_m": radius} for radius in (0.05, 0.08, 0.12, 0.2, 0.35)),
+    lacks=needs_neighbour,
+)

@@ -1,0 +1,44 @@
+"""Directional drift: a preferred compass direction."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import tilt
+from zfcal.model.kernels.hooks import FACTOR
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by their component along the direction."""
+    along = ux * math.cos(parameters[1]) + uy * math.sin(parameters[1])
+    return tilt(parameters[0], along, 1.0)
+
+
+EFFECT = Effect(
+    name="directional-drift",
+    says="All over the tank fish prefer one compass direction, as with a current, a light or a "
+    "slope.",
+    reference="Montgomery et al. 1997, Nature 389: 960-963",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=0.0,
+            high=4.0,
+            default=0.4,
+            says="Log of the preference for headings along the direction.",
+        ),
+        EffectParameter(
+            name="direction_rad",
+            low=-7.0,
+            high=7.0,
+            default=0.0,
+            says="The direction, counter-clockwise from x, in radians.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+    shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+)

@@ -1,0 +1,42 @@
+"""Fatigue: speed drifts over the trial."""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import times_faster
+from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
+from zfcal.model.kernels.world import TIME
+
+
+@hook(SPEED_HOOK)
+def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Return an exponential of the time since the moment of the usual speed."""
+    return times_faster(-parameters[0] * (state[TIME * n + i] - parameters[1]) / 3600.0)
+
+
+EFFECT = Effect(
+    name="fatigue",
+    says="Fish get slower in the course of the trial.",
+    opposite="Fish get faster in the course of the trial.",
+    reference="Wong et al. 2010, Behavioural Brain Research 208: 450-457",
+    parameters=(
+        EffectParameter(
+            name="per_hour",
+            low=-30.0,
+            high=30.0,
+            default=1.5,
+            says="Loss of speed, as a log per hour.",
+        ),
+        EffectParameter(
+            name="usual_at_s",
+            low=0.0,
+            high=1e5,
+            default=900.0,
+            says="When the speed is as the base model has it, in seconds of the trial.",
+        ),
+    ),
+    strength="per_hour",
+    probe=0.02,
+    speed=speed,
+)

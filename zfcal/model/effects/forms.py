@@ -1,0 +1,122 @@
+"""Formulas that the hooks of several effects share; compiled into each of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from zfcal.model.compiled import inlined
+from zfcal.model.effects.base import Company
+from zfcal.model.kernels.world import EXIT, MOUTH_M, MOUTH_X, MOUTH_Y, X, Y
+
+SPEED_M_S = 0.07
+"""A middling speed of a zebrafish: about where measured histograms have their mean."""
+
+SLOWEST_M_S = 0.005
+"""A lower speed counts as this one where a ratio of speeds is asked."""
+
+MOST_TIMES = 3.0
+"""An effect on speed at most so many times speeds up or slows down."""
+
+_EDGE = 8.0
+_SENSE = 3.0
+_MOUTH_REACH_M = 0.1
+
+Hooked = Any
+"""A pointer to numbers, as hooks are given it."""
+
+
+@inlined
+def tilt(strength: float, cue: float, most: float) -> float:
+    """Return ``exp(strength * cue)`` over its largest value, for a cue in [-most, most]."""
+    return math.exp(strength * cue - abs(strength) * most)
+
+
+@inlined
+def beyond(value: float, limit: float) -> float:
+    """Return a step from 0 to 1 at a limit, half of it at the limit itself.
+
+    It rises from a tenth to nine tenths between 0.76 and 1.32 of the limit, so that a fit
+    finds the limit by its slope.
+    """
+    ratio = (value / limit) ** _EDGE
+    return ratio / (1.0 + ratio)
+
+
+@inlined
+def sense_along(cosine: float) -> float:
+    """Return the sense of travel along a line from a heading's cosine with it, in [-1, 1].
+
+    Nearly its sign: headings within 45 degrees of the line are all but the same.
+    """
+    return math.tanh(_SENSE * cosine) / math.tanh(_SENSE)
+
+
+@inlined
+def way_out(
+    state: Hooked, n: int, i: int, move: tuple[float, float, int], heading_share: float
+) -> float:
+    """Return how much a move is one out of the agent's room, in [-1, 1].
+
+    Parameters
+    ----------
+    move
+        Unit vector x and y of the heading, and the landing zone.
+    heading_share
+        Share of the cosine with the direction of the mouth; the rest is 1 for a step
+        that ends in the zone between the rooms, -1 for one that could and does not.
+    """
+    ux, uy, landing = move
+    cosine = ux * state[MOUTH_X * n + i] + uy * state[MOUTH_Y * n + i]
+    crossing = 0.0
+    if state[MOUTH_M * n + i] < _MOUTH_REACH_M:
+        crossing = 1.0 if landing == state[EXIT * n + i] else -1.0
+    return heading_share * cosine + (1.0 - heading_share) * crossing
+
+
+@inlined
+def apart(state: Hooked, n: int, i: int, j: int) -> float:
+    """Return the distance between two agents, in metres."""
+    dx, dy = state[X * n + j] - state[X * n + i], state[Y * n + j] - state[Y * n + i]
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@inlined
+def cut(value: float, low: float, high: float) -> float:
+    """Return a value within limits."""
+    return min(high, max(low, value))
+
+
+@inlined
+def times_faster(exponent: float) -> float:
+    """Return ``exp(exponent)`` within a third and three."""
+    return cut(math.exp(cut(exponent, -10.0, 10.0)), 1.0 / MOST_TIMES, MOST_TIMES)
+
+
+@inlined
+def log_speed(speed_m_s: float, usual_m_s: float) -> float:
+    """Return the logarithm of a speed over the usual one; the slowest count as 5 mm/s."""
+    return math.log(max(speed_m_s, SLOWEST_M_S) / usual_m_s)
+
+
+@inlined
+def quickness(speed_m_s: float) -> float:
+    """Return how far a speed is from 0.07 m/s, in units of 0.05 m/s, in [-1.4, 2]."""
+    return cut((speed_m_s - SPEED_M_S) / 0.05, -1.4, 2.0)
+
+
+@inlined
+def nearest_seen(state: Hooked, sight: Hooked, n: int, i: int) -> int:
+    """Return the nearest agent that agent i sees, -1 if it sees none."""
+    found, least = -1, math.inf
+    for j in range(n):
+        if sight[i * n + j] > 0.0:
+            away = apart(state, n, i, j)
+            if away < least:
+                found, least = j, away
+    return found
+
+
+def needs_neighbour(company: Company) -> str | None:
+    """Return what a recording lacks for an effect between neighbours."""
+    return None if company.n_fish + company.n_robots > 1 else "a neighbour"

@@ -1,0 +1,68 @@
+"""Group cohesion: long-range attraction to the middle of the group."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import needs_neighbour
+from zfcal.model.kernels.hooks import COMPONENT
+from zfcal.model.kernels.world import ZONE, X, Y
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the bearing of the centroid of all others, seen or not."""
+    x, y, count = 0.0, 0.0, 0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
+            x += state[X * n + j] - state[X * n + i]
+            y += state[Y * n + j] - state[Y * n + i]
+            count += 1
+    length = math.sqrt(x * x + y * y)
+    if not length > 0.0:
+        return 0.0
+    out[0], out[1], out[2] = x / length, y / length, parameters[1]
+    away_m, full_m = length / count, parameters[2]
+    return parameters[0] * (min(1.0, away_m / full_m) if full_m > 0.0 else 1.0)
+
+
+EFFECT = Effect(
+    name="group-cohesion",
+    says="Fish are drawn to the middle of the group, however far away it is.",
+    reference="Couzin et al. 2002, Journal of Theoretical Biology 218: 1-11",
+    parameters=(
+        EffectParameter(
+            name="weight",
+            low=0.0,
+            high=10.0,
+            default=1.0,
+            says="Weight of the bearing of the others' centroid, beside the base's one.",
+        ),
+        EffectParameter(
+            name="kappa",
+            low=0.0,
+            high=30.0,
+            default=5.0,
+            says="Von Mises concentration about that bearing.",
+        ),
+        EffectParameter(
+            name="full_m",
+            low=0.0,
+            high=0.6,
+            default=0.0,
+            says="Distance of the centroid from which the weight is whole, in metres.",
+        ),
+    ),
+    strength="weight",
+    probe=0.005,
+    component=component,
+    shapes=lambda _arena: (
+        {"kappa": 2.0, "full_m": 0.0},
+        {"kappa": 8.0, "full_m": 0.0},
+        {"kappa": 2.0, "full_m": 0.3},
+        {"kappa": 8.0, "full_m": 0.3},
+    ),
+    lacks=needs_neighbour,
+)

@@ -1,0 +1,48 @@
+"""Habituation: social attraction drifts over the trial."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import cut, needs_neighbour
+from zfcal.model.kernels.hooks import SIGHT
+from zfcal.model.kernels.world import TIME
+
+_MOST = 3.0
+
+
+@hook(SIGHT)
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh every neighbour by an exponential of time."""
+    later = (state[TIME * n + i] - parameters[1]) / 3600.0
+    return math.exp(cut(-parameters[0] * later, -_MOST, _MOST))
+
+
+EFFECT = Effect(
+    name="habituation",
+    says="Fish attend less and less to each other in the course of the trial.",
+    opposite="Fish attend more and more to each other in the course of the trial.",
+    reference="Rankin et al. 2009, Neurobiology of Learning and Memory 92: 135-138",
+    parameters=(
+        EffectParameter(
+            name="per_hour",
+            low=-60.0,
+            high=60.0,
+            default=3.0,
+            says="Loss of attention, as a log per hour.",
+        ),
+        EffectParameter(
+            name="usual_at_s",
+            low=0.0,
+            high=1e5,
+            default=900.0,
+            says="When attention is as the base model has it, in seconds of the trial.",
+        ),
+    ),
+    strength="per_hour",
+    probe=0.05,
+    sight=sight,
+    lacks=needs_neighbour,
+)

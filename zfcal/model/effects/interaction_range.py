@@ -1,0 +1,44 @@
+"""Interaction range: neighbours beyond a distance are ignored."""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import apart, beyond, needs_neighbour
+from zfcal.model.kernels.hooks import SIGHT
+
+
+@hook(SIGHT)
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Take away from what is farther than the range."""
+    return 1.0 - parameters[0] * beyond(apart(state, n, i, j), parameters[1])
+
+
+EFFECT = Effect(
+    name="interaction-range",
+    says="Fish ignore neighbours that are farther away than a certain distance.",
+    reference="Katz et al. 2011, Proceedings of the National Academy of Sciences 108: 18720-18725",
+    parameters=(
+        EffectParameter(
+            name="ignored",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="Share of attention that neighbours beyond the range lose.",
+        ),
+        EffectParameter(
+            name="range_m",
+            low=0.03,
+            high=0.6,
+            default=0.12,
+            says="Distance at which half of that share is lost, in metres.",
+        ),
+    ),
+    strength="ignored",
+    probe=0.01,
+    sight=sight,
+    shapes=lambda _arena: tuple(
+        {"range_m": range_m} for range_m in (0.06, 0.09, 0.13, 0.19, 0.28, 0.4)
+    ),
+    lacks=needs_neighbour,
+)

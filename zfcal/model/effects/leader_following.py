@@ -1,0 +1,38 @@
+"""Leader following: fast neighbours get more attention than slow ones."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import needs_neighbour, quickness
+from zfcal.model.kernels.hooks import SIGHT
+from zfcal.model.kernels.world import SPEED
+
+
+@hook(SIGHT)
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh a neighbour by how much faster than 0.07 m/s it swims."""
+    return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
+
+
+EFFECT = Effect(
+    name="leader-following",
+    says="Fish attend more to neighbours that swim fast.",
+    opposite="Fish attend more to neighbours that swim slowly.",
+    reference="Pettit et al. 2015, Current Biology 25: 3132-3137",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-2.0,
+            high=2.0,
+            default=0.7,
+            says="Log of the attention gained per 0.05 m/s that a neighbour is faster than "
+            "0.07 m/s.",
+        ),
+    ),
+    probe=0.01,
+    sight=sight,
+    lacks=needs_neighbour,
+)

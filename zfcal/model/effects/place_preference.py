@@ -1,0 +1,58 @@
+"""Place preference: attraction to a place in the tank, or avoidance of it."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import tilt
+from zfcal.model.effects.places import places
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import X, Y
+
+_AT_IT_M = 0.02
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the bearing of the place; far from it less, and at it not at all."""
+    dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    away = math.sqrt(dx * dx + dy * dy)
+    if not away > 0.0:
+        return 1.0
+    pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    return tilt(parameters[0], pull * (ux * dx + uy * dy) / away, pull)
+
+
+EFFECT = Effect(
+    name="place-preference",
+    says="Fish are drawn to a place in the tank.",
+    opposite="Fish keep away from a place in the tank.",
+    reference="Mathur et al. 2011, Nature Protocols 6: 338-345",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-4.0,
+            high=4.0,
+            default=1.0,
+            says="Log of the preference for headings toward the place.",
+        ),
+        EffectParameter(
+            name="x_m", low=-100.0, high=100.0, default=0.0, says="The place's x, in metres."
+        ),
+        EffectParameter(
+            name="y_m", low=-100.0, high=100.0, default=0.0, says="The place's y, in metres."
+        ),
+        EffectParameter(
+            name="reach_m",
+            low=0.03,
+            high=2.0,
+            default=0.3,
+            says="Distance at which half of the pull is left, in metres.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+    shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
+)

@@ -1,0 +1,52 @@
+"""Rear blind zone: the field of view is narrower than assumed."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import needs_neighbour
+from zfcal.model.kernels.hooks import SIGHT
+from zfcal.model.kernels.world import HX, HY, X, Y
+
+_SOFT_RAD = 0.06
+
+
+@hook(SIGHT)
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Take away from what is farther from the heading than the field of view."""
+    dx, dy = state[X * n + j] - state[X * n + i], state[Y * n + j] - state[Y * n + i]
+    hx, hy = state[HX * n + i], state[HY * n + i]
+    off = abs(math.atan2(hx * dy - hy * dx, hx * dx + hy * dy))
+    return 1.0 - parameters[0] / (1.0 + math.exp((parameters[1] - off) / _SOFT_RAD))
+
+
+EFFECT = Effect(
+    name="rear-blind-zone",
+    says="Fish do not respond to neighbours at their side or rear that the model lets them see.",
+    reference="Couzin et al. 2002, Journal of Theoretical Biology 218: 1-11",
+    parameters=(
+        EffectParameter(
+            name="ignored",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="Share of attention that neighbours outside the narrower field lose.",
+        ),
+        EffectParameter(
+            name="fov_rad",
+            low=0.5,
+            high=2.9,
+            default=1.57,
+            says="Field of view to each side of the heading, in radians.",
+        ),
+    ),
+    strength="ignored",
+    probe=0.01,
+    sight=sight,
+    shapes=lambda _arena: tuple(
+        {"fov_rad": math.radians(degrees)} for degrees in (60.0, 75.0, 90.0, 105.0, 120.0)
+    ),
+    lacks=needs_neighbour,
+)

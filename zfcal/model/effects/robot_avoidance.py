@@ -1,0 +1,73 @@
+"""Robot avoidance: the robot is treated otherwise than a fish."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.forms import apart, cut, tilt
+from zfcal.model.kernels.hooks import FACTOR, SIGHT
+from zfcal.model.kernels.world import KIND, X, Y
+
+_MOST_ATTENTION = 5.0
+_NEAR_M = 0.1
+
+
+@hook(SIGHT)
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Change the attention that a robot gets."""
+    if not state[KIND * n + j] > 0.0:
+        return 1.0
+    return cut(1.0 - parameters[0] * (1.0 - parameters[1]), 0.0, _MOST_ATTENTION)
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings away from the robots that are seen; the nearer, the more."""
+    away, most = 0.0, 0.0
+    if parameters[1] > 0.0:
+        for j in range(n):
+            if state[KIND * n + j] > 0.0 and sight[i * n + j] > 0.0:
+                dx, dy = state[X * n + i] - state[X * n + j], state[Y * n + i] - state[Y * n + j]
+                far_m = max(apart(state, n, i, j), 1e-9)
+                near = math.exp(-far_m / _NEAR_M)
+                away += near * (ux * dx + uy * dy) / far_m
+                most += near
+    return tilt(parameters[0] * parameters[1], away, most)
+
+
+def _lacks(company: Company) -> str | None:
+    if company.n_robots < 1:
+        return "a robot"
+    return None if company.n_fish > 0 else "a fish"
+
+
+EFFECT = Effect(
+    name="robot-avoidance",
+    says="Fish attend less to the robot than to a fish, or swim away from it.",
+    opposite="Fish attend more to the robot than to a fish, or seek it.",
+    reference="Butail et al. 2013, PLoS ONE 8: e76123",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-4.0,
+            high=4.0,
+            default=1.0,
+            says="Share of attention that the robot loses, or log of the preference for headings "
+            "away from it when it is close.",
+        ),
+        EffectParameter(
+            name="flight",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: the robot gets less attention; 1: it gets that of a fish, and is fled from.",
+        ),
+    ),
+    probe=0.01,
+    sight=sight,
+    factor=factor,
+    shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
+    lacks=_lacks,
+)

@@ -1,0 +1,48 @@
+"""Speed-turn coupling: fast steps are straighter than slow ones.
+
+The model draws the speed first, so what is a slowing down in turns for the fish is a
+turning less at speed for the model: the same joint law.
+"""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import HX, HY
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the cosine of their turn times how quick the step is."""
+    straight = state[HX * n + i] * ux + state[HY * n + i] * uy
+    quick = quickness(speed + SPEED_M_S - parameters[1])
+    return tilt(parameters[0], quick * straight, abs(quick))
+
+
+EFFECT = Effect(
+    name="speed-turn-coupling",
+    says="Fish slow down in turns: fast steps are straighter than slow ones.",
+    opposite="Fish speed up in turns: slow steps are straighter than fast ones.",
+    reference="Mwaffo et al. 2015, Journal of the Royal Society Interface 12: 20140884",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-3.0,
+            high=3.0,
+            default=0.7,
+            says="Log of the preference for straight on against a right angle, gained per "
+            "0.05 m/s.",
+        ),
+        EffectParameter(
+            name="usual_m_s",
+            low=0.01,
+            high=0.3,
+            default=SPEED_M_S,
+            says="Speed at which turns are as the base model has them, in m/s.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+)

@@ -1,0 +1,35 @@
+"""Turning bias: handedness."""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.forms import tilt
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import HX, HY
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the sine of the turn that they are; left is positive."""
+    return tilt(parameters[0], state[HX * n + i] * uy - state[HY * n + i] * ux, 1.0)
+
+
+EFFECT = Effect(
+    name="turning-bias",
+    says="Fish turn left more than right.",
+    opposite="Fish turn right more than left.",
+    reference="Bisazza et al. 2000, Laterality 5: 269-284",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-4.0,
+            high=4.0,
+            default=0.5,
+            says="Half the log of how much more likely a right angle to the left is than one to "
+            "the right.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+)

@@ -1,0 +1,47 @@
+"""Wall persistence: a fish keeps its sense of travel along a wall.
+
+The base model forgets it: along a wall both ways are alike.
+"""
+
+from __future__ import annotations
+
+from zfcal.model.compiled import hook
+from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.forms import sense_along, tilt
+from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.world import FOLLOWS, HX, HY, TAU_X, TAU_Y
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by whether they keep the sense of travel; nearly all or nothing."""
+    if not state[FOLLOWS * n + i] > 0.0:
+        return 1.0
+    tau_x, tau_y = state[TAU_X * n + i], state[TAU_Y * n + i]
+    now = sense_along(state[HX * n + i] * tau_x + state[HY * n + i] * tau_y)
+    then = sense_along(ux * tau_x + uy * tau_y)
+    return tilt(parameters[0], now * then, abs(now))
+
+
+def _lacks(company: Company) -> str | None:
+    return None if company.follows_walls else "a zone that follows walls"
+
+
+EFFECT = Effect(
+    name="wall-persistence",
+    says="Along a wall fish keep the direction in which they already swim.",
+    opposite="Along a wall fish turn back more often than by chance.",
+    reference="Jeanson et al. 2003, Journal of Theoretical Biology 225: 443-451",
+    parameters=(
+        EffectParameter(
+            name="strength",
+            low=-3.0,
+            high=3.0,
+            default=0.7,
+            says="Half the log odds of swimming on against turning back.",
+        ),
+    ),
+    probe=0.01,
+    factor=factor,
+    lacks=_lacks,
+)
