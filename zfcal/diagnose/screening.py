@@ -49,8 +49,8 @@ from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]
 
-_FLOOR = 0.05
-"""Share of a uniform law that a heading's density is taken to have at least."""
+_FLOOR = 0.01
+"""Share of a uniform law in a heading's density, beside the lapse that was fitted."""
 
 _FAST_QUANTILE = 0.995
 _STEEPEST = 8.0
@@ -83,6 +83,35 @@ class Score:
     steps: Floats
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Tables:
+    """The fitted density of each cell of headings.
+
+    Parameters
+    ----------
+    mixture : ndarray, shape (turn, cell)
+        Before attraction and tilts, not scaled.
+    probability, with_lapse : ndarray, shape (turn, cell)
+        Of each cell, without and with the lapse.
+    taken : ndarray, shape (turn,)
+        The mixture at the heading taken.
+    floor : ndarray, shape (turn,)
+        What is added to it, so that no heading counts for too much.
+    """
+
+    mixture: Floats
+    probability: Floats
+    with_lapse: Floats
+    taken: Floats
+    floor: Floats
+
+    def mixtures(
+        self, rows: NDArray[np.intp] | slice = slice(None)
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return what the scores of mixtures need of some turns."""
+        return self.mixture[rows], self.with_lapse[rows], self.taken[rows], self.floor[rows]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Screen:
     """A fitted model, ready to be asked for effects.
@@ -99,9 +128,21 @@ class Screen:
     fitted: Fitted
 
     @cached_property
-    def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
+    def _tables(self) -> _Tables:
         mixture, probability, taken = self.fitted.tables()
-        return mixture, probability, taken, _FLOOR * mixture.mean(axis=1)
+        lapse = np.zeros(len(taken))
+        for x, turns in zip(self.fitted.x, self.fitted.turns, strict=True):
+            lapse[turns.rows] = x[-1]
+        inside = probability > 0
+        evenly = inside / np.maximum(inside.sum(axis=1), 1)[:, None]
+        with_lapse = (1 - lapse)[:, None] * probability + lapse[:, None] * evenly
+        return _Tables(
+            mixture=mixture,
+            probability=probability,
+            with_lapse=with_lapse,
+            taken=taken,
+            floor=(lapse / (1 - lapse) + _FLOOR) * mixture.mean(axis=1),
+        )
 
     @cached_property
     def _bases(self) -> tuple[list[Floats], Floats]:
@@ -119,7 +160,7 @@ class Screen:
 
     def project(self, scores: Floats) -> Floats:
         """Return scores of turns less what the model's own parameters could explain."""
-        rest = np.where(self.fitted.used, scores * self.fitted.weight, 0.0)
+        rest = np.where(self.fitted.used, scores, 0.0)
         zones, psi = self._bases
         for basis, turns in zip(zones, self.fitted.turns, strict=True):
             rest[turns.rows] -= basis @ (basis.T @ rest[turns.rows])
@@ -149,24 +190,24 @@ class Screen:
         strength = effect.probe if tilts else candidate.notable
         asked = {effect.name: candidate.values(strength)}
         packed = pack([replace(without_effects(fitted.parameters), effects=asked)], scene.arena)
-        mixture, probability, taken, floor = self._tables
+        tables = self._tables
         total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
         angle = fitted.view.angle_sr
         if len(packed.components):
             parts = components_of(scene, packed, angle)
-            component_score(parts, scene.turns.taken, mixture, probability, taken, floor, some)
+            component_score(parts, scene.turns.taken, *tables.mixtures(), some)
             total += some
         if len(packed.factors):
             tilt, tilt_taken = factors_of(scene, packed, angle)
-            factor_score(tilt, tilt_taken, probability, some)
-            total += some
+            factor_score(tilt, tilt_taken, tables.probability, some)
+            total += some * fitted.weight
         if len(packed.sights):
             total += self._sight_scores(scene, packed)
         return total / strength
 
     def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
         fitted, turns = self.fitted, scene.turns
-        mixture, probability, taken, floor = self._tables
+        tables = self._tables
         changed = np.empty_like(fitted.view.angle_sr)
         attend(scene.states, turns.at, turns.who, packed, fitted.view.angle_sr, changed)
         total = np.zeros(len(turns))
@@ -175,8 +216,8 @@ class Screen:
             some = np.empty(len(rows))
             social_score(
                 fitted.view.toward[rows], changed[rows], fitted.view.angle_sr[rows], zone.taken,
-                own[1], constants(own[:2])[1], own[2], mixture[rows], probability[rows],
-                taken[rows], floor[rows], some,
+                own[1], constants(own[:2])[1], own[2],
+                *tables.mixtures(rows), some,
             )  # fmt: skip
             total[rows] = some
         return total
@@ -187,9 +228,8 @@ class Screen:
         values = candidate.values(candidate.notable) | candidate.shape
         late = with_effect(fitted.parameters, candidate.name, values)
         other, _, other_taken = replace(fitted, view=view_of(self.scene, late)).tables()
-        mixture, probability, taken, floor = self._tables
         scores = np.empty(len(turns))
-        mixture_score(other, other_taken, mixture, probability, taken, floor, scores)
+        mixture_score(other, other_taken, *self._tables.mixtures(), scores)
         return scores
 
     def _scatter(self, candidate: Candidate, steps: Floats) -> Score:

@@ -65,4 +65,5 @@ EFFECT = Effect(
         {"kappa": 8.0, "full_m": 0.3},
     ),
     lacks=needs_neighbour,
+    fixed=("full_m",),
 )

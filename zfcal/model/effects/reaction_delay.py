@@ -24,4 +24,5 @@ EFFECT = Effect(
     shapes=lambda _arena: tuple({"delay_s": delay} for delay in (0.2, 0.4, 0.6, 0.8, 1.2, 1.6)),
     lacks=needs_neighbour,
     identity_s=2.4,
+    fixed=("delay_s",),
 )

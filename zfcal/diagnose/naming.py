@@ -1,0 +1,246 @@
+"""Which of several suspects it is: refits, look-alikes, held-out confirmation.
+
+Scores say that something is missing; many effects that are not there answer to one that
+is. So each of the strongest suspects is put into the model with its own mechanism, and
+what it gains is compared step by step (Vuong 1989, Econometrica 57: 307-333). A suspect
+that has nothing to say once another is in the model falls; one that stands whichever of
+the others is in the model is named. Two that both fall, or both stand and gain alike,
+are a tie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.screening import Score, Screen
+from zfcal.diagnose.speeds import fit_speed
+from zfcal.model.extended import Fitted, Free, bounds_of, maximise, with_effect
+from zfcal.model.kernels.world import TRAIT
+from zfcal.model.scene import Scene
+
+Floats = NDArray[np.float64]
+
+_ROUNDS = 10
+_SURE = 2.0
+"""Standard errors by which one suspect must beat another."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refit:
+    """A suspect in the model.
+
+    Parameters
+    ----------
+    candidate
+        What was added, at its shape.
+    screen
+        The model with it, ready to be asked further.
+    values
+        Its parameters at their maximum likelihood.
+    interval
+        95 % interval of each that was fitted.
+    gain : ndarray, shape (sample,)
+        Log likelihood that it adds, summed over the agents of each sample of the scene.
+    n_free
+        Parameters that were fitted.
+    """
+
+    candidate: Candidate
+    screen: Screen
+    values: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    gain: Floats
+    n_free: int
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.candidate.name
+
+    @property
+    def nats(self) -> float:
+        """Log likelihood gained, less what as many idle parameters would gain."""
+        return float(self.gain.sum()) - self.n_free
+
+    def over(self, other: Refit) -> float:
+        """Return by how many standard errors it gains more than another (Vuong 1989)."""
+        by = self.gain - other.gain
+        spread = float(by.std()) * np.sqrt(len(by))
+        ahead = self.nats - other.nats
+        return ahead / spread if spread > 1e-9 else 0.0
+
+
+def free_of(candidate: Candidate) -> Free:
+    """Return the parameters of an effect that a fit moves."""
+    effect = candidate.effect
+    return tuple((effect.name, name) for name in effect.names if name not in effect.fixed)
+
+
+def refit(screen: Screen, score: Score) -> Refit:
+    """Return the model with a suspect added, all parameters at their maximum likelihood.
+
+    Parameters
+    ----------
+    screen
+        The model so far.
+    score
+        Of the suspect: its shape, and a strength to start from.
+    """
+    candidate = score.candidate
+    if candidate.effect.on_speed:
+        return _refit_speed(screen, score)
+    scene = screen.scene
+    if candidate.effect.individual:
+        scene = with_traits(scene, score)
+    free = free_of(candidate)
+    start = candidate.values(_start(score))
+    if candidate.effect.lag is not None:
+        start = dict(candidate.shape)
+    fitted = maximise(
+        scene,
+        with_effect(screen.fitted.parameters, candidate.name, start),
+        free=(*screen.fitted.free, *free),
+        start=screen.fitted.x,
+        rounds=_ROUNDS,
+    )
+    by_step = np.nan_to_num(fitted.log_p - screen.fitted.log_p)
+    values = dict(fitted.parameters.effects[candidate.name])
+    return Refit(
+        candidate=candidate,
+        screen=Screen(scene=scene, fitted=fitted),
+        values=values,
+        interval=_intervals(fitted, free, values),
+        gain=by_sample(scene, scene.turns.at, by_step),
+        n_free=max(1, len(free)),
+    )
+
+
+def by_sample(scene: Scene, at: NDArray[np.int64], values: Floats) -> Floats:
+    """Return the sums over the agents of each sample, shape (sample,)."""
+    return np.bincount(at, weights=values, minlength=len(scene.k)).astype(np.float64)
+
+
+def _start(score: Score) -> float:
+    """Return a strength to start from: a part of the way, on the right side."""
+    candidate = score.candidate
+    low, high = bounds_of(candidate.name, candidate.effect.strength)
+    size = min(max(abs(score.strength), 0.05 * candidate.notable), candidate.notable)
+    return float(np.clip(np.copysign(size, score.z), low + 1e-6 * (high - low), high))
+
+
+def _intervals(
+    fitted: Fitted, free: Free, values: dict[str, float]
+) -> dict[str, tuple[float, float]]:
+    first = len(fitted.free) - len(free)
+    error = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))[first:]
+    found = {}
+    for (name, key), half in zip(free, 1.96 * error, strict=True):
+        low, high = bounds_of(name, key)
+        found[key] = (max(low, values[key] - half), min(high, values[key] + half))
+    return found
+
+
+def _refit_speed(screen: Screen, score: Score) -> Refit:
+    candidate = score.candidate
+    found = fit_speed(screen, candidate, score.strength)
+    parameters = with_effect(screen.fitted.parameters, candidate.name, found.values)
+    # Headings are judged given the speed: the rest of the fit stands.
+    fitted = replace(screen.fitted, parameters=parameters)
+    moves = screen.scene.moves
+    return Refit(
+        candidate=candidate,
+        screen=Screen(scene=screen.scene, fitted=fitted),
+        values=found.values,
+        interval={candidate.effect.strength: found.interval},
+        gain=by_sample(screen.scene, moves.at, found.gain),
+        n_free=1,
+    )
+
+
+def with_traits(scene: Scene, score: Score) -> Scene:
+    """Return a scene whose agents have the traits that their scores ask for.
+
+    Traits have mean zero and standard deviation one over the tracks that are long enough
+    to tell.
+    """
+    ids, place = np.unique(scene.turns.track, return_inverse=True)
+    sums = np.bincount(place, weights=score.steps)
+    information = np.bincount(place, weights=score.steps**2)
+    known = information > 0.02 * information.sum()
+    traits = np.zeros(len(ids))
+    if known.sum() > 1:
+        each = sums[known] / information[known]
+        shrunk = each - np.average(each, weights=information[known])
+        spread = float(shrunk.std())
+        traits[known] = shrunk / spread if spread > 0 else 0.0
+    states = scene.states.copy()
+    for track, trait in zip(ids, traits, strict=True):
+        states[:, TRAIT][scene.tracks == track] = trait
+    return replace(scene, states=states)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Choice:
+    """The suspect that is named, and those that cannot be told from it.
+
+    Parameters
+    ----------
+    best
+        The one that gains most.
+    ties
+        The others.
+    considered
+        All that were refitted, the largest gain first.
+    """
+
+    best: Refit
+    ties: tuple[Refit, ...]
+    considered: tuple[Refit, ...]
+
+
+def choose(refits: Sequence[Refit], standing: Standing) -> Choice:
+    """Return which suspect it is.
+
+    Parameters
+    ----------
+    refits
+        Each in the model by itself.
+    standing
+        Tells whether a suspect still has something to say beside another.
+    """
+    order = sorted(refits, key=lambda each: -each.nats)
+    best, ties = order[0], []
+    for other in order[1:]:
+        if best.over(other) > _SURE:
+            continue
+        best_falls = not standing(best.candidate, other)
+        other_falls = not standing(other.candidate, best)
+        if best_falls == other_falls:
+            ties.append(other)
+        elif best_falls:
+            # It gains more by its freedom, but the other one says all of it.
+            ties.append(other)
+    return Choice(best=best, ties=tuple(ties), considered=tuple(order))
+
+
+class Standing:
+    """Whether a suspect is still asked for when another is in the model.
+
+    Parameters
+    ----------
+    threshold
+        Standard errors from which on it is.
+    """
+
+    def __init__(self, threshold: float) -> None:
+        self._threshold = threshold
+
+    def __call__(self, candidate: Candidate, beside: Refit) -> bool:
+        """Return whether a candidate stands beside a suspect."""
+        z = beside.screen.ask(candidate).z
+        return (abs(z) if candidate.signed else z) > self._threshold
