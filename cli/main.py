@@ -31,6 +31,7 @@ COMMANDS = {
     "simulate": "simulate",
     "analyse": "analyse",
     "calibrate": "calibrate",
+    "diagnose": "diagnose",
     "report": "report",
     "inspect": "inspect",
     "check": "check",

@@ -67,6 +67,11 @@ class Output:
         0, or 1 for the reason of each artifact.
     quiet
         Whether only errors and left-out files are told.
+
+    Attributes
+    ----------
+    bare
+        Whether a single result is the JSON document, as it stands in its file.
     """
 
     def __init__(self, command: str, *, as_json: bool, verbose: int, quiet: bool) -> None:
@@ -75,6 +80,7 @@ class Output:
         self.verbose = verbose
         self.quiet = quiet
         self.exit_code = 0
+        self.bare = False
         self._bars = Bars(shown=sys.stderr.isatty() and not quiet)
         self._artifacts: dict[Path, dict[str, str]] = {}
         self._left_out: dict[tuple[str, str], dict[str, str]] = {}
@@ -218,7 +224,7 @@ class Output:
             say(f"{self.command}: nothing to do, {fresh} up to date.")
 
     def _print_document(self) -> None:
-        document = {
+        document: Any = {
             "command": self.command,
             "exit_code": self.exit_code,
             "artifacts": list(self._artifacts.values()),
@@ -227,6 +233,8 @@ class Output:
             "errors": self._errors,
             "results": self._results,
         }
+        if self.bare and len(self._results) == 1 and not self._errors:
+            (document,) = self._results
         text = json.dumps(document, indent=2, ensure_ascii=False)
         # A path that is no UTF-8 would make it no JSON.
         click.echo(text.encode(errors="surrogateescape").decode(errors="replace"))

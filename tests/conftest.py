@@ -1,10 +1,22 @@
 """What all tests share: where the real recordings lie, and how hypothesis runs."""
 
+import math
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
+
+from zfcal.diagnose.findings import (
+    Diagnosis,
+    EffectFound,
+    Located,
+    Note,
+    Screened,
+    Trace,
+    Verdict,
+)
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -53,3 +65,93 @@ def recording():
         return pytest.skip(f"no recording {name!r} in {', '.join(map(str, folders))}")
 
     return find
+
+
+def _trace(arena, rng, *, n=4000, minutes=10.0):
+    """Return an effect's statistic, large near the left wall and gone once it is added."""
+    x0, y0, x1, y1 = arena.outline.bounds
+    places = rng.uniform((x0, y0), (x1, y1), (4 * n, 2))
+    places = places[arena.zone_of(places) > 0][:n]
+    here = 1.0 - (places[:, 0] - x0) / (x1 - x0)
+    cue = np.linspace(0.02, 0.3, 12)
+    return Trace(
+        time_s=np.sort(rng.uniform(0, 60 * minutes, n)),
+        x_m=places[:, 0],
+        y_m=places[:, 1],
+        track=rng.integers(0, 4, n).astype(np.int32),
+        before=rng.normal(0.4 * here, 1.0),
+        after=rng.normal(0.0, 1.0, n),
+        cue=cue,
+        observed=0.4 + 0.5 * np.exp(-cue / 0.1),
+        expected_before=np.full(12, 0.55),
+        expected_after=0.4 + 0.48 * np.exp(-cue / 0.1),
+        cue_name="distance of the nearest neighbour (m)",
+        response_name="alignment (cosine)",
+    )
+
+
+@pytest.fixture(scope="session")
+def make_diagnosis():
+    """Return what makes a diagnosis up by hand; keywords replace parts of it."""
+
+    def make(arena, model, *, names=("alignment",), **changes):
+        rng = np.random.default_rng(1)
+        effects = tuple(
+            EffectFound(
+                name=name,
+                says=f"Fish show {name} < as the sentence says & more.",
+                strength={"weight": 12.5, "kappa": 8.0},
+                interval={"weight": (9.0, 16.0), "kappa": (3.0, math.nan)},
+                gain_nats_per_step=0.0123,
+                gain_se=0.002,
+                p=0.00001,
+                trace=_trace(arena, rng),
+            )
+            for name in names
+        )
+        screened = (
+            Screened(name="alignment", z=14.2, p=1e-12, shape={"kappa": 12.0}),
+            Screened(name="group-cohesion", z=-3.1, p=0.2),
+            Screened(name="turning-bias", z=0.4, p=0.9),
+            Screened(name="boldness", z=math.nan, p=math.nan, minutes_needed=45.0),
+            Screened(name="robot-avoidance", z=math.nan, p=math.nan, lacks="a robot"),
+        )
+        where = (
+            Located(
+                statistic="alignment",
+                zone=arena.zone_names[0],
+                time_s=(0.0, 300.0),
+                agents=(1, 3),
+                observed=0.61,
+                expected=0.52,
+                z=7.9,
+                q=1e-6,
+            ),
+            Located(
+                statistic="turning",
+                zone=None,
+                time_s=(0.0, 600.0),
+                agents=None,
+                observed=0.31,
+                expected=0.33,
+                z=-3.4,
+                q=0.02,
+            ),
+        )
+        known = {
+            "verdict": Verdict.NAMED if names else Verdict.NO_EFFECT,
+            "where": where,
+            "effects": effects,
+            "screened": screened,
+            "notes": (
+                Note(name="noise", says="Positions are noisy.", values={"sd_mm": 0.5}),
+                Note(name="omnibus", says="Nothing else stands out.", values={"p": math.nan}),
+            ),
+            "base": model,
+            "extended": model,
+            "minutes": 10.0,
+            "n_steps": 4000,
+        }
+        return Diagnosis(**{**known, **changes})
+
+    return make

@@ -310,7 +310,7 @@ _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
     r"models/\d{6,}\.parquet": _table_checker(POPULATION),
     r"models/[^/]+\.toml": _check_model,
     r"(poses|drive|frames/(overhead|below))/\d{6,}\.mcap": _check_mcap,
-    r"diagnosis/findings\.json": _check_findings,
+    r"diagnosis/([^/]+/)?findings\.json": _check_findings,
 }
 
 

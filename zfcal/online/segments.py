@@ -18,6 +18,7 @@ from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import LeftOut, Tell
 from zfcal.online.opening import OpenTrial, open_trial
+from zfcal.tracks import Tracks
 from zfcal.trial import second_of
 from zfcal.units import SEGMENT_S
 
@@ -96,17 +97,29 @@ def _locate(opened: OpenTrial, path: Path, start_s: int) -> Located:
     trial = opened.trial
     tracks = read_tracks(path)
     end_s = start_s + SEGMENT_S
+    check_times(path, tracks, start_s)
+    try:
+        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
+    except InputError as error:
+        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
+    return locate(samples, opened.arena)
+
+
+def check_times(path: Path, tracks: Tracks, start_s: int) -> None:
+    """Refuse a segment whose rows lie outside the minute that its name states.
+
+    Raises
+    ------
+    DamagedError
+        They do.
+    """
+    end_s = start_s + SEGMENT_S
     if len(tracks) and not (tracks.time_s[0] >= start_s and tracks.time_s[-1] < end_s):
         raise DamagedError(
             f"{path}: holds the times {tracks.time_s[0]:.6g} s to {tracks.time_s[-1]:.6g} s, "
             f"expected {start_s} s to {end_s:.6g} s.",
             hint="The name says where a segment starts: give the file its own name back.",
         )
-    try:
-        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
-    except InputError as error:
-        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
-    return locate(samples, opened.arena)
 
 
 def is_whole(root: Path, start_s: int, *, fps: float) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,17 +38,35 @@ def render_page(views: Sequence[TrialView], pictures: Sequence[Picture], lineage
     lineage
         Of the report, which stands in the page as well.
     """
+    content = _of_one(views[0]) if len(views) == 1 else _of_several(views)
+    content["left_out"] = [line for view in views for line in view.left_out]
+    return render(content, pictures, lineage.as_dict())
+
+
+def render(
+    content: Mapping[str, Any], pictures: Sequence[Picture], provenance: Mapping[str, Any]
+) -> str:
+    """Return a page as HTML.
+
+    Parameters
+    ----------
+    content
+        ``title``, ``facts``, ``statements``, ``gaps``, ``left_out`` and ``tables``.
+    pictures
+        In the order in which they are shown.
+    provenance
+        Where the page comes from, with the ``version`` that made it; it stands in the
+        page as JSON.
+    """
     environment = Environment(
         loader=PackageLoader("zfcal.report"), autoescape=True, undefined=StrictUndefined
     )
     environment.filters["hold"] = _hold
-    content = _of_one(views[0]) if len(views) == 1 else _of_several(views)
     text = environment.get_template("page.html.j2").render(
         **content,
-        left_out=[line for view in views for line in view.left_out],
         sections=[_section(picture) for picture in pictures],
-        version=lineage.version,
-        lineage=_embedded(lineage),
+        version=provenance["version"],
+        lineage=_embedded(provenance),
         light=_colours(1),
         dark=_colours(2),
     )
@@ -117,9 +135,9 @@ def _hold(text: str) -> str:
     )
 
 
-def _embedded(lineage: Lineage) -> str:
-    """Return the lineage as JSON that cannot end the element that it stands in."""
-    return to_json(lineage.as_dict()).replace("<", "\\u003c")
+def _embedded(provenance: Mapping[str, Any]) -> str:
+    """Return JSON that cannot end the element that it stands in."""
+    return to_json(provenance).replace("<", "\\u003c")
 
 
 def _colours(column: int) -> str:

@@ -1,0 +1,63 @@
+"""`zfcal diagnose`: where a model and tracks disagree, and which effect is missing."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .durations import span
+from .options import EXISTING, PLACE, makes_artifacts, seed_option, speaks, takes_trials
+from .output import Output
+from .streams import each_trial
+
+if TYPE_CHECKING:
+    from zfcal.online.streams import Work
+
+
+@click.command("diagnose")
+@takes_trials
+@click.option("--model", type=EXISTING, help="Another model than that of the newest round.")
+@click.option(
+    "--null",
+    "n_null",
+    type=click.Choice(["39", "199"]),
+    default="39",
+    show_default=True,
+    help="Trials simulated without any effect, to learn what chance does.",
+)
+@click.option("--quick", is_flag=True, help="Take that from theory instead: seconds, less sure.")
+@click.option("--noise-mm", type=click.FloatRange(min=0), help="Position noise, sd per coordinate.")
+@click.option("--window", "window_s", type=span, metavar="START:END", help="Only this stretch.")
+@seed_option("Seed of the random numbers.  [default: the trial's]")
+@click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
+@click.option("-o", "--out", "out_dir", type=PLACE, help="Folder.  [default: TRIAL/diagnosis]")
+@makes_artifacts
+@speaks
+def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
+    r"""Find the effect that a model misses: where it shows, what it is, how sure that is.
+
+    Writes diagnosis/findings.json with pictures and report.html. Findings about a
+    model that has effects already go to diagnosis/NAME/, after the model's file.
+
+    \b
+    Example:
+        zfcal diagnose trial
+        zfcal diagnose trial --quick --json
+        zfcal diagnose trial --model trial/models/extended.toml
+        zfcal diagnose day1 day2 --window 0:1800 --noise-mm 0.5
+    """
+    from .diagnosis import choose, diagnose_one
+
+    chosen, task = choose(options, trials)
+    out.bare = len(trials) == 1
+    roots: dict[Path, None] = {}
+
+    def collect(found: Work) -> None:
+        roots[found.root] = None
+
+    each_trial(out, trials, collect)
+    for root in roots:
+        out.attempt(functools.partial(diagnose_one, out, root, chosen, task))
