@@ -162,6 +162,7 @@ class Group:
             self.arena,
             n_agents=self.n_agents,
             n_counted=n_counted,
+            n_robots=self.n_robots,
             n_steps=n_steps,
             seeds=seeds,
             n_threads=self.n_workers,

@@ -118,6 +118,7 @@ class FixedModel:
             self.arena,
             n_agents=self.n_agents,
             n_counted=n_counted,
+            n_robots=self.n_agents - self.n_fish,
             n_steps=n_steps,
             seeds=seeds,
             n_threads=self.n_workers,

@@ -194,6 +194,7 @@ def swim(opened: OpenTrial, options: SimulateOptions) -> Tracks:
         n_agents=trial.n_agents,
         n_steps=n_steps,
         seed=trial.seed if options.seed is None else options.seed,
+        n_robots=trial.n_robots,
     )
     xy_m, heading_rad = between_steps(xy_m, heading_rad, per_step)
     return _as_tracks(opened, xy_m[:n_frames], heading_rad[:n_frames])

@@ -41,6 +41,7 @@ def long_run(
         arena,
         n_agents=trial.n_agents,
         n_counted=trial.n_agents,
+        n_robots=trial.n_robots,
         n_steps=max(1, round(settings.long_s / trial.dt_s)),
         seeds=np.asarray(source.seeds(Purpose.CONFIRMATION, settings.long_runs)),
     )

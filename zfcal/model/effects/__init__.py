@@ -13,6 +13,7 @@ from functools import cache
 
 from zfcal.errors import InputError
 from zfcal.model.effects.base import MAX_PARAMETERS, Company, Effect, EffectParameter
+from zfcal.model.effects.generic import PREFIX, generic_effects
 
 __all__ = [
     "MAX_PARAMETERS",
@@ -21,30 +22,39 @@ __all__ = [
     "EffectParameter",
     "all_effects",
     "find_effect",
+    "generic_effects",
 ]
 
 
 @cache
 def all_effects() -> tuple[Effect, ...]:
-    """Return every effect, in the order of their names."""
-    found = (_effect_of(module.name) for module in pkgutil.iter_modules(__path__))
+    """Return every listed effect, in the order of their names; the generic ones stand apart."""
+    found = (_effect_of(module.name) for module in _modules())
     return tuple(sorted((effect for effect in found if effect), key=lambda effect: effect.name))
 
 
 def find_effect(name: str) -> Effect:
-    """Return the effect of a name, or raise an `InputError` that lists the nearest ones."""
-    modules = {
-        module.name.replace("_", "-"): module.name for module in pkgutil.iter_modules(__path__)
-    }
-    effect = _effect_of(modules[name]) if name in modules else None
+    """Return the effect of a name, or raise an `InputError` that lists the nearest ones.
+
+    Those of the generic family are found as well: ``generic:heading:wall``.
+    """
+    if name.startswith(PREFIX):
+        effect = next((one for one in generic_effects() if one.name == name), None)
+    else:
+        modules = {found.name.replace("_", "-"): found.name for found in _modules()}
+        effect = _effect_of(modules[name]) if name in modules else None
     if effect:
         return effect
-    known = [effect.name for effect in all_effects()]
+    known = [one.name for one in (*all_effects(), *generic_effects())]
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
     raise InputError(
         f"There is no effect {name!r}.",
         hint=f"Did you mean {' or '.join(near)}?" if near else f"Known: {', '.join(known)}.",
     )
+
+
+def _modules() -> list[pkgutil.ModuleInfo]:
+    return list(pkgutil.iter_modules(__path__))
 
 
 @cache

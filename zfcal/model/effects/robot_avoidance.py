@@ -6,11 +6,10 @@ import math
 
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import apart, cut, tilt
+from zfcal.model.effects.forms import apart, tilt
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
 from zfcal.model.kernels.world import KIND, X, Y
 
-_MOST_ATTENTION = 5.0
 _NEAR_M = 0.1
 
 
@@ -19,7 +18,7 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Change the attention that a robot gets."""
     if not state[KIND * n + j] > 0.0:
         return 1.0
-    return cut(1.0 - parameters[0] * (1.0 - parameters[1]), 0.0, _MOST_ATTENTION)
+    return math.exp(-parameters[0] * (1.0 - parameters[1]))
 
 
 @hook(FACTOR)
@@ -51,10 +50,10 @@ EFFECT = Effect(
     parameters=(
         EffectParameter(
             name="strength",
-            low=-4.0,
-            high=4.0,
+            low=-3.0,
+            high=5.0,
             default=1.0,
-            says="Share of attention that the robot loses, or log of the preference for headings "
+            says="Log of the attention that the robot loses, or of the preference for headings "
             "away from it when it is close.",
         ),
         EffectParameter(
