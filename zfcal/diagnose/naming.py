@@ -10,7 +10,7 @@ are a tie.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -203,7 +203,7 @@ class Choice:
     considered: tuple[Refit, ...]
 
 
-def choose(refits: Sequence[Refit], standing: Standing) -> Choice:
+def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]) -> Choice:
     """Return which suspect it is.
 
     Parameters
@@ -218,29 +218,9 @@ def choose(refits: Sequence[Refit], standing: Standing) -> Choice:
     for other in order[1:]:
         if best.over(other) > _SURE:
             continue
-        best_falls = not standing(best.candidate, other)
-        other_falls = not standing(other.candidate, best)
-        if best_falls == other_falls:
-            ties.append(other)
-        elif best_falls:
-            # It gains more by its freedom, but the other one says all of it.
-            ties.append(other)
+        # It gains as much. If it falls beside the best one, which stands beside it, then
+        # it is a shadow; if both fall they say the same, and if both stand neither does all.
+        if standing(best.candidate, other) and not standing(other.candidate, best):
+            continue
+        ties.append(other)
     return Choice(best=best, ties=tuple(ties), considered=tuple(order))
-
-
-class Standing:
-    """Whether a suspect is still asked for when another is in the model.
-
-    Parameters
-    ----------
-    threshold
-        Standard errors from which on it is.
-    """
-
-    def __init__(self, threshold: float) -> None:
-        self._threshold = threshold
-
-    def __call__(self, candidate: Candidate, beside: Refit) -> bool:
-        """Return whether a candidate stands beside a suspect."""
-        z = beside.screen.ask(candidate).z
-        return (abs(z) if candidate.signed else z) > self._threshold

@@ -176,34 +176,44 @@ class Screen:
             # Scores by a trait of one; whoever has which shows in how they scatter.
             scene = replace(scene, states=scene.states.copy())
             scene.states[:, TRAIT] = 1.0
-        steps = self.project(self._heading_scores(scene, candidate))
+        steps = self.project(self.heading_scores(scene, candidate))
         if effect.individual:
             return self._scatter(candidate, steps)
         return summed(candidate, steps)
 
-    def _heading_scores(self, scene: Scene, candidate: Candidate) -> Floats:
+    def heading_scores(self, scene: Scene, candidate: Candidate) -> Floats:
+        """Return the scores of an effect on the heading, before projection, shape (turn,).
+
+        Parameters
+        ----------
+        scene
+            Whose states the effect asks: the own scene, or one with other states.
+        candidate
+            What is asked for.
+        """
         effect, fitted = candidate.effect, self.fitted
         if effect.lag is not None:
             return self._late_scores(candidate)
+        base = without_effects(fitted.parameters)
+
+        def at(strength: float) -> Packed:
+            asked = {effect.name: candidate.values(strength)}
+            return pack([replace(base, effects=asked)], scene.arena)
+
         # Mixtures are compared at a strength worth noticing, tilts next to none.
-        tilts = effect.factor is not None
-        strength = effect.probe if tilts else candidate.notable
-        asked = {effect.name: candidate.values(strength)}
-        packed = pack([replace(without_effects(fitted.parameters), effects=asked)], scene.arena)
-        tables = self._tables
+        tables, angle, strong = self._tables, fitted.view.angle_sr, candidate.notable
         total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
-        angle = fitted.view.angle_sr
-        if len(packed.components):
-            parts = components_of(scene, packed, angle)
+        if effect.component is not None:
+            parts = components_of(scene, at(strong), angle)
             component_score(parts, scene.turns.taken, *tables.mixtures(), some)
-            total += some
-        if len(packed.factors):
-            tilt, tilt_taken = factors_of(scene, packed, angle)
+            total += some / strong
+        if effect.sight is not None:
+            total += self._sight_scores(scene, at(strong)) / strong
+        if effect.factor is not None:
+            tilt, tilt_taken = factors_of(scene, at(effect.probe), angle)
             factor_score(tilt, tilt_taken, tables.probability, some)
-            total += some * fitted.weight
-        if len(packed.sights):
-            total += self._sight_scores(scene, packed)
-        return total / strength
+            total += some * fitted.weight / effect.probe
+        return total
 
     def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
         fitted, turns = self.fitted, scene.turns

@@ -6,17 +6,23 @@ import math
 
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.kernels.hooks import COMPONENT
-from zfcal.model.kernels.world import HX, HY
+from zfcal.model.effects.forms import apart, needs_neighbour, tilt
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.world import HX, HY, ZONE
 
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""
 
 
+_NEAR_M = 0.15
+_PER_WEIGHT = 0.03
+
+
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
     """Add a component about the neighbours' mean heading; the more they agree, the heavier."""
+    if parameters[3] > 0.0:
+        return 0.0
     x, y = 0.0, 0.0
     for j in range(n):
         angle = sight[i * n + j]
@@ -30,6 +36,23 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
         return 0.0
     out[0], out[1], out[2] = x / length, y / length, parameters[1]
     return parameters[0] * length
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the mean heading of all that are near, seen or not."""
+    if not parameters[3] > 0.0:
+        return 1.0
+    x, y, near = 0.0, 0.0, 0.0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0 and apart(state, n, i, j) < _NEAR_M:
+            x += state[HX * n + j]
+            y += state[HY * n + j]
+            near += 1.0
+    if not near > 0.0:
+        return 1.0
+    most = math.sqrt(x * x + y * y) / near
+    return tilt(_PER_WEIGHT * parameters[0] * parameters[3], (x * ux + y * uy) / near, most)
 
 
 EFFECT = Effect(
@@ -59,16 +82,26 @@ EFFECT = Effect(
             says="1: each neighbour counts by its solid angle; 0: all that are seen count alike, "
             "as one of 0.01 sr.",
         ),
+        EffectParameter(
+            name="leaning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: some headings are drawn about the mean heading of those that are seen; 1: all "
+            "headings lean toward that of those within 0.15 m, by 0.03 nats per weight.",
+        ),
     ),
     strength="weight",
     probe=0.05,
     component=component,
+    factor=factor,
     shapes=lambda _arena: (
         {"kappa": 3.0, "grading": 1.0},
         {"kappa": 12.0, "grading": 1.0},
         {"kappa": 3.0, "grading": 0.0},
         {"kappa": 12.0, "grading": 0.0},
+        {"leaning": 1.0},
     ),
     lacks=needs_neighbour,
-    fixed=("grading",),
+    fixed=("grading", "leaning"),
 )

@@ -7,7 +7,19 @@ from typing import Any
 
 from zfcal.model.compiled import inlined
 from zfcal.model.effects.base import Company
-from zfcal.model.kernels.world import EXIT, MOUTH_M, MOUTH_X, MOUTH_Y, X, Y
+from zfcal.model.kernels.world import (
+    EXIT,
+    FOLLOWS,
+    HX,
+    HY,
+    MOUTH_M,
+    MOUTH_X,
+    MOUTH_Y,
+    TAU_X,
+    TAU_Y,
+    X,
+    Y,
+)
 
 SPEED_M_S = 0.07
 """A middling speed of a zebrafish: about where measured histograms have their mean."""
@@ -50,6 +62,23 @@ def sense_along(cosine: float) -> float:
     Nearly its sign: headings within 45 degrees of the line are all but the same.
     """
     return math.tanh(_SENSE * cosine) / math.tanh(_SENSE)
+
+
+@inlined
+def leftward(state: Hooked, n: int, i: int, ux: float, uy: float, along_walls: float) -> float:
+    """Return how far a heading is to the left of where the base law has it, in [-1, 1].
+
+    Parameters
+    ----------
+    along_walls
+        0: to the left of the present heading everywhere. 1: where fish follow walls, to
+        the left of the nearer sense along the wall.
+    """
+    if along_walls > 0.0 and state[FOLLOWS * n + i] > 0.0:
+        tau_x, tau_y = state[TAU_X * n + i], state[TAU_Y * n + i]
+        return 2.0 * (tau_x * uy - tau_y * ux) * (tau_x * ux + tau_y * uy)
+    hx, hy = state[HX * n + i], state[HY * n + i]
+    return hx * uy - hy * ux
 
 
 @inlined

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import tilt
+from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import HX, HY
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of the turn that they are; left is positive."""
-    return tilt(parameters[0], state[HX * n + i] * uy - state[HY * n + i] * ux, 1.0)
+    return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
 
 
 EFFECT = Effect(
@@ -29,7 +28,17 @@ EFFECT = Effect(
             says="Half the log of how much more likely a right angle to the left is than one to "
             "the right.",
         ),
+        EffectParameter(
+            name="along_walls",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: left of the present heading everywhere; 1: where fish follow walls, left of "
+            "the way along the wall.",
+        ),
     ),
     probe=0.01,
     factor=factor,
+    shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
+    fixed=("along_walls",),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import tilt
+from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
 
@@ -13,8 +13,10 @@ from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of their turn times that of the last turn."""
     hx, hy = state[HX * n + i], state[HY * n + i]
-    last = state[PAST_HX * n + i] * hy - state[PAST_HY * n + i] * hx
-    return tilt(parameters[0], last * (hx * uy - hy * ux), abs(last))
+    px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
+    # A fish that has turned back has no side to go on to.
+    last = (px * hy - py * hx) * max(0.0, px * hx + py * hy) ** parameters[2]
+    return tilt(parameters[0], last * leftward(state, n, i, ux, uy, parameters[1]), abs(last))
 
 
 EFFECT = Effect(
@@ -31,8 +33,27 @@ EFFECT = Effect(
             says="Half the log of how much more likely a right angle to the same side is than one "
             "to the other side, after a right angle.",
         ),
+        EffectParameter(
+            name="along_walls",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: the side of the present heading everywhere; 1: where fish follow walls, the "
+            "side of the way along the wall.",
+        ),
+        EffectParameter(
+            name="forgets_wide",
+            low=0.0,
+            high=4.0,
+            default=0.0,
+            says="Power of the cosine of the last turn by which wide turns count for less.",
+        ),
     ),
     probe=0.01,
     factor=factor,
+    shapes=lambda _arena: tuple(
+        {"along_walls": along, "forgets_wide": wide} for along in (0.0, 1.0) for wide in (0.0, 1.0)
+    ),
+    fixed=("along_walls", "forgets_wide"),
     identity_s=0.8,
 )

@@ -1,0 +1,214 @@
+"""Forward selection: the effects that a model lacks, one after the other.
+
+A suspect is a listed effect whose efficient score, standardised by the null through the
+measurement, is too large for the whole family (Sidak 1967, Journal of the American
+Statistical Association 62: 626-633). The best one is put into the model, and all are
+asked again, until nothing is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.naming import Choice, Refit, choose, refit
+from zfcal.diagnose.null import Null
+from zfcal.diagnose.screening import Score, Screen, ask_all
+
+Floats = NDArray[np.float64]
+Told = Callable[[str, int, int], None]
+
+LEVEL = 0.02
+"""Chance of a false alarm over the whole family."""
+
+_MOST_EFFECTS = 4
+_SUSPECTS = 6
+_RIVALS = 3
+_LEAST_NATS = 6.0
+_LEAST_SHARE = 0.15
+"""A further effect must gain this share of the first one's nats: an effect whose true form
+is a little different from its mechanism leaves something over that others answer to."""
+
+_STANDS = 3.0
+_RIVAL_AHEAD = 3.0
+_RIVAL_TIMES = 1.25
+_RIVAL_Z = 6.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Asked:
+    """A family of candidates and its null.
+
+    Parameters
+    ----------
+    candidates
+        Each effect at each shape.
+    null
+        Of their z, in their order.
+    """
+
+    candidates: tuple[Candidate, ...]
+    null: Null
+
+    def standardised(self, scores: Sequence[Score]) -> Floats:
+        """Return z less its centre over its spread; -inf on the side that cannot be."""
+        z = self.null.standardised(np.array([score.z for score in scores]))
+        one_sided = np.array([not score.candidate.signed for score in scores])
+        return np.where(one_sided & (z < 0), 0.0, z)
+
+    def family_p(self, z: Floats) -> Floats:
+        """Return p-values over the whole family."""
+        own = self.null.p(z)
+        return np.asarray(-np.expm1(len(z) * np.log1p(-np.minimum(own, 1 - 1e-16))))
+
+    def centre_of(self, candidate: Candidate) -> tuple[float, float]:
+        """Return centre and spread of a candidate's z."""
+        at = self.candidates.index(candidate)
+        return float(self.null.centre[at]), float(self.null.spread[at])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Best:
+    """An effect at the shape that a recording asks for most.
+
+    Parameters
+    ----------
+    score
+        At that shape.
+    z, p
+        Standardised, and over the family.
+    """
+
+    score: Score
+    z: float
+    p: float
+
+
+def best_of(asked: Asked, scores: Sequence[Score]) -> list[Best]:
+    """Return each effect at its best shape, the clearest first."""
+    z = asked.standardised(scores)
+    p = asked.family_p(z)
+    found: dict[str, Best] = {}
+    for score, own, chance in zip(scores, z, p, strict=True):
+        name = score.candidate.name
+        if name not in found or abs(own) > abs(found[name].z):
+            found[name] = Best(score=score, z=float(own), p=float(chance))
+    return sorted(found.values(), key=lambda best: -abs(best.z))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Step:
+    """One effect that was added.
+
+    Parameters
+    ----------
+    choice
+        What was chosen, and among what.
+    best
+        As it was screened.
+    before
+        The model without it.
+    """
+
+    choice: Choice
+    best: Best
+    before: Screen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Selection:
+    """The effects, in the order of adding.
+
+    Parameters
+    ----------
+    steps
+        One for each effect.
+    screened
+        All effects as they were asked for in the model that was given.
+    final
+        The model with all of them.
+    """
+
+    steps: tuple[Step, ...]
+    screened: tuple[Best, ...]
+    final: Screen
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Selector:
+    """Adds effects until nothing is left.
+
+    Parameters
+    ----------
+    listed, generic
+        Families of candidates.
+    n_workers
+        Threads.
+    told
+        Hears how far it is.
+    """
+
+    listed: Asked
+    generic: Asked
+    n_workers: int
+    told: Told = field(default=lambda _stage, _done, _all: None)
+
+    def select(self, screen: Screen) -> Selection:
+        """Return the effects that a model lacks."""
+        steps: list[Step] = []
+        first: tuple[Best, ...] = ()
+        for number in range(_MOST_EFFECTS):
+            ranked = self._ranked(self.listed, screen)
+            first = first or tuple(ranked)
+            step = self._step(screen, ranked, steps)
+            if step is None:
+                break
+            steps.append(step)
+            screen = step.choice.best.screen
+            self.told("adding effects", number + 1, _MOST_EFFECTS)
+        return Selection(steps=tuple(steps), screened=first, final=screen)
+
+    def _ranked(self, asked: Asked, screen: Screen) -> list[Best]:
+        return best_of(asked, ask_all(screen, asked.candidates, self.n_workers))
+
+    def _step(self, screen: Screen, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
+        taken = {step.choice.best.name for step in done}
+        open_ = [best for best in ranked if best.score.candidate.name not in taken]
+        suspects = [best for best in open_ if best.p < LEVEL][:_SUSPECTS]
+        rivals = [
+            best
+            for best in self._ranked(self.generic, screen)
+            if abs(best.z) > _RIVAL_Z and best.score.candidate.name not in taken
+        ][:_RIVALS]
+        least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
+        listed = self._refits(screen, suspects, least)
+        generic = self._refits(screen, rivals, least)
+        if not listed and not generic:
+            return None
+        choice = self._choose(listed, generic)
+        by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
+        return Step(choice=choice, best=by_name[choice.best.name], before=screen)
+
+    def _refits(self, screen: Screen, bests: Sequence[Best], least: float) -> list[Refit]:
+        made = [refit(screen, best.score) for best in bests]
+        return [each for each in made if each.nats > least]
+
+    def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
+        if not listed:
+            return Choice(best=max(generic, key=lambda each: each.nats), ties=(), considered=())
+        choice = choose(listed, self._stands)
+        for rival in sorted(generic, key=lambda each: -each.nats):
+            ahead = rival.over(choice.best) > _RIVAL_AHEAD
+            if ahead and rival.nats > _RIVAL_TIMES * choice.best.nats:
+                return Choice(best=rival, ties=(), considered=choice.considered)
+        return choice
+
+    def _stands(self, candidate: Candidate, beside: Refit) -> bool:
+        """Return whether a candidate is still asked for when another is in the model."""
+        centre, spread = self.listed.centre_of(candidate)
+        z = (beside.screen.ask(candidate).z - centre) / spread
+        return (abs(z) if candidate.signed else z) > _STANDS
