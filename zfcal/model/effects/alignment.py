@@ -70,4 +70,5 @@ EFFECT = Effect(
         {"kappa": 12.0, "grading": 0.0},
     ),
     lacks=needs_neighbour,
+    fixed=("grading",),
 )

@@ -39,4 +39,5 @@ EFFECT = Effect(
     strength="exponent",
     probe=0.01,
     speed=speed,
+    fixed=("usual_m_s",),
 )

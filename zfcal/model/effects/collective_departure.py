@@ -60,4 +60,5 @@ EFFECT = Effect(
     ),
     lacks=_lacks,
     identity_s=10.0,
+    fixed=("heading_share",),
 )

@@ -39,4 +39,5 @@ EFFECT = Effect(
     strength="per_hour",
     probe=0.02,
     speed=speed,
+    fixed=("usual_at_s",),
 )

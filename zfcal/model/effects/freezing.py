@@ -47,4 +47,5 @@ EFFECT = Effect(
     speed=speed,
     shapes=lambda _arena: tuple({"duration_s": duration} for duration in (1.0, 2.0, 5.0)),
     identity_s=2.0,
+    stops=True,
 )

@@ -45,4 +45,5 @@ EFFECT = Effect(
     probe=0.05,
     sight=sight,
     lacks=needs_neighbour,
+    fixed=("usual_at_s",),
 )

@@ -69,4 +69,5 @@ EFFECT = Effect(
     factor=factor,
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
     lacks=_lacks,
+    fixed=("flight",),
 )

@@ -58,4 +58,5 @@ EFFECT = Effect(
     speed=speed,
     shapes=lambda _arena: ({"focus": 0.0}, {"focus": 4.0}),
     lacks=needs_neighbour,
+    fixed=("focus", "usual_m_s"),
 )

@@ -45,4 +45,5 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    fixed=("usual_m_s",),
 )
