@@ -59,6 +59,6 @@ EFFECT = Effect(
     shapes=_shapes,
     lacks=_lacks,
     identity_s=300.0,
-    fixed=("heading_share",),
     individual=True,
+    fixed=("heading_share",),
 )

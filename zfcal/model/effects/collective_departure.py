@@ -60,5 +60,5 @@ EFFECT = Effect(
     ),
     lacks=_lacks,
     identity_s=10.0,
-    fixed=("memory_s", "heading_share"),
+    fixed=("heading_share",),
 )

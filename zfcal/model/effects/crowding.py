@@ -53,5 +53,5 @@ EFFECT = Effect(
     speed=speed,
     shapes=lambda _arena: tuple({"radius_m": radius} for radius in (0.05, 0.08, 0.12, 0.2, 0.35)),
     lacks=needs_neighbour,
-    fixed=("radius_m", "usual"),
+    fixed=("usual",),
 )

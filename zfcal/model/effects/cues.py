@@ -93,3 +93,6 @@ WAVE = (
     number("period_s", (20.0, 1e5), 240.0, "From one crest of the wave to the next, in seconds."),
     number("crest_s", (-1e5, 1e5), 0.0, "When it is strongest, in seconds of the trial."),
 )
+
+FIXED = ("from_s", "for_s", "every_s", "period_s", "crest_s", "on")
+"""Names of parameters whose likelihood has many hills: a fit would climb the wrong one."""

@@ -10,6 +10,7 @@ from zfcal.arena import Arena
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.cues import (
+    FIXED,
     PLACE,
     REFERENCE,
     WAVE,
@@ -196,6 +197,7 @@ def _effect(
         factor=factor,
         shapes=shapes,
         lacks=lacks,
+        fixed=tuple(own.name for own in parameters if own.name in FIXED),
     )
 
 

@@ -9,7 +9,17 @@ from typing import Any
 from zfcal.arena import Arena
 from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
-from zfcal.model.effects.cues import PLACE, REFERENCE, WHEN, bearing, number, quick, too_far, window
+from zfcal.model.effects.cues import (
+    FIXED,
+    PLACE,
+    REFERENCE,
+    WHEN,
+    bearing,
+    number,
+    quick,
+    too_far,
+    window,
+)
 from zfcal.model.effects.forms import apart, beyond, nearest_seen, needs_neighbour, times_faster
 from zfcal.model.effects.places import places
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
@@ -116,6 +126,7 @@ def _effect(
         speed=speed,
         shapes=shapes,
         lacks=needs_neighbour if cue.startswith("neighbour") else _anywhere,
+        fixed=tuple(own.name for own in parameters if own.name in FIXED),
     )
 
 

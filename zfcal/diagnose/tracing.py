@@ -1,0 +1,105 @@
+"""An effect's own statistic, step by step and against what it responds to, for pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.findings import Trace
+from zfcal.diagnose.naming import Refit
+from zfcal.diagnose.screening import Score, Screen
+from zfcal.model.kernels.world import SPEED, WALL, ZONE, X, Y
+from zfcal.model.scene import Moves, Scene
+
+Floats = NDArray[np.float64]
+
+_BINS = 12
+_BY_TIME = ("fatigue", "habituation")
+_BY_SPEED = ("burst-and-coast", "freezing", "speed-turn-coupling")
+_BY_WALL = ("wall-persistence", "turning-bias", "turning-memory", "directional-drift")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Cue:
+    name: str
+    values: Floats
+
+
+def trace(score: Score, before: Screen, after: Refit) -> Trace:
+    """Return the efficient scores of an effect, without it and with it in the model.
+
+    Parameters
+    ----------
+    score
+        Of the effect in the model without it.
+    before
+        That model.
+    after
+        The model with it.
+
+    Notes
+    -----
+    Scores are in units of their own standard deviation. A model expects zero of them;
+    what is left when the effect is in it is what it does not explain.
+    """
+    scene = before.scene
+    steps: Moves = scene.moves if score.candidate.effect.on_speed else scene.turns
+    unit = float(score.steps.std()) or 1.0
+    own = np.sign(score.z or 1.0) * score.steps / unit
+    left = np.sign(score.z or 1.0) * after.screen.ask(score.candidate).steps / unit
+    states = scene.states[steps.at, :, steps.who]
+    cue = _cue(score.candidate.name, scene, steps)
+    middle, observed = _binned(cue.values, own)
+    _, rest = _binned(cue.values, left)
+    return Trace(
+        time_s=scene.time_s(steps),
+        x_m=states[:, X],
+        y_m=states[:, Y],
+        track=steps.track,
+        before=own,
+        after=left,
+        cue=middle,
+        observed=observed,
+        expected_before=np.zeros_like(observed),
+        expected_after=observed - rest,
+        cue_name=cue.name,
+        response_name="score of the effect (standard deviations a step)",
+    )
+
+
+def _cue(name: str, scene: Scene, steps: Moves) -> _Cue:
+    states = scene.states[steps.at, :, steps.who]
+    if name in _BY_TIME or name.endswith(":time"):
+        return _Cue(name="time (min)", values=scene.time_s(steps) / 60)
+    if name in _BY_SPEED or name.endswith("own-speed"):
+        return _Cue(name="speed of the step before (cm/s)", values=100 * states[:, SPEED])
+    if name in _BY_WALL or "wall" in name or scene.n_fish + scene.n_robots < 2:
+        return _Cue(name="distance to the wall (cm)", values=100 * states[:, WALL])
+    return _Cue(name="distance to the nearest neighbour (cm)", values=100 * _nearest(scene, steps))
+
+
+def _nearest(scene: Scene, steps: Moves) -> Floats:
+    all_ = scene.states[steps.at]
+    rows = np.arange(len(steps))
+    away = np.hypot(
+        all_[:, X] - all_[rows, X, steps.who][:, None],
+        all_[:, Y] - all_[rows, Y, steps.who][:, None],
+    )
+    away[rows, steps.who] = np.inf
+    away[all_[:, ZONE] == 0] = np.inf
+    nearest = away.min(axis=1)
+    return np.where(np.isfinite(nearest), nearest, np.nan)
+
+
+def _binned(cue: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return the middle of each of twelve equally full bins, and the mean there."""
+    known = ~np.isnan(cue)
+    cue, values = cue[known], values[known]
+    if len(cue) < _BINS:
+        return np.zeros(0), np.zeros(0)
+    order = np.argsort(cue, kind="stable")
+    groups = np.array_split(order, _BINS)
+    middle = np.array([np.median(cue[group]) for group in groups])
+    return middle, np.array([values[group].mean() for group in groups])
