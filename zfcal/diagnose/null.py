@@ -8,16 +8,16 @@ err in opposite directions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from zfcal.arena import Arena
-from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.screening import Screen
 from zfcal.errors import InputError
 from zfcal.model.extended import Fitted, maximise
@@ -26,14 +26,13 @@ from zfcal.model.simulate import simulate_tracks
 from zfcal.tracks import ROBOT, Samples
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 _ROUNDS = 3
 """Steps of a replicate's fit, which starts at the parameters that made it."""
 
 _PRIOR_WEIGHT = 20.0
 """Replicates that the theory, a spread of one, counts for."""
-
-_LONGEST_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,11 +138,10 @@ def replicate(
         clock_s=(float(samples.k[0]) * samples.dt_s, 1.0),
     )
     # Whoever is there at a sample takes the next simulated agent, and keeps it.
-    whose = np.concatenate([_assign(present[:, ~robots], n_fish)])
     made = np.full_like(samples.xy_m, np.nan)
-    for group, first in ((~robots, 0), (robots, n_fish)):
+    for group, first, n in ((~robots, 0, n_fish), (robots, n_fish, n_robots)):
         columns = np.flatnonzero(group)
-        whose = _assign(present[:, columns], max(1, n_robots if first else n_fish))
+        whose = _assign(present[:, columns], max(1, n))
         for column, agent in zip(columns, whose, strict=True):
             rows = present[:, column]
             made[rows, column] = xy[rows, first + agent]
@@ -213,20 +211,22 @@ class Chain:
         return Screen(scene=scene, fitted=again)
 
 
-Ask = Callable[[Screen], Floats]
-
-
 def run_null(
-    chain: Chain, ask: Ask, n: int, *, n_workers: int, done: Callable[[int], None] | None = None
-) -> Floats:
-    """Return the statistics of replicates, shape (replicate, statistic).
+    chain: Chain,
+    ask: Callable[[int, Screen], T],
+    n: int,
+    *,
+    n_workers: int,
+    done: Callable[[int], None] = lambda _n: None,
+) -> list[T]:
+    """Return what is asked of each replicate, in their order.
 
     Parameters
     ----------
     chain
         From the fitted model to scores.
     ask
-        What is asked of each replicate.
+        Of a replicate: its number and its screen.
     n
         How many.
     n_workers
@@ -234,26 +234,16 @@ def run_null(
     done
         Told how many are done.
     """
-    rows: list[Floats] = []
+    rows: list[T] = []
 
-    def work(number: int) -> Floats:
-        return ask(chain.screen(number))
+    def work(number: int) -> T:
+        return ask(number, chain.screen(number))
 
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         for row in pool.map(work, range(n)):
             rows.append(row)
-            if done is not None:
-                done(len(rows))
-    return np.array(rows)
-
-
-def scores_of(candidates: Sequence[Candidate]) -> Ask:
-    """Return what asks a screen for the z of candidates."""
-
-    def ask(screen: Screen) -> Floats:
-        return np.array([screen.ask(candidate).z for candidate in candidates])
-
-    return ask
+            done(len(rows))
+    return rows
 
 
 def check_length(samples: Samples, scene: Scene, least_steps: int) -> None:

@@ -158,6 +158,11 @@ class Screen:
             psi[turns.rows] -= basis @ (basis.T @ psi[turns.rows])
         return zones, _basis(psi)
 
+    @property
+    def probability(self) -> Floats:
+        """Probability of each cell of headings, shape (turn, cell)."""
+        return self._tables.probability
+
     def project(self, scores: Floats) -> Floats:
         """Return scores of turns less what the model's own parameters could explain."""
         rest = np.where(self.fitted.used, scores, 0.0)

@@ -1,0 +1,129 @@
+"""Whether what was found holds on steps that it was not fitted to.
+
+Blocks of 60 s alternate between two halves. Both models are fitted to one half and
+judged on the other, and the other way round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.findings import Note
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import Step
+from zfcal.model.extended import MIN_STEPS, Fitted, maximise
+from zfcal.model.scene import Moves, Scene, thin
+
+Floats = NDArray[np.float64]
+
+BLOCK_S = 60.0
+_ROUNDS = 6
+_SURE = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Confirmed:
+    """What an effect gains on steps that were held out.
+
+    Parameters
+    ----------
+    gain_nats_per_step, gain_se
+        Mean over all steps of the log density with it less that without it, and the
+        standard error of that mean.
+    holds
+        Whether the gain is more than two standard errors.
+    """
+
+    gain_nats_per_step: float
+    gain_se: float
+    holds: bool
+
+
+def half_of(scene: Scene, steps: Moves, which: int) -> NDArray[np.bool_]:
+    """Return the steps in every other block of 60 s, shape (step,)."""
+    block = np.floor(scene.time_s(steps) / min(BLOCK_S, scene.duration_s / 4)).astype(np.int64)
+    return np.asarray(block % 2 == which)
+
+
+def halves(scene: Scene) -> tuple[Scene, Scene]:
+    """Return the same states with the steps of each half."""
+    first, second = (
+        thin(scene, half_of(scene, scene.turns, which), half_of(scene, scene.moves, which))
+        for which in (0, 1)
+    )
+    return first, second
+
+
+def confirm(step: Step) -> Confirmed:
+    """Return what an effect gains on held-out steps.
+
+    Parameters
+    ----------
+    step
+        The effect, and the model without it.
+    """
+    best = step.choice.best
+    if best.candidate.effect.on_speed:
+        return _in_time(best.gain, len(best.screen.scene.moves))
+    before = _held_out(step.before.scene, step.before.fitted)
+    after = _held_out(best.screen.scene, best.screen.fitted)
+    gain = after - before
+    gain = gain[~np.isnan(gain)]
+    return _summary(gain)
+
+
+def _held_out(scene: Scene, fitted: Fitted) -> Floats:
+    """Return log densities of all turns, each under the fit to the other half."""
+    parts = halves(scene)
+    log_p = np.full(len(scene.turns), np.nan)
+    for which, (own, other) in enumerate((parts, parts[::-1])):
+        learnt = maximise(
+            other, fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS
+        )
+        judged = maximise(own, learnt.parameters, start=learnt.x, rounds=0)
+        log_p[half_of(scene, scene.turns, which)] = judged.log_p
+    return log_p
+
+
+def _summary(gain: Floats) -> Confirmed:
+    n = max(len(gain), 1)
+    mean, error = float(gain.sum() / n), float(gain.std() / np.sqrt(n))
+    return Confirmed(gain_nats_per_step=mean, gain_se=error, holds=mean > _SURE * error)
+
+
+def _in_time(gain: Floats, n_steps: int) -> Confirmed:
+    """Return the gain of an effect on speed, whose one strength was fitted to all steps."""
+    n = max(n_steps, 1)
+    mean = float(gain.sum() - 1.0) / n
+    error = float(gain.std() * np.sqrt(len(gain))) / n
+    return Confirmed(gain_nats_per_step=mean, gain_se=error, holds=mean > _SURE * error)
+
+
+def halves_note(screen: Screen) -> Note:
+    """Return how far the fits of the two halves differ, in standard errors."""
+    fitted = screen.fitted
+    differences = []
+    fits = [
+        maximise(part, fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS)
+        for part in halves(screen.scene)
+    ]
+    for zone, turns in enumerate(fitted.turns):
+        if len(turns.rows) < 4 * MIN_STEPS:
+            continue
+        by = fits[0].x[zone][:3] - fits[1].x[zone][:3]
+        variances = [_variance(fit.scores[zone]) for fit in fits]
+        differences.append(np.abs(by) / np.sqrt(variances[0] + variances[1]))
+    largest = float(np.max(differences)) if differences else 0.0
+    return Note(
+        name="halves",
+        says="Largest difference between the fits of the two halves, in standard errors.",
+        values={"largest": largest},
+    )
+
+
+def _variance(scores: Floats) -> Floats:
+    information = scores.T @ scores
+    return np.asarray(np.diag(np.linalg.pinv(information))[:3])

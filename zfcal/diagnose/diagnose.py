@@ -1,0 +1,335 @@
+"""From a question to a diagnosis: fit, null, screen, selection, places, verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.candidates import Candidate, askable, candidates_of
+from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
+from zfcal.diagnose.controls import NAMES, ask_controls
+from zfcal.diagnose.findings import (
+    Diagnosis,
+    EffectFound,
+    Located,
+    Note,
+    Screened,
+    Verdict,
+)
+from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
+from zfcal.diagnose.null import (
+    Chain,
+    Measurement,
+    Null,
+    check_length,
+    from_replicates,
+    run_null,
+    theory,
+)
+from zfcal.diagnose.omnibus import Omnibus, judge, statistics
+from zfcal.diagnose.question import Question, Tell
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import LEVEL, Asked, Best, Selection, Selector, Step
+from zfcal.diagnose.telling import says
+from zfcal.diagnose.tracing import trace
+from zfcal.model.effects import find_effect
+from zfcal.model.effects.generic import generic_effects
+from zfcal.model.extended import Free, maximise
+from zfcal.model.scene import Scene, make_scene
+from zfcal.parameters import Parameters
+
+Floats = NDArray[np.float64]
+
+LEAST_STEPS = 200
+"""Fewer steps with a heading tell nothing of twenty-one parameters."""
+
+_GENERIC_REPLICATES = 13
+_NOTICED = 5.0
+"""Standard errors at which an effect of notable strength must stand to be testable."""
+
+_UNEXPLAINED = 1e-3
+_CONTROL = 4.5
+_ASSUMED_NOISE_M = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Row:
+    """What one replicate says, or the measured tracks themselves."""
+
+    listed: Floats
+    generic: Floats | None
+    controls: Floats
+    residuals: Residuals
+    omnibus: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Case:
+    """A question, its scene, the fitted model, and the families that are asked for."""
+
+    question: Question
+    scene: Scene
+    screen: Screen
+    listed: tuple[Candidate, ...]
+    generic: tuple[Candidate, ...]
+    lacks: dict[str, str]
+
+    def row(self, number: int, screen: Screen) -> _Row:
+        """Return what a screen says; the generic family is asked of the first ones alone."""
+        generic = None
+        if number < _GENERIC_REPLICATES:
+            generic = np.array([screen.ask(each).z for each in self.generic])
+        probability = screen.probability
+        rng = np.random.default_rng([self.question.seed, 5, number + 1])
+        return _Row(
+            listed=np.array([screen.ask(each).z for each in self.listed]),
+            generic=generic,
+            controls=ask_controls(screen, self.question.seed),
+            residuals=residuals(screen.scene, screen.fitted, table=probability),
+            omnibus=statistics(screen.scene, screen.fitted, rng, table=probability),
+        )
+
+
+def diagnose(question: Question, tell: Tell) -> Diagnosis:
+    """Return where a model and measured tracks disagree, and which effects are missing.
+
+    Parameters
+    ----------
+    question
+        Model, tracks, and how sure the answer is to be.
+    tell
+        Hears how far it is.
+
+    Raises
+    ------
+    InputError
+        There are no fish, or too few of their steps have a heading.
+    """
+    tell("fitting", 0, 1)
+    case = _open(question)
+    tell("fitting", 1, 1)
+    rows = _null_rows(case, tell)
+    selector = Selector(
+        listed=_asked(case.listed, [row.listed for row in rows]),
+        generic=_asked(case.generic, [row.generic for row in rows if row.generic is not None]),
+        n_workers=question.n_workers,
+        told=tell,
+    )
+    selection = selector.select(case.screen)
+    confirmed = [confirm(step) for step in selection.steps]
+    kept = _kept(selection.steps, confirmed)
+    omnibus = _omnibus(case, selection.final if kept else case.screen, rows)
+    return _diagnosis(case, rows, selection, (kept, confirmed[: len(kept)]), omnibus)
+
+
+def _open(question: Question) -> _Case:
+    model = dataclasses.replace(
+        question.model,
+        zones=tuple(dataclasses.replace(zone, kappa_w=None) for zone in question.model.zones),
+    )
+    scene = make_scene(question.samples, question.arena)
+    check_length(question.samples, scene, LEAST_STEPS)
+    fitted = maximise(scene, model, free=free_of_model(model))
+    effects, lacks = askable(scene, model)
+    own = tuple(model.effects)
+    return _Case(
+        question=question,
+        scene=scene,
+        screen=Screen(scene=scene, fitted=fitted),
+        listed=candidates_of(effects, question.arena, without=own),
+        generic=candidates_of(_generic(scene), question.arena, without=own),
+        lacks=lacks,
+    )
+
+
+def free_of_model(model: Parameters) -> Free:
+    """Return the parameters of a model's effects on heading that a fit moves."""
+    return tuple(
+        (name, key)
+        for name in model.effects
+        for effect in (find_effect(name),)
+        if not effect.on_speed
+        for key in effect.names
+        if key not in effect.fixed and key in model.effects[name]
+    )
+
+
+def _generic(scene: Scene):  # type: ignore[no-untyped-def]  # noqa: ANN202
+    from zfcal.diagnose.candidates import company_of
+
+    company = company_of(scene)
+    return tuple(effect for effect in generic_effects() if effect.lacks(company) is None)
+
+
+def _null_rows(case: _Case, tell: Tell) -> list[_Row]:
+    question = case.question
+    if question.quick:
+        return []
+    chain = Chain(
+        samples=question.samples,
+        arena=question.arena,
+        fitted=case.screen.fitted,
+        measurement=Measurement(noise_m=_noise(question)),
+        seed=question.seed,
+    )
+    n = question.n_null
+    return run_null(
+        chain,
+        case.row,
+        n,
+        n_workers=question.n_workers,
+        done=lambda done: tell("null replicates", done, n),
+    )
+
+
+def _noise(question: Question) -> float:
+    return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
+
+
+def _asked(candidates: tuple[Candidate, ...], rows: Sequence[Floats]) -> Asked:
+    null: Null = from_replicates(np.array(rows)) if len(rows) > 2 else theory(len(candidates))
+    return Asked(candidates=candidates, null=null)
+
+
+def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, ...]:
+    """Return the effects up to the first that held-out steps do not bear out."""
+    kept = []
+    for step, told in zip(steps, confirmed, strict=True):
+        if not told.holds:
+            break
+        kept.append(step)
+    return tuple(kept)
+
+
+def _omnibus(case: _Case, screen: Screen, rows: Sequence[_Row]) -> Omnibus:
+    rng = np.random.default_rng([case.question.seed, 5, 0])
+    own = statistics(screen.scene, screen.fitted, rng, table=screen.probability)
+    return judge(own, [row.omnibus for row in rows])
+
+
+def _diagnosis(
+    case: _Case,
+    rows: Sequence[_Row],
+    selection: Selection,
+    kept: tuple[tuple[Step, ...], Sequence[Confirmed]],
+    omnibus: Omnibus,
+) -> Diagnosis:
+    steps, confirmed = kept
+    effects = tuple(_effect(step, held) for step, held in zip(steps, confirmed, strict=True))
+    final = steps[-1].choice.best.screen if steps else case.screen
+    screened = _screened(case, selection.screened)
+    return Diagnosis(
+        verdict=_verdict(effects, screened, omnibus),
+        where=_where(case, rows),
+        effects=effects,
+        screened=screened,
+        notes=_notes(case, rows, final, omnibus),
+        base=case.screen.fitted.parameters,
+        extended=final.fitted.parameters,
+        minutes=case.scene.duration_s / 60,
+        n_steps=len(case.scene.turns),
+    )
+
+
+def _effect(step: Step, held: Confirmed) -> EffectFound:
+    best = step.choice.best
+    return EffectFound(
+        name=best.name,
+        says=says(best.candidate, best.values, best.interval),
+        strength=best.values,
+        interval=best.interval,
+        gain_nats_per_step=held.gain_nats_per_step,
+        gain_se=held.gain_se,
+        p=step.best.p,
+        ties=tuple(tie.name for tie in step.choice.ties),
+        trace=trace(step.best.score, step.before, best),
+    )
+
+
+def _verdict(
+    effects: tuple[EffectFound, ...], screened: tuple[Screened, ...], omnibus: Omnibus
+) -> Verdict:
+    if effects:
+        return Verdict.TIE if effects[0].ties else Verdict.NAMED
+    if omnibus.p < _UNEXPLAINED:
+        return Verdict.UNEXPLAINED
+    asked = [each for each in screened if each.lacks is None]
+    blind = [each for each in asked if each.minutes_needed is not None]
+    return Verdict.UNTESTABLE if 2 * len(blind) > len(asked) else Verdict.NO_EFFECT
+
+
+def _screened(case: _Case, ranked: Sequence[Best]) -> tuple[Screened, ...]:
+    minutes = case.scene.duration_s / 60
+    made = [_as_screened(best, minutes) for best in ranked]
+    made += [
+        Screened(name=name, z=math.nan, p=1.0, minutes_needed=None, lacks=what)
+        for name, what in case.lacks.items()
+    ]
+    return tuple(made)
+
+
+def _as_screened(best: Best, minutes: float) -> Screened:
+    candidate, score = best.score.candidate, best.score
+    expected = abs(candidate.notable) * math.sqrt(max(score.information, 0.0))
+    needed = minutes * (_NOTICED / max(expected, 1e-3)) ** 2
+    enough = expected >= _NOTICED or best.p < LEVEL
+    return Screened(
+        name=candidate.name,
+        z=best.z,
+        p=best.p,
+        minutes_needed=None if enough else needed,
+        shape=candidate.shape,
+    )
+
+
+def _where(case: _Case, rows: Sequence[_Row]) -> tuple[Located, ...]:
+    screen = case.screen
+    own = residuals(screen.scene, screen.fitted, table=screen.probability)
+    if not rows:
+        return located(own)
+    return located(own, *centre_and_spread(own, [row.residuals for row in rows]))
+
+
+def _notes(case: _Case, rows: Sequence[_Row], final: Screen, omnibus: Omnibus) -> tuple[Note, ...]:
+    return (
+        _noise_note(case.question),
+        halves_note(case.screen),
+        _controls_note(case, rows, final),
+        Note(
+            name="omnibus",
+            says=f"Ranks of headings and speeds in the final model: largest is {omnibus.worst}.",
+            values={"z": omnibus.z, "p": omnibus.p},
+        ),
+        Note(
+            name="null",
+            says="Replicates of the fitted model through the measurement."
+            if rows
+            else "The theory alone: tracking noise can pose as a turning memory.",
+            values={"replicates": float(len(rows))},
+        ),
+    )
+
+
+def _noise_note(question: Question) -> Note:
+    if question.noise_m is None:
+        text = "The noise of positions is not known; none was assumed."
+        return Note(name="noise", says=text, values={})
+    text = f"Positions err by {1000 * question.noise_m:.2g} mm per coordinate"
+    source = question.noise_source
+    return Note(name="noise", says=f"{text} ({source}).", values={"noise_m": question.noise_m})
+
+
+def _controls_note(case: _Case, rows: Sequence[_Row], final: Screen) -> Note:
+    z = ask_controls(final, case.question.seed)
+    null = from_replicates(np.array([row.controls for row in rows])) if rows else theory(len(z))
+    own = null.standardised(z)
+    fired = [name for name, value in zip(NAMES, own, strict=True) if abs(value) > _CONTROL]
+    text = "Negative controls are silent, as they must be."
+    if fired:
+        text = f"NEGATIVE CONTROL FIRES: {', '.join(fired)}. Do not trust this diagnosis."
+    return Note(name="controls", says=text, values=dict(zip(NAMES, map(float, own), strict=True)))

@@ -1,0 +1,277 @@
+r"""Whether a model and measured tracks disagree at all, in whatever way.
+
+Ranks of headings and speeds (`ranks`) are uniform and independent of all that came before
+when the model is right. Asked are:
+
+* uniformity, over all steps and in each bin of each context: with scores :math:`p_k` of
+  mean 0 and variance 1, :math:`\sum_b \sum_k (\sum_{s \in b} p_k)^2 / n_b` is a chi-square;
+* serial correlation: products of an agent's score with its own one to five steps before,
+  and with its nearest neighbour's at the same step and one to five before;
+* bursts: correlation of all agents' scores within 1, 3, 10 and 30 s;
+* pulses at regular times: the periodogram of the scores' sum over agents, summed over
+  harmonics of a fundamental (de Jager et al. 1989, Astronomy and Astrophysics 221: 180-190),
+  the largest of all fundamentals.
+
+Each is turned into a standard normal number z that is large where the model is wrong, and
+the largest of all counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, ndtr, ndtri
+from scipy.stats import t as student
+
+from zfcal.diagnose.battery import speed_factor
+from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
+from zfcal.diagnose.contexts import contexts, speed_context
+from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
+from zfcal.diagnose.rare import rare_statistics, run_statistics
+from zfcal.diagnose.surroundings import probabilities, surroundings
+from zfcal.model.extended import Fitted
+from zfcal.model.scene import Moves, Scene
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LAGS = 5
+_BINS = 20
+_BURSTS_S = (1.0, 3.0, 10.0, 30.0)
+_HARMONICS = (1, 5, 20)
+_SHORTEST_PERIOD_S = 5.0
+_LEAST_PULSES = 4
+_PRIOR_WEIGHT = 10.0
+_Z_MAX = 37.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Omnibus:
+    """Whether a model and measured tracks disagree.
+
+    Parameters
+    ----------
+    p
+        Probability of a largest statistic like this when the model is right, by
+        Bonferroni's inequality.
+    worst
+        The statistic that is largest.
+    z
+        Its value, in standard deviations of the null.
+    statistics
+        All of them, likewise.
+    """
+
+    p: float
+    worst: str
+    z: float
+    statistics: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Scores:
+    """Scores of one order of ranks, and which steps they belong to."""
+
+    name: str
+    steps: Moves
+    values: Floats
+    near: Ints
+    contexts: Mapping[str, Ints]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        return np.asarray(np.isfinite(self.values[:, 0]))
+
+
+def statistics(
+    scene: Scene, fitted: Fitted, rng: np.random.Generator, *, table: Floats | None = None
+) -> dict[str, float]:
+    """Return the statistics of the omnibus test by name, each standard normal in the null.
+
+    Parameters
+    ----------
+    scene
+        Where everybody was.
+    fitted
+        The model that is doubted, at its maximum likelihood on the scene.
+    rng
+        For the ranks within a cell of headings.
+    table : ndarray, shape (turn, cell)
+        The second table of ``fitted.tables()``, where it is at hand.
+    """
+    made: dict[str, float] = {}
+    probability = probabilities(fitted, table)
+    for scores in _scored(scene, fitted, rng, probability):
+        if scores.known.sum() < LEAST_IN_BIN:
+            continue
+        if scores.steps is scene.turns:
+            made[f"{scores.name}: uniformity"] = _uniformity(scores)
+        for name, bins in scores.contexts.items():
+            made[f"{scores.name} by {name}"] = by_context(scores.values, bins)
+        made |= dict(_serial(scores, scene))
+        made |= dict(_in_time(scores, scene))
+    made |= rare_statistics(scene, fitted, probability)
+    made |= run_statistics(scene, fitted, rng)
+    return {name: z for name, z in made.items() if math.isfinite(z)}
+
+
+def _scored(
+    scene: Scene, fitted: Fitted, rng: np.random.Generator, probability: Floats
+) -> Iterator[_Scores]:
+    turns, moves = scene.turns, scene.moves
+    about = surroundings(scene, turns)
+    sorted_by = contexts(scene, turns, about)
+    sorted_by["own speed"] = speed_context(turns.speed_m_s)
+    for name, ranks in heading_ranks(turns, about, probability, rng).items():
+        values = scores_of(np.where(fitted.used, ranks, np.nan))
+        yield _Scores(name=name, steps=turns, values=values, near=about.near, contexts=sorted_by)
+    about = surroundings(scene, moves)
+    sorted_by = contexts(scene, moves, about)
+    # Speeds are ranked within their zones: that says nothing.
+    del sorted_by["zone"]
+    ranks = speed_ranks(moves, speed_factor(scene, fitted), rng)
+    yield _Scores(
+        name="speed", steps=moves, values=scores_of(ranks), near=about.near, contexts=sorted_by
+    )
+
+
+def _uniformity(scores: _Scores) -> float:
+    ranks = scores.values[scores.known, 0] / math.sqrt(3.0) / 2 + 0.5
+    count = np.bincount(np.minimum(ranks * _BINS, _BINS - 1).astype(np.int64), minlength=_BINS)
+    expected = len(ranks) / _BINS
+    return normal_of(float(((count - expected) ** 2).sum() / expected), _BINS - 1)
+
+
+def _serial(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
+    """Yield correlations with former scores of one's own and of the nearest neighbour."""
+    rows = np.full((len(scene.k) + LAGS, scene.states.shape[2]), -1, dtype=np.int64)
+    steps = scores.steps
+    rows[steps.at + LAGS, steps.who] = np.arange(len(steps))
+    track, near = steps.track, np.maximum(scores.near, 0)
+    for lag in range(1, LAGS + 1):
+        before = rows[steps.at + LAGS - lag, steps.who]
+        before = np.where(track[before] == track, before, -1)
+        yield f"{scores.name}, own {lag} before", _products(scores.values, before)
+    for lag in range(LAGS + 1):
+        other = np.where(scores.near >= 0, rows[steps.at + LAGS - lag, near], -1)
+        if lag == 0:
+            # Two that are each other's nearest count once.
+            mutual = (other >= 0) & (near[other] == steps.who) & (near > steps.who)
+            other = np.where(mutual, -1, other)
+        yield f"{scores.name}, nearest neighbour's {lag} before", _products(scores.values, other)
+
+
+def _products(values: Floats, other: Ints) -> float:
+    rows = other >= 0
+    product = values[rows] * values[other[rows]]
+    product = product[np.isfinite(product[:, 0])]
+    if len(product) < LEAST_IN_BIN:
+        return math.nan
+    chi2 = (product.sum(axis=0) ** 2).sum() / len(product)
+    return normal_of(float(chi2), product.shape[1])
+
+
+def _in_time(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
+    known = scores.known
+    at, n = scores.steps.at[known], len(scene.k)
+    columns = scores.values[known].T
+    sums = _summed(at, columns, n)
+    squares = _summed(at, columns**2, n)
+    for length_s in _BURSTS_S:
+        per = max(1, round(length_s / scene.dt_s))
+        yield f"{scores.name}: bursts of {length_s:g} s", _burst(sums, squares, per)
+    yield f"{scores.name}: pulses", _pulses(sums, scene.dt_s)
+
+
+def _summed(at: Ints, columns: Floats, n: int) -> Floats:
+    made = np.zeros((len(columns), n))
+    for row, column in enumerate(columns):
+        made[row] = np.bincount(at, column, n)
+    return made
+
+
+def _burst(sums: Floats, squares: Floats, per: int) -> float:
+    """Return how far scores of one stretch of time go together: their sum over pairs."""
+    starts = np.arange(0, sums.shape[1], per)
+    whole = np.add.reduceat(sums, starts, axis=1) ** 2
+    own = np.add.reduceat(squares, starts, axis=1)
+    pairs = whole - own
+    # Every pair's product has mean 0 and variance 1, whatever the others'.
+    spread = np.sqrt((pairs**2).sum(axis=1))
+    if not (spread > 0).all():
+        return math.nan
+    return float((pairs.sum(axis=1) / spread).sum() / math.sqrt(DEGREES))
+
+
+def _pulses(sums: Floats, dt_s: float) -> float:
+    """Return the largest sum of a periodogram over harmonics, as a normal number.
+
+    The grid of fundamentals is as fine as the highest harmonic needs.
+    """
+    n = sums.shape[1]
+    power = np.abs(np.fft.rfft(sums, axis=1)) ** 2 / (sums**2).sum(axis=1, keepdims=True) * 2
+    duration_s = n * dt_s
+    best = math.inf
+    for harmonics in _HARMONICS:
+        high = min(duration_s / _SHORTEST_PERIOD_S, (power.shape[1] - 1) / harmonics)
+        fundamental = np.arange(_LEAST_PULSES, high, 1 / harmonics)
+        if not fundamental.size:
+            continue
+        at = np.rint(fundamental[:, None] * np.arange(1, harmonics + 1)).astype(np.int64)
+        whole = power[:, at].sum(axis=(0, 2))
+        df = 2 * harmonics * sums.shape[0]
+        best = min(best, float(chdtrc(df, whole.max())) * fundamental.size)
+    best *= len(_HARMONICS)
+    return -float(ndtri(min(best, 1 - 1e-9))) if best > 0 else _Z_MAX
+
+
+def _tail(z: float) -> float:
+    return float(ndtr(-z))
+
+
+def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = ()) -> Omnibus:
+    """Return what the statistics come to.
+
+    Parameters
+    ----------
+    measured
+        From `statistics`.
+    nulls
+        Likewise, of simulations of the fitted model through the same measurement; without
+        them the analytic null counts.
+    """
+    n = len(nulls)
+    made: dict[str, float] = {}
+    tails: dict[str, float] = {}
+    for name, z in measured.items():
+        drawn = np.array([null[name] for null in nulls if name in null])
+        centre = float(drawn.mean()) if drawn.size else 0.0
+        squares = float(((drawn - centre) ** 2).sum())
+        df = max(drawn.size - 1, 0) + _PRIOR_WEIGHT
+        spread = math.sqrt((squares + _PRIOR_WEIGHT) / df * (1 + 1 / max(drawn.size, 1)))
+        made[name] = (z - centre) / spread if n else z
+        tails[name] = float(student.sf(made[name], df)) if n else _tail(z)
+    if not made:
+        return Omnibus(p=1.0, worst="", z=math.nan)
+    worst = min(tails, key=lambda name: tails[name])
+    p = min(1.0, tails[worst] * len(tails))
+    return Omnibus(p=p, worst=worst, z=made[worst], statistics=made)
+
+
+def omnibus(scene: Scene, fitted: Fitted, *, rng: np.random.Generator) -> Omnibus:
+    """Return whether model and data disagree at all, by the model's own law.
+
+    Parameters
+    ----------
+    scene
+        Where everybody was.
+    fitted
+        The model that is doubted, at its maximum likelihood on the scene.
+    rng
+        For the ranks within a cell of headings.
+    """
+    return judge(statistics(scene, fitted, rng))
