@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.diagnose.candidates import Candidate, askable, candidates_of
+from zfcal.diagnose.candidates import Candidate, askable, candidates_of, company_of
 from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
 from zfcal.diagnose.controls import NAMES, ask_controls
 from zfcal.diagnose.findings import (
@@ -33,11 +33,21 @@ from zfcal.diagnose.null import (
 )
 from zfcal.diagnose.omnibus import Omnibus, judge, statistics
 from zfcal.diagnose.question import Question, Tell
-from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import LEVEL, Asked, Best, Selection, Selector, Step
+from zfcal.diagnose.screening import Score, Screen, ask_all
+from zfcal.diagnose.selection import (
+    LEVEL,
+    RIVAL_Z,
+    RIVALS,
+    Asked,
+    Best,
+    Selection,
+    Selector,
+    Step,
+    best_of,
+)
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.tracing import trace
-from zfcal.model.effects import find_effect
+from zfcal.model.effects import Effect, find_effect
 from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import Free, maximise
 from zfcal.model.scene import Scene, make_scene
@@ -48,7 +58,10 @@ Floats = NDArray[np.float64]
 LEAST_STEPS = 200
 """Fewer steps with a heading tell nothing of twenty-one parameters."""
 
-_GENERIC_REPLICATES = 13
+_GENERIC_REPLICATES = 8
+_AT_LARGE_REPLICATES = 20
+"""Replicates that are asked in general as well: where, and whether at all."""
+
 _NOTICED = 5.0
 """Standard errors at which an effect of notable strength must stand to be testable."""
 
@@ -62,10 +75,8 @@ class _Row:
     """What one replicate says, or the measured tracks themselves."""
 
     listed: Floats
-    generic: Floats | None
     controls: Floats
-    residuals: Residuals
-    omnibus: dict[str, float]
+    at_large: tuple[Residuals, dict[str, float]] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,19 +90,20 @@ class _Case:
     generic: tuple[Candidate, ...]
     lacks: dict[str, str]
 
-    def row(self, number: int, screen: Screen) -> _Row:
-        """Return what a screen says; the generic family is asked of the first ones alone."""
-        generic = None
-        if number < _GENERIC_REPLICATES:
-            generic = np.array([screen.ask(each).z for each in self.generic])
-        probability = screen.probability
-        rng = np.random.default_rng([self.question.seed, 5, number + 1])
-        return _Row(
-            listed=np.array([screen.ask(each).z for each in self.listed]),
-            generic=generic,
-            controls=ask_controls(screen, self.question.seed),
-            residuals=residuals(screen.scene, screen.fitted, table=probability),
-            omnibus=statistics(screen.scene, screen.fitted, rng, table=probability),
+    def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
+        """Return the located residuals and the omnibus statistics of a screen."""
+        rng = np.random.default_rng([self.question.seed, 5, number])
+        scene, fitted, table = screen.scene, screen.fitted, screen.probability
+        return residuals(scene, fitted, table=table), statistics(scene, fitted, rng, table=table)
+
+    def chain(self) -> Chain:
+        """Return what makes replicates of the fitted model."""
+        return Chain(
+            samples=self.question.samples,
+            arena=self.question.arena,
+            fitted=self.screen.fitted,
+            measurement=Measurement(noise_m=_noise(self.question)),
+            seed=self.question.seed,
         )
 
 
@@ -113,18 +125,87 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     tell("fitting", 0, 1)
     case = _open(question)
     tell("fitting", 1, 1)
-    rows = _null_rows(case, tell)
+    scores = ask_all(case.screen, case.listed, question.n_workers)
+    asked = _best_shapes(scores)
+    rows = _null_rows(case, asked, tell)
+    names = tuple(each.name for each in asked)
+    own = case.at_large(0, case.screen)
+    omnibus = judge(own[1], [row.at_large[1] for row in rows if row.at_large])
     selector = Selector(
-        listed=_asked(case.listed, [row.listed for row in rows]),
-        generic=_asked(case.generic, [row.generic for row in rows if row.generic is not None]),
+        listed=Asked(candidates=case.listed, names=names, null=_null([r.listed for r in rows])),
+        rivals=lambda screen: _rivals(case, screen),
+        suspicious=omnibus.p < _UNEXPLAINED,
         n_workers=question.n_workers,
         told=tell,
     )
-    selection = selector.select(case.screen)
+    selection = selector.select(case.screen, scores)
     confirmed = [confirm(step) for step in selection.steps]
     kept = _kept(selection.steps, confirmed)
-    omnibus = _omnibus(case, selection.final if kept else case.screen, rows)
-    return _diagnosis(case, rows, selection, (kept, confirmed[: len(kept)]), omnibus)
+    if kept:
+        final = case.at_large(0, kept[-1].choice.best.screen)
+        omnibus = judge(final[1], [row.at_large[1] for row in rows if row.at_large])
+    where = _where(own[0], rows)
+    return _diagnosis(case, rows, selection, (kept, confirmed[: len(kept)]), (where, omnibus))
+
+
+def _best_shapes(scores: Sequence[Score]) -> tuple[Candidate, ...]:
+    """Return each effect at the shape that the recording asks for most."""
+    best: dict[str, tuple[float, Candidate]] = {}
+    for score in scores:
+        z = abs(score.z) if score.candidate.signed else score.z
+        if score.candidate.name not in best or z > best[score.candidate.name][0]:
+            best[score.candidate.name] = (z, score.candidate)
+    return tuple(candidate for _, candidate in best.values())
+
+
+def _null_rows(case: _Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row]:
+    question = case.question
+    if question.quick:
+        return []
+
+    def ask(number: int, screen: Screen) -> _Row:
+        at_large = case.at_large(number + 1, screen) if number < _AT_LARGE_REPLICATES else None
+        return _Row(
+            listed=np.array([screen.ask(each).z for each in asked]),
+            controls=ask_controls(screen, question.seed),
+            at_large=at_large,
+        )
+
+    n = question.n_null
+    return run_null(
+        case.chain(),
+        ask,
+        n,
+        n_workers=question.n_workers,
+        done=lambda done: tell("null replicates", done, n),
+    )
+
+
+def _noise(question: Question) -> float:
+    return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
+
+
+def _null(rows: Sequence[Floats]) -> Null:
+    return from_replicates(np.array(rows)) if len(rows) > 2 else theory(0)
+
+
+def _rivals(case: _Case, screen: Screen) -> list[Best]:
+    """Return what beyond the list a model is asked for, held against a few replicates."""
+    question = case.question
+    alone = Asked(candidates=case.generic, names=(), null=theory(0))
+    found = best_of(alone, ask_all(screen, case.generic, question.n_workers))
+    found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
+    if question.quick or not found:
+        return found
+    asked = tuple(best.score.candidate for best in found)
+
+    def ask(_number: int, other: Screen) -> Floats:
+        return np.array([other.ask(each).z for each in asked])
+
+    rows = run_null(case.chain(), ask, _GENERIC_REPLICATES, n_workers=question.n_workers)
+    names = tuple(each.name for each in asked)
+    family = Asked(candidates=case.generic, names=names, null=_null(rows))
+    return best_of(family, [best.score for best in found])
 
 
 def _open(question: Question) -> _Case:
@@ -159,41 +240,9 @@ def free_of_model(model: Parameters) -> Free:
     )
 
 
-def _generic(scene: Scene):  # type: ignore[no-untyped-def]  # noqa: ANN202
-    from zfcal.diagnose.candidates import company_of
-
+def _generic(scene: Scene) -> tuple[Effect, ...]:
     company = company_of(scene)
     return tuple(effect for effect in generic_effects() if effect.lacks(company) is None)
-
-
-def _null_rows(case: _Case, tell: Tell) -> list[_Row]:
-    question = case.question
-    if question.quick:
-        return []
-    chain = Chain(
-        samples=question.samples,
-        arena=question.arena,
-        fitted=case.screen.fitted,
-        measurement=Measurement(noise_m=_noise(question)),
-        seed=question.seed,
-    )
-    n = question.n_null
-    return run_null(
-        chain,
-        case.row,
-        n,
-        n_workers=question.n_workers,
-        done=lambda done: tell("null replicates", done, n),
-    )
-
-
-def _noise(question: Question) -> float:
-    return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
-
-
-def _asked(candidates: tuple[Candidate, ...], rows: Sequence[Floats]) -> Asked:
-    null: Null = from_replicates(np.array(rows)) if len(rows) > 2 else theory(len(candidates))
-    return Asked(candidates=candidates, null=null)
 
 
 def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, ...]:
@@ -206,26 +255,20 @@ def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, 
     return tuple(kept)
 
 
-def _omnibus(case: _Case, screen: Screen, rows: Sequence[_Row]) -> Omnibus:
-    rng = np.random.default_rng([case.question.seed, 5, 0])
-    own = statistics(screen.scene, screen.fitted, rng, table=screen.probability)
-    return judge(own, [row.omnibus for row in rows])
-
-
 def _diagnosis(
     case: _Case,
     rows: Sequence[_Row],
     selection: Selection,
     kept: tuple[tuple[Step, ...], Sequence[Confirmed]],
-    omnibus: Omnibus,
+    at_large: tuple[tuple[Located, ...], Omnibus],
 ) -> Diagnosis:
-    steps, confirmed = kept
+    (steps, confirmed), (where, omnibus) = kept, at_large
     effects = tuple(_effect(step, held) for step, held in zip(steps, confirmed, strict=True))
     final = steps[-1].choice.best.screen if steps else case.screen
     screened = _screened(case, selection.screened)
     return Diagnosis(
         verdict=_verdict(effects, screened, omnibus),
-        where=_where(case, rows),
+        where=where,
         effects=effects,
         screened=screened,
         notes=_notes(case, rows, final, omnibus),
@@ -287,12 +330,9 @@ def _as_screened(best: Best, minutes: float) -> Screened:
     )
 
 
-def _where(case: _Case, rows: Sequence[_Row]) -> tuple[Located, ...]:
-    screen = case.screen
-    own = residuals(screen.scene, screen.fitted, table=screen.probability)
-    if not rows:
-        return located(own)
-    return located(own, *centre_and_spread(own, [row.residuals for row in rows]))
+def _where(own: Residuals, rows: Sequence[_Row]) -> tuple[Located, ...]:
+    nulls = [row.at_large[0] for row in rows if row.at_large]
+    return located(own, *centre_and_spread(own, nulls)) if nulls else located(own)
 
 
 def _notes(case: _Case, rows: Sequence[_Row], final: Screen, omnibus: Omnibus) -> tuple[Note, ...]:

@@ -27,7 +27,7 @@ LEVEL = 0.02
 
 _MOST_EFFECTS = 4
 _SUSPECTS = 6
-_RIVALS = 3
+RIVALS = 3
 _LEAST_NATS = 6.0
 _LEAST_SHARE = 0.15
 """A further effect must gain this share of the first one's nats: an effect whose true form
@@ -36,7 +36,8 @@ is a little different from its mechanism leaves something over that others answe
 _STANDS = 3.0
 _RIVAL_AHEAD = 3.0
 _RIVAL_TIMES = 1.25
-_RIVAL_Z = 6.0
+RIVAL_Z = 6.0
+"""An effect beyond the list is named on clearer evidence than a listed one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,16 +48,21 @@ class Asked:
     ----------
     candidates
         Each effect at each shape.
+    names
+        Effects of which the null is known, each at the shape that the recording asks for.
     null
-        Of their z, in their order.
+        Of their z, in the order of the names; the theory for all others.
     """
 
     candidates: tuple[Candidate, ...]
+    names: tuple[str, ...]
     null: Null
 
     def standardised(self, scores: Sequence[Score]) -> Floats:
-        """Return z less its centre over its spread; -inf on the side that cannot be."""
-        z = self.null.standardised(np.array([score.z for score in scores]))
+        """Return z less its centre over its spread; zero on the side that cannot be."""
+        own = [self.centre_of(score.candidate) for score in scores]
+        centre, spread = np.array(own).reshape(-1, 2).T
+        z = (np.array([score.z for score in scores]) - centre) / spread
         one_sided = np.array([not score.candidate.signed for score in scores])
         return np.where(one_sided & (z < 0), 0.0, z)
 
@@ -67,7 +73,9 @@ class Asked:
 
     def centre_of(self, candidate: Candidate) -> tuple[float, float]:
         """Return centre and spread of a candidate's z."""
-        at = self.candidates.index(candidate)
+        if candidate.name not in self.names:
+            return 0.0, 1.0
+        at = self.names.index(candidate.name)
         return float(self.null.centre[at]), float(self.null.spread[at])
 
 
@@ -144,8 +152,13 @@ class Selector:
 
     Parameters
     ----------
-    listed, generic
-        Families of candidates.
+    listed
+        The family of candidates.
+    rivals
+        Effects beyond the list that a model is asked for, the clearest first; they cost
+        time, and are asked where there is something to explain.
+    suspicious
+        Whether something is to be explained even if no listed effect answers.
     n_workers
         Threads.
     told
@@ -153,17 +166,27 @@ class Selector:
     """
 
     listed: Asked
-    generic: Asked
+    rivals: Callable[[Screen], list[Best]]
+    suspicious: bool
     n_workers: int
     told: Told = field(default=lambda _stage, _done, _all: None)
 
-    def select(self, screen: Screen) -> Selection:
-        """Return the effects that a model lacks."""
+    def select(self, screen: Screen, scores: Sequence[Score]) -> Selection:
+        """Return the effects that a model lacks.
+
+        Parameters
+        ----------
+        screen
+            Of the model.
+        scores
+            Of the listed candidates in it.
+        """
         steps: list[Step] = []
-        first: tuple[Best, ...] = ()
+        ranked = best_of(self.listed, scores)
+        first = tuple(ranked)
         for number in range(_MOST_EFFECTS):
-            ranked = self._ranked(self.listed, screen)
-            first = first or tuple(ranked)
+            if number:
+                ranked = self._ranked(self.listed, screen)
             step = self._step(screen, ranked, steps)
             if step is None:
                 break
@@ -179,11 +202,7 @@ class Selector:
         taken = {step.choice.best.name for step in done}
         open_ = [best for best in ranked if best.score.candidate.name not in taken]
         suspects = [best for best in open_ if best.p < LEVEL][:_SUSPECTS]
-        rivals = [
-            best
-            for best in self._ranked(self.generic, screen)
-            if abs(best.z) > _RIVAL_Z and best.score.candidate.name not in taken
-        ][:_RIVALS]
+        rivals = self._rivals(screen, taken) if suspects or self.suspicious else []
         least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
         listed = self._refits(screen, suspects, least)
         generic = self._refits(screen, rivals, least)
@@ -192,6 +211,10 @@ class Selector:
         choice = self._choose(listed, generic)
         by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
         return Step(choice=choice, best=by_name[choice.best.name], before=screen)
+
+    def _rivals(self, screen: Screen, taken: set[str]) -> list[Best]:
+        found = (best for best in self.rivals(screen) if best.score.candidate.name not in taken)
+        return [best for best in found if abs(best.z) > RIVAL_Z][:RIVALS]
 
     def _refits(self, screen: Screen, bests: Sequence[Best], least: float) -> list[Refit]:
         made = [refit(screen, best.score) for best in bests]

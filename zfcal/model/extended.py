@@ -304,19 +304,13 @@ class Fitted:
             size = (len(rows), ANGLES)
             some, share = np.empty(size), np.empty(size)
             tilt = view.tilt[rows] if len(view.tilt) else view.tilt
-            kappas, scales = (own[0], own[1]), constants(own[:2])
+            here = np.empty(len(rows))
             cell_table(
-                turns.base, view.toward[rows], view.angle_sr[rows], turns.share, view.parts[rows],
-                tilt, kappas, scales, own[2], np.exp(x[3:-1]), some, share,
+                turns.base, view.toward[rows], view.angle_sr[rows], turns.taken, turns.share,
+                view.parts[rows], tilt, (own[0], own[1]), constants(own[:2]), own[2],
+                np.exp(x[3:-1]), some, share, here,
             )  # fmt: skip
-            mixture[rows], probability[rows] = some, share
-            sums, over = np.empty((len(rows), COLUMNS)), np.empty((len(rows), len(x) - 4, COLUMNS))
-            extended_sums(
-                turns.base, view.toward[rows], view.angle_sr[rows], turns.taken,
-                np.zeros_like(turns.share), view.parts[rows], np.zeros((0, ANGLES)), kappas,
-                scales, sums, over,
-            )  # fmt: skip
-            taken[rows] = sums[:, BASE] + own[2] * sums[:, SOCIAL] + sums[:, EXTRA]
+            mixture[rows], probability[rows], taken[rows] = some, share, here
         return mixture, probability, taken
 
 
