@@ -14,15 +14,32 @@ from zfcal.model.effects import MAX_PARAMETERS, Company, all_effects, find_effec
 from zfcal.model.effects.places import places
 from zfcal.model.simulate import simulate_tracks
 
-LISTED = """
-alignment wall-persistence group-cohesion interaction-range rear-blind-zone leader-following
-reaction-delay collective-departure place-preference directional-drift turning-bias turning-memory
-speed-matching crowding burst-and-coast speed-turn-coupling freezing fatigue habituation boldness
-robot-avoidance
-""".split()
+LISTED = {
+    "alignment",
+    "wall-persistence",
+    "group-cohesion",
+    "interaction-range",
+    "rear-blind-zone",
+    "leader-following",
+    "reaction-delay",
+    "collective-departure",
+    "place-preference",
+    "directional-drift",
+    "turning-bias",
+    "turning-memory",
+    "speed-matching",
+    "crowding",
+    "burst-and-coast",
+    "speed-turn-coupling",
+    "freezing",
+    "fatigue",
+    "habituation",
+    "boldness",
+    "robot-avoidance",
+}
 
 EVERY = pytest.mark.parametrize(
-    "effect", (*all_effects(), *generic_effects()), ids=lambda effect: effect.name
+    "effect", [*all_effects(), *generic_effects()], ids=lambda effect: effect.name
 )
 
 FULL = Company(n_fish=4, n_robots=1, has_rooms=True, follows_walls=True)
