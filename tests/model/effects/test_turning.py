@@ -89,6 +89,20 @@ def test_left_is_favoured_over_right(ask, strength):
         assert asked.factor(heading) == pytest.approx(asked.factor(heading + math.pi))
 
 
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_left_can_be_left_of_the_way_along_the_wall(ask, sense):
+    """45 degrees to the left of either sense against 45 to the right: e^(2 s), whichever way
+    the fish swims; away from walls it is left of the heading.
+    """
+    rows = {"TAU_X": 1.0, "TAU_Y": 0.0, "HX": 0.0, "HY": sense, "FOLLOWS": [1.0, 0.0]}
+    asked = ask("turning-bias", {"strength": 0.5, "along_walls": 1.0}, **rows)
+    for along in (0.0, math.pi):
+        ratio = asked.factor(along + math.pi / 4) / asked.factor(along - math.pi / 4)
+        assert ratio == pytest.approx(math.e)
+    left = math.pi / 2 * (1 + sense)
+    assert asked.factor(left, i=1) / asked.factor(left + math.pi, i=1) == pytest.approx(math.e)
+
+
 def test_biased_fish_turn_left(swim):
     """Mean sine of the turns; without the effect it is nothing."""
 
@@ -106,6 +120,16 @@ def test_a_turn_is_remembered(ask):
     ratio = asked.factor(math.pi / 2) / asked.factor(-math.pi / 2)
     assert ratio == pytest.approx(math.exp(1.0))
     assert asked.factor(1.0, i=1) == pytest.approx(1.0)
+
+
+def test_wide_turns_can_be_forgotten(ask):
+    """After 60 degrees s sin 60 cos 60; after 120 degrees nothing."""
+    turned = np.radians([-60.0, -120.0])
+    rows = {"PAST_HX": np.cos(turned), "PAST_HY": np.sin(turned)}
+    asked = ask("turning-memory", {"strength": 0.5, "forgets_wide": 1.0}, **rows)
+    ratio = asked.factor(math.pi / 2) / asked.factor(-math.pi / 2)
+    assert ratio == pytest.approx(math.exp(math.sqrt(3) / 4))
+    assert asked.factor(1.0, i=1) == asked.factor(-1.0, i=1) == 1.0
 
 
 def test_turns_to_one_side_come_in_series(swim):
