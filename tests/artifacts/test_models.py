@@ -17,6 +17,7 @@ from zfcal.artifacts.models import (
     write_model,
 )
 from zfcal.errors import DamagedError, InputError, SchemaError
+from zfcal.model.effects import all_effects, generic_effects
 from zfcal.parameters import from_genes, natural
 
 ZONES = (("corridor", True), ("walls", True), ("centre", False))
@@ -77,6 +78,23 @@ def test_effects_come_back_with_their_parameters(tmp_path, model, origin):
 
     assert read_model(tmp_path / "m.toml") == extended
     assert list(read_model(tmp_path / "m.toml").effects) == ["turning-bias", "alignment"]
+
+
+def test_every_effect_comes_back_from_a_file(tmp_path, model, origin):
+    """Generic ones as well, whose names have colons; to the last bit, in their order."""
+    every = (*generic_effects(), *all_effects())
+    effects = {
+        effect.name: {each.name: (each.low + each.default) / 3 for each in effect.parameters}
+        for effect in every
+    }
+    extended = dataclasses.replace(model, effects=effects)
+
+    write_model(tmp_path / "m.toml", extended, origin)
+
+    found = read_model(tmp_path / "m.toml").effects
+    assert found == effects
+    assert list(found) == list(effects)
+    assert '[effects."generic:heading:wall"]' in (tmp_path / "m.toml").read_text()
 
 
 def test_effects_may_be_a_list_of_names(path, model):

@@ -35,6 +35,33 @@ def test_a_neighbour_that_swims_upward_turns_the_focal_fish_upward(two_rooms, ma
     assert component.min() > -1e-3
 
 
+def test_neighbours_that_disagree_weigh_less(ask):
+    """Two of 0.01 sr at right angles: root of two of one; opposite ones: nothing."""
+    rows = {"HX": [1.0, 1.0, 0.0], "HY": [0.0, 0.0, 1.0]}
+    weight, (x, y, kappa) = ask("alignment", {"weight": 10.0, "kappa": 7.0}, **rows).component()
+    assert weight == pytest.approx(0.1 * math.sqrt(2))
+    assert (x, y, kappa) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5), 7.0))
+    assert ask("alignment", {"weight": 10.0}, HX=[1.0, 1.0, -1.0]).component()[0] == 0.0
+
+
+def test_all_that_are_seen_can_count_alike(ask):
+    """One of 0.04 sr and one of 0.0001 sr: with grading 0 their mean heading is the diagonal."""
+    asked = ask("alignment", {"weight": 10.0, "grading": 0.0}, HX=[1.0, 1.0, 0.0], HY=[0, 0, 1])
+    asked.sight[0] = (0.0, 0.04, 0.0001)
+    weight, (x, y, _) = asked.component()
+    assert (weight, x) == pytest.approx((0.1 * math.sqrt(2), y))
+
+
+def test_all_headings_can_lean_toward_that_of_those_near(ask):
+    """Along against opposite e^(2 x 20 x 0.03); who is 0.2 m away does not count."""
+    given = {"weight": 20.0, "leaning": 1.0}
+    rows = {"X": [0.0, 0.1, 0.2], "HX": [1.0, 0.0, 1.0], "HY": [0.0, 1.0, 0.0]}
+    asked = ask("alignment", given, **rows)
+    ratio = asked.factor(math.pi / 2) / asked.factor(-math.pi / 2)
+    assert ratio == pytest.approx(math.exp(1.2))
+    assert asked.component()[0] == 0.0
+
+
 def test_aligned_fish_are_more_polarised(two_rooms, make_natural):
     """Mean polarisation of five fish over 4,000 s rises by more than 0.02 (0.37 to 0.42)."""
     plain = make_natural(two_rooms)
