@@ -132,7 +132,9 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     own = case.at_large(0, case.screen)
     omnibus = judge(own[1], [row.at_large[1] for row in rows if row.at_large])
     selector = Selector(
-        listed=Asked(candidates=case.listed, names=names, null=_null([r.listed for r in rows])),
+        listed=Asked(
+            candidates=case.listed, names=names, null=_null([row.listed for row in rows], names)
+        ),
         rivals=lambda screen: _rivals(case, screen),
         suspicious=omnibus.p < _UNEXPLAINED,
         n_workers=question.n_workers,
@@ -185,8 +187,8 @@ def _noise(question: Question) -> float:
     return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
 
 
-def _null(rows: Sequence[Floats]) -> Null:
-    return from_replicates(np.array(rows)) if len(rows) > 2 else theory(0)
+def _null(rows: Sequence[Floats], names: Sequence[str]) -> Null:
+    return from_replicates(np.array(rows)) if len(rows) > 2 else theory(len(names))
 
 
 def _rivals(case: _Case, screen: Screen) -> list[Best]:
@@ -204,7 +206,7 @@ def _rivals(case: _Case, screen: Screen) -> list[Best]:
 
     rows = run_null(case.chain(), ask, _GENERIC_REPLICATES, n_workers=question.n_workers)
     names = tuple(each.name for each in asked)
-    family = Asked(candidates=case.generic, names=names, null=_null(rows))
+    family = Asked(candidates=case.generic, names=names, null=_null(rows, names))
     return best_of(family, [best.score for best in found])
 
 
