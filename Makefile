@@ -48,8 +48,14 @@ format: install  ## Format the code
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 
-bench: install  ## Measure what the documentation states
-	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
+# Other people's optimisers, to compare with, in addition to what zfcal needs.
+.venv/.benched: .venv/.installed requirements-bench.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
+	@touch $@
+
+# BENCH_OPTIONS=--write renews benchmarks/results and the documentation.
+bench: .venv/.benched  ## Measure what the documentation states; report what became worse
+	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
 
 bench-real: install  ## Run the main job on the real recordings in ../shared/data (ZFCAL_SHARED_DATA)
 	$(BIN)/python benchmarks/real_recordings.py
@@ -61,12 +67,16 @@ effects-page: install  ## Write docs/effects.md from the effects themselves
 	$(BIN)/python -c 'from zfcal.report.effects_page import effects_page as page; print(page(), end="")' \
 		> docs/effects.md
 
-lock: install  ## Write requirements.lock anew; pins that still fit stay
-	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
-		--fork-strategy fewest --generate-hashes --no-emit-index-url --no-annotate --quiet \
-		--custom-compile-command "make lock" $(LOCK_OPTIONS) --output-file requirements.lock
+COMPILE = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strategy fewest \
+	--generate-hashes --no-emit-index-url --no-annotate --quiet \
+	--custom-compile-command "make lock" $(LOCK_OPTIONS)
 
-lock-upgrade:  ## Write requirements.lock anew with the newest versions
+# What zfcal is tested with does not depend on what it is compared with: a lock for each.
+lock: install  ## Write both locks anew; pins that still fit stay
+	$(COMPILE) pyproject.toml --all-extras --output-file requirements.lock
+	$(COMPILE) --group bench --constraint requirements.lock --output-file requirements-bench.lock
+
+lock-upgrade:  ## Write both locks anew with the newest versions
 	$(MAKE) lock LOCK_OPTIONS=--upgrade
 
 clean:  ## Remove what can be made again

@@ -1,13 +1,13 @@
 """Measure a cluster of one and two worker processes against this process.
 
-Writes ``benchmarks/results/cluster.json`` and ``docs/benchmarks-cluster.md``.
+Makes ``cluster.json`` and ``benchmarks-cluster.md``: in ``build/benchmarks``, with
+``--write`` in ``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_cluster.py
 """
 
 from __future__ import annotations
 
-import argparse
 import functools
 import hashlib
 import logging
@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 from distributed import LocalCluster
-from measuring import DOCS, RESULTS, keep, load, machine, table, wall_s
+from measuring import load, machine, table, wall_s
+from regressions import Ratio, conclude, parser
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.calibrate.cluster import ClusterGroup
@@ -178,19 +179,29 @@ def markdown(found: dict[str, Any]) -> str:
     )
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return the speed of every place against one thread of one process."""
+    base, *others = found["places"].items()
+    return {
+        f"{what}: {place}": Ratio(value=base[1]["times"][what]["s"] / time["s"], better="more")
+        for place, measured in others
+        for what, time in measured["times"].items()
+    }
+
+
 def main() -> None:
-    """Measure and write both files."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
-    parser.add_argument("--out", type=Path, help="Write both files there.")
-    options = parser.parse_args()
+    """Measure, write both files, and compare."""
+    options = parser(__doc__).parse_args()
     os.nice(1)
     tiny = Effort(population=8, repeats=1, generations=1, trials=2)
     found = measure(tiny if options.tiny else Effort())
-    text = markdown(found)
-    keep("cluster", found, results=options.out or RESULTS)
-    ((options.out or DOCS) / "benchmarks-cluster.md").write_text(text, encoding="utf-8")
-    print(text)
+    conclude(
+        "cluster",
+        found,
+        markdown(found),
+        ratios=ratios,
+        options=options,
+    )
 
 
 if __name__ == "__main__":

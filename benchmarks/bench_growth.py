@@ -1,15 +1,13 @@
 """Measure how the cost grows: with agents, duration, population and trials.
 
-Writes ``benchmarks/results/growth.json``, ``docs/pictures/growth.png`` and
-``docs/benchmarks-growth.md``.
+Makes ``growth.json``, ``pictures/growth.png`` and ``benchmarks-growth.md``: in
+``build/benchmarks``, with ``--write`` in ``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_growth.py
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import subprocess
 import sys
@@ -23,7 +21,8 @@ from typing import Any
 import growth_document
 import numpy as np
 import shapely
-from measuring import DOCS, RESULTS, keep, load, machine, processor_s
+from measuring import load, machine, processor_s
+from regressions import Ratio, conclude, parser, places, read
 
 from zfcal.arena import Arena, make_arena
 from zfcal.artifacts.arenas import load_arena
@@ -280,24 +279,48 @@ def measure(effort: Effort) -> dict[str, Any]:
     return found
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return the exponents of growth, and what is small beside the rest.
+
+    Two parts of one cost are compared on the same machine: the fixed part of an
+    agent-step and a pair, a generation and the optimiser's share of it.
+    """
+    growth = {f"exponent over {name}": Ratio(value=v) for name, v in found["slopes"].items()}
+    parts = {
+        f"a pair over the fixed part, {key}": Ratio(value=pair["per_other_ns"] / pair["fixed_ns"])
+        for key, pair in found["pairs"].items()
+    }
+    shares = {
+        f"optimiser's share of a generation of {row['population']}": Ratio(
+            value=row["optimiser_s"] / row["generation_s"]
+        )
+        for row in found["population"]
+    }
+    return growth | parts | shares
+
+
 def main() -> None:
-    """Measure, or draw again what was measured, and write the three files."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
-    parser.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
-    parser.add_argument("--out", type=Path, help="Write all files there.")
-    options = parser.parse_args()
-    results = options.out or RESULTS
+    """Measure, or draw again what was measured, write the three files, and compare."""
+    options_of = parser(__doc__)
+    options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options = options_of.parse_args()
+    place = places(options)
     if options.draw:
-        found = json.loads((results / "growth.json").read_text(encoding="utf-8"))
+        found = read("growth", place.results)
+        if found is None:
+            raise SystemExit(
+                f"{place.results} has no growth.json; --write draws the committed one."
+            )
     else:
         found = measure(TINY if options.tiny else Effort())
-        keep("growth", found, results=results)
-    pictures = options.out or DOCS / "pictures"
-    growth_document.draw(found, pictures / "growth.png")
-    text = growth_document.markdown(found)
-    ((options.out or DOCS) / "benchmarks-growth.md").write_text(text, encoding="utf-8")
-    print(text)
+    growth_document.draw(found, place.docs / "pictures" / "growth.png")
+    conclude(
+        "growth",
+        found,
+        growth_document.markdown(found),
+        ratios=ratios,
+        options=options,
+    )
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """Measure the main job: start-up, analyse, kernel, generations, recovery of parameters.
 
-Writes ``benchmarks/results/main_job.json`` and ``docs/benchmarks-main-job.md``.
+Makes ``main_job.json`` and ``benchmarks-main-job.md``: in ``build/benchmarks``, with
+``--write`` in ``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_main_job.py
 """
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import statistics
@@ -17,8 +17,10 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from regressions import Ratio, conclude, parser
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import measure
@@ -31,7 +33,6 @@ from zfcal.model.steps import steps_of
 from zfcal.parameters import Parameters, gene_names, natural, to_genes
 from zfcal.tracks import Samples
 
-ROOT = Path(__file__).resolve().parent.parent
 ZFCAL = str(Path(sys.executable).parent / "zfcal")
 ARENA = load_arena("two-rooms", Path())
 TRUTH = natural(tuple((zone.name, zone.follows_walls) for zone in ARENA.zones), dt_s=0.2)
@@ -230,8 +231,32 @@ def _markdown(found: dict[str, object]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return what was measured side by side, one over the other."""
+    kernel, generation = found["kernel"], found["generations"]
+    one_s = kernel["exact_2_core_ns"] * 1e-9 * 60 * 3300 * 5
+    made = {
+        "exact sampler over grid sampler": Ratio(
+            value=kernel["exact_1_core_ns"] / kernel["grid_1_core_ns"]
+        ),
+        "two threads against one": Ratio(
+            value=kernel["exact_1_core_ns"] / kernel["exact_2_core_ns"], better="more"
+        ),
+        "a generation over its simulations": Ratio(
+            value=generation["default_s_per_generation"] / one_s
+        ),
+        "a generation of 10 x 1800 over one of 1 x 3000": Ratio(
+            value=generation["authors_s_per_generation"] / generation["default_s_per_generation"]
+        ),
+    }
+    rows = found["recovery"]
+    likelihood, score = (sum(row[key] for row in rows) for key in ("likelihood_s", "score_s"))
+    return made | {"likelihood over search": Ratio(value=likelihood / score)}
+
+
 def main() -> None:
-    """Measure all and write both files."""
+    """Measure all, write both files, and compare."""
+    options = parser(__doc__, tiny=False).parse_args()
     found = {
         "machine": ", ".join(
             (platform.machine(), f"{os.cpu_count()} cores", f"Python {platform.python_version()}")
@@ -242,11 +267,13 @@ def main() -> None:
         "generations": generations(),
         "recovery": recovery(),
     }
-    results = ROOT / "benchmarks" / "results"
-    results.mkdir(exist_ok=True)
-    (results / "main_job.json").write_text(json.dumps(found, indent=1) + "\n")
-    (ROOT / "docs" / "benchmarks-main-job.md").write_text(_markdown(found))
-    print(_markdown(found))
+    conclude(
+        "main_job",
+        found,
+        _markdown(found),
+        ratios=ratios,
+        options=options,
+    )
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-SCRIPTS = ("bench_growth", "growth_document", "measuring")
+SCRIPTS = ("bench_growth", "growth_document", "measuring", "regressions")
 
 
 @pytest.fixture(scope="module")

@@ -48,7 +48,18 @@ def project(repository):
 @pytest.fixture(scope="module")
 def pins(repository):
     """Return for each locked package its version, its marker and its hashes."""
-    text = (repository / "requirements.lock").read_text(encoding="utf-8").replace("\\\n", " ")
+    return locked(repository / "requirements.lock")
+
+
+@pytest.fixture(scope="module")
+def bench_pins(repository):
+    """Return the same of what benchmarks compare with."""
+    return locked(repository / "requirements-bench.lock")
+
+
+def locked(path: Path) -> dict[str, tuple[str, str, list[str]]]:
+    """Return for each package of a lock its version, its marker and its hashes."""
+    text = path.read_text(encoding="utf-8").replace("\\\n", " ")
     found = {}
     for line in text.splitlines():
         if line and not line.startswith(("#", "-")):
@@ -194,6 +205,19 @@ def test_every_pin_has_hashes_and_none_an_address(repository, pins):
     text = (repository / "requirements.lock").read_text(encoding="utf-8")
     assert not re.search(r"://|--index|--find-links|@ ", text)
     assert [name for name, (_, _, hashes) in pins.items() if not hashes] == []
+
+
+def test_benchmarks_are_locked_apart(repository, project, pins, bench_pins):
+    """With hashes and without addresses, at zfcal's own versions; zfcal needs none of it."""
+    text = (repository / "requirements-bench.lock").read_text(encoding="utf-8")
+    assert not re.search(r"://|--index|--find-links|@ ", text)
+    assert [name for name, (_, _, hashes) in bench_pins.items() if not hashes] == []
+    shared = pins.keys() & bench_pins.keys()
+    assert {name: bench_pins[name][0] for name in shared} == {n: pins[n][0] for n in shared}
+    for requirement in map(Requirement, project["dependency-groups"]["bench"]):
+        name = canonicalize_name(requirement.name)
+        assert requirement.specifier.contains(bench_pins[name][0])
+        assert name not in pins
 
 
 def test_what_is_installed_here_is_what_the_lock_says(pins):

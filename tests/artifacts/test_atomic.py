@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.atomic import (
+    append_bytes,
     is_orphan,
     is_part,
     sha256_of,
@@ -244,6 +245,21 @@ def test_a_full_disk_is_an_error_that_says_so(small_disk):
     assert path.read_text() == "old"
     assert names_in(path.parent) == ["000000.parquet"]
     write_text_whole(path, "x" * 100_000)
+
+
+def test_what_is_appended_follows_what_was_there(tmp_path):
+    """A file that is not there begins with it."""
+    path = tmp_path / "log"
+    append_bytes(path, b"one")
+    append_bytes(path, b"\x00two")
+    assert path.read_bytes() == b"one\x00two"
+
+
+def test_a_file_that_cannot_be_appended_to_is_an_error_that_says_so(tmp_path):
+    """A folder stands there; what it holds stays."""
+    (tmp_path / "log").mkdir()
+    with pytest.raises(StorageError, match="log"):
+        append_bytes(tmp_path / "log", b"x")
 
 
 def test_a_file_in_place_of_a_folder_is_an_error_that_says_so(tmp_path):

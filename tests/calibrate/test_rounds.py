@@ -42,8 +42,7 @@ def test_nobody_good_is_lost_on_the_way(task, small, truth):
     """The ten are of all that was evaluated, not of the last population alone."""
     last = search(task, small)
     features = task.evaluation(small)(truth[None])
-    genes = np.vstack([truth, last.genes])
-    wider = replace(last, genes=genes, features=np.vstack([features, last.features]))
+    wider = replace(last, parts=((truth[None], features), *last.parts))
     assert not (last.state.genes == truth).all(axis=1).any()
     assert (conclude(task, small, wider).genes == truth).all()
 

@@ -27,7 +27,8 @@ def veterans(n, *, score=0.8, noise=0.05, champion=None):
 
 def same(a, b):
     """Return whether two searches are equal bit by bit."""
-    pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.name != "state"]
+    plain = ("genes", "features", "history", "world_changed", "n_renewed")
+    pairs = [(getattr(a, name), getattr(b, name)) for name in plain]
     pairs += [(getattr(a.state, f.name), getattr(b.state, f.name)) for f in fields(a.state)]
     return all(np.array_equal(x, y, equal_nan=True) if isinstance(x, np.ndarray) else x == y
                for x, y in pairs)  # fmt: skip

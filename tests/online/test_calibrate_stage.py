@@ -227,6 +227,27 @@ def test_a_killed_round_goes_on_and_ends_in_the_same_bytes(
     assert not list((trial / "models").glob(".*checkpoint"))
 
 
+def test_a_round_killed_while_it_wrote_ends_in_the_same_bytes(
+    trial, copy_trial, quick, heard, read_all
+):
+    """Half a generation at the checkpoint's end is bred again."""
+    whole = copy_trial(trial, "whole")
+    calibrate(whole, quick, say_nothing)
+
+    def kill(event):
+        if isinstance(event, Progress) and event.stage != "rounds" and event.done == 2:
+            raise Killed
+
+    with pytest.raises(Killed):
+        calibrate(trial, quick, kill)
+    checkpoint = trial / "models" / ".000120.checkpoint"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:-1000])
+    calibrate(trial, quick, heard.append)
+    bred = [e.done for e in heard if isinstance(e, Progress) and e.stage == "window to 120 s"]
+    assert bred == [2, 3]
+    assert read_all(trial) == read_all(whole)
+
+
 def test_a_checkpoint_of_another_round_is_not_taken(trial, copy_trial, quick, read_all):
     """Nor one that is damaged, or farther than is asked for."""
 

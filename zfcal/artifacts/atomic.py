@@ -75,11 +75,35 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_text_whole(path: Path, text: str) -> None:
     """Make a UTF-8 text file with `write_whole`, its line ends as they stand in ``text``."""
+    write_bytes_whole(path, text.encode())
+
+
+def write_bytes_whole(path: Path, data: bytes) -> None:
+    """Make a file of these bytes with `write_whole`."""
 
     def write(part: Path) -> None:
-        part.write_bytes(text.encode())
+        part.write_bytes(data)
 
     write_whole(path, write)
+
+
+def append_bytes(path: Path, data: bytes) -> None:
+    """Add to the end of a file and wait until the disk has it.
+
+    Whoever reads the file must know an end that was cut: a process that is killed may
+    leave one.
+
+    Raises
+    ------
+    StorageError
+        The disk is full, or the place cannot be written.
+    """
+    try:
+        with path.open("ab") as file:
+            file.write(data)
+        _flush(path)
+    except OSError as error:
+        raise storage_error(path, error) from error
 
 
 def sha256_of(path: Path) -> str:

@@ -39,10 +39,10 @@ class Progress:
     ----------
     state
         The population.
-    genes : ndarray, shape (genome, gene)
-        All genomes that the round has evaluated, in that order.
-    features : ndarray, shape (genome, 4)
-        Their I_D, I_W, I_O, I_T; NaN is null.
+    parts
+        Genes, shape (genome, gene), and features, shape (genome, 4), of all that the
+        round has evaluated, in that order. As many parts as there were evaluations:
+        to join them each time would cost a long search more than its breeding.
     history
         A line per generation, the initial population's first.
     world_changed
@@ -52,11 +52,20 @@ class Progress:
     """
 
     state: State
-    genes: Floats
-    features: Floats
+    parts: tuple[tuple[Floats, Floats], ...]
     history: tuple[Generation, ...]
     world_changed: bool = False
     n_renewed: int = 0
+
+    @property
+    def genes(self) -> Floats:
+        """All genomes that the round has evaluated, shape (genome, gene)."""
+        return np.concatenate([genes for genes, _ in self.parts])
+
+    @property
+    def features(self) -> Floats:
+        """Their I_D, I_W, I_O, I_T, shape (genome, 4); NaN is null."""
+        return np.concatenate([features for _, features in self.parts])
 
     @property
     def scores(self) -> Floats:
@@ -151,7 +160,7 @@ def advance(
     step: Callable[[State, Evaluate], State] = evolve.step,
 ) -> Progress:
     """Return the search one generation later, with all that it evaluated kept."""
-    kept: list[tuple[Floats, Floats]] = [(progress.genes, progress.features)]
+    kept: list[tuple[Floats, Floats]] = []
 
     def evaluate_and_keep(genes: Floats) -> Floats:
         features = evaluate(genes)
@@ -162,8 +171,7 @@ def advance(
     return replace(
         progress,
         state=state,
-        genes=np.concatenate([genes for genes, _ in kept]),
-        features=np.concatenate([features for _, features in kept]),
+        parts=(*progress.parts, *kept),
         history=(*progress.history, describe(state)),
     )
 
@@ -179,6 +187,7 @@ def begin(task: Task, settings: Settings, evaluate: Evaluate) -> Progress:
     seed = task.seeds.sequence(Purpose.EVOLUTION)
     genes = first_population(task, settings)
     features = evaluate(genes)
+    parts: tuple[tuple[Floats, Floats], ...] = ((genes, features),)
     state = start(genes, features, seed=seed)
     changed = task.previous is not None and world_changed(
         task.previous,
@@ -194,12 +203,11 @@ def begin(task: Task, settings: Settings, evaluate: Evaluate) -> Progress:
             np.concatenate([state.features[:-n_renewed], fresh]),
             seed=seed,
         )
-        genes, features = np.concatenate([genes, newcomers]), np.concatenate([features, fresh])
-    state = replace(state, evaluations=len(genes))
+        parts += ((newcomers, fresh),)
+    state = replace(state, evaluations=len(genes) + n_renewed)
     return Progress(
         state=state,
-        genes=genes,
-        features=features,
+        parts=parts,
         history=(describe(state),),
         world_changed=changed,
         n_renewed=n_renewed,

@@ -32,13 +32,12 @@ from zfcal.online.likelihood import estimate, track_files
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, tell_version
 from zfcal.online.rounds import (
     MODEL,
+    Checkpoint,
     RoundPlaces,
     checkpoint_key,
-    load_checkpoint,
     read_control,
     read_previous,
     result_table,
-    save_checkpoint,
     score_table,
     write_round,
 )
@@ -339,9 +338,10 @@ def run_search(
     at_most = options.generations_asked if options.budget_s is None else None
     started_s = time.monotonic()
     stage = f"window to {round_task.seeds.window_end_s} s"
+    kept = Checkpoint(checkpoint, key)
 
     def watch(search: Search) -> None:
-        save_checkpoint(checkpoint, search, key)
+        kept.save(search)
         done, total = search.state.generation, options.generations_asked
         if options.budget_s is not None:
             done, total = int(time.monotonic() - started_s), math.ceil(options.budget_s)
@@ -352,7 +352,7 @@ def run_search(
         options.settings,
         deadline=options.deadline(),
         watch=watch,
-        resume=load_checkpoint(checkpoint, key, at_most=at_most),
+        resume=kept.load(at_most=at_most),
     )
 
 

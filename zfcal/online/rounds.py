@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.atomic import write_whole
+from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import write_model
 from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
@@ -245,36 +245,53 @@ def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
     }
 
 
-def save_checkpoint(path: Path, progress: Progress, key: str) -> None:
-    """Write where a search is, whole or not at all."""
-    data = to_bytes(progress, key=key)
-
-    def write(part: Path) -> None:
-        part.write_bytes(data)
-
-    write_whole(path, write)
-
-
-def load_checkpoint(path: Path, key: str, *, at_most: int | None) -> Progress | None:
-    """Return where a killed round was; None to start anew.
+class Checkpoint:
+    """The file that keeps a search: whole at first, then a block for each generation.
 
     Parameters
     ----------
     path
-        The checkpoint.
+        Where it lies.
     key
-        Of the round that wants to go on.
-    at_most
-        Generations that are asked for: one that is farther is of no use.
+        Of the round; a file with another one is of no use.
     """
-    try:
-        progress = from_bytes(path.read_bytes(), key=key)
-    except (FileNotFoundError, DamagedError):
-        # Starting anew ends in the same result; the next generation replaces the file.
-        return None
-    if progress is None or (at_most is not None and progress.state.generation > at_most):
-        return None
-    return progress
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path = path
+        self._key = key
+        self._kept: Progress | None = None
+
+    def save(self, progress: Progress) -> None:
+        """Keep where the search is.
+
+        Raises
+        ------
+        StorageError
+            The disk is full, or the place cannot be written.
+        """
+        data = to_bytes(progress, key=self._key, since=self._kept)
+        if self._kept is None:
+            write_bytes_whole(self._path, data)
+        else:
+            append_bytes(self._path, data)
+        self._kept = progress
+
+    def load(self, *, at_most: int | None) -> Progress | None:
+        """Return where a killed round was; None to start anew.
+
+        Parameters
+        ----------
+        at_most
+            Generations that are asked for: one that is farther is of no use.
+        """
+        try:
+            progress = from_bytes(self._path.read_bytes(), key=self._key)
+        except (FileNotFoundError, DamagedError):
+            # Starting anew ends in the same result, and the first save replaces the file.
+            return None
+        if progress is None or (at_most is not None and progress.state.generation > at_most):
+            return None
+        return progress
 
 
 def checkpoint_key(lineage: Lineage) -> str:
