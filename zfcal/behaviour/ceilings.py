@@ -222,8 +222,13 @@ def halves_ceiling(
     located = locate(samples, arena)
     if not len(located):
         return None
-    since_s = (located.k - located.k[0]) * located.dt_s
-    odd = np.floor(since_s / block_s + 1e-9).astype(np.int64) % 2 == 1
+    odd = block_numbers(located, int(located.k[0]), block_s) % 2 == 1
     if not odd.any():
         return None
     return compare(measure(located.take(~odd), arena), measure(located.take(odd), arena))
+
+
+def block_numbers(located: Located, start_k: int, block_s: float) -> NDArray[np.int64]:
+    """Return in which block of time each point lies, counted from a sample, shape (point,)."""
+    since_s = (located.k - start_k) * located.dt_s
+    return np.floor(since_s / block_s + 1e-9).astype(np.int64)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.behaviour.ceilings import piece_together, places_of_fish
+from zfcal.behaviour.ceilings import block_numbers, piece_together, places_of_fish
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import (
@@ -25,6 +25,7 @@ from zfcal.behaviour.statistics import (
     n_counts,
 )
 from zfcal.tracks import FISH, ROBOT
+from zfcal.units import SEGMENT_S
 
 Ints = NDArray[np.int64]
 
@@ -123,3 +124,38 @@ class Pool:
             self._counts = np.concatenate([self._counts, fresh])
             self._spans = np.concatenate([self._spans, spans])
         return np.array([self._row[int(agent)] for agent in agents], dtype=np.intp)
+
+
+@final
+class Halves:
+    """The fish of every other block of time against those of the others.
+
+    Parameters
+    ----------
+    arena
+        In which all points are located.
+    block_s
+        Length of a block, counted from the first sample.
+    """
+
+    def __init__(self, arena: Arena, *, block_s: float = SEGMENT_S) -> None:
+        self._block_s = block_s
+        self._start_k: int | None = None
+        self._pools = (Pool(arena), Pool(arena))
+
+    def add(self, fish: Located) -> None:
+        """Add the stretch that follows, of fish alone."""
+        if not len(fish):
+            return
+        if self._start_k is None:
+            self._start_k = int(fish.k[0])
+        half = block_numbers(fish, self._start_k, self._block_s) % 2
+        for number, pool in enumerate(self._pools):
+            pool.add(fish.take(half == number))
+
+    def scores(self) -> Scores | None:
+        """Return what `zfcal.behaviour.ceilings.halves_ceiling` finds."""
+        even, odd = (pool.fish() for pool in self._pools)
+        if not (odd.occupation.any() or odd.n_void):
+            return None
+        return compare(even, odd)
