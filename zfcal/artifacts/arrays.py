@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-_DTYPES = {
+_DTYPES: dict[Any, np.dtype[Any]] = {
     pa.float64(): np.dtype(np.float64),
     pa.float32(): np.dtype(np.float32),
     pa.int64(): np.dtype(np.int64),
