@@ -265,7 +265,7 @@ def without(*path):
         ({"type": "FeatureCollection", "features": [feature("zone", [LEFT], zone="a",
           follows_walls=True)]}, "needs one feature of role 'outline', got 0", "role = outline"),
         ({"type": "FeatureCollection", "features": []}, "features must be a list of at least", ""),
-        ({"type": "Polygon", "coordinates": [SQUARE]}, "is a GeoJSON Polygon, expected a FeatureCollection", ""),
+        ({"type": "Polygon", "coordinates": [SQUARE]}, "is a GeoJSON Polygon", ""),
         (document(feature("zone", [[[x + 2, y] for x, y in LEFT]], zone="a", follows_walls=True)),
          "zone 'a': 0.500000 m2 of it lie outside", "metres"),
         (document(feature("zone", [LEFT], zone="a", follows_walls=True),
