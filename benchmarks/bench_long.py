@@ -225,7 +225,9 @@ def markdown(found: dict[str, Any]) -> str:
             the same files."""
     parts = ["# Half an hour and a day\n", textwrap.fill(" ".join(said.split()), 120) + "\n"]
     for each in found["lengths"]:
-        parts += [f"## {each['name'][:1].upper()}{each['name'][1:]}\n", _table(each, compared)]
+        parts.append(f"## {each['name'][:1].upper()}{each['name'][1:]}\n")
+        parts += [textwrap.fill(each["note"], 120) + "\n"] if "note" in each else []
+        parts.append(_table(each, compared))
     return "\n".join(parts)
 
 

@@ -294,7 +294,9 @@ def _held_out(found: dict[str, Any]) -> list[str]:
             ten minutes the champions score {overall(trials, "guided", "late")} with the estimate
             and {overall(trials, "alone", "late")} without, the estimate by itself
             {overall(trials, "likelihood", "late")}, the true model
-            {overall(trials, "truth", "late")}; on the window itself the order is the reverse."""
+            {overall(trials, "truth", "late")}. On the window itself it is
+            {overall(trials, "guided", "S")}, {overall(trials, "alone", "S")},
+            {overall(trials, "likelihood", "own")} and {overall(trials, "truth", "own")}."""
         ),
     ]
 
