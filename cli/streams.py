@@ -68,15 +68,15 @@ def trials_together(
 
 
 def _one_of_many(path: Path, work: Callable[[Work, Tell], None], tell: Tell) -> None:
-    from zfcal.online.streams import work_of
+    from zfcal.online.streams import work_at
 
-    work(work_of(path), tell)
+    work(work_at(path), tell)
 
 
 def _one(path: Path, work: Callable[[Work], None]) -> None:
-    from zfcal.online.streams import work_of
+    from zfcal.online.streams import work_at
 
-    work(work_of(path))
+    work(work_at(path))
 
 
 def _each_line(out: Output, stream: TextIO, work: Callable[[Work], None]) -> None:

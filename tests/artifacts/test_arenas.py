@@ -265,7 +265,7 @@ def without(*path):
         ({"type": "FeatureCollection", "features": [feature("zone", [LEFT], zone="a",
           follows_walls=True)]}, "needs one feature of role 'outline', got 0", "role = outline"),
         ({"type": "FeatureCollection", "features": []}, "features must be a list of at least", ""),
-        ({"type": "Polygon", "coordinates": [SQUARE]}, "unknown key 'coordinates'", ""),
+        ({"type": "Polygon", "coordinates": [SQUARE]}, "is a GeoJSON Polygon", ""),
         (document(feature("zone", [[[x + 2, y] for x, y in LEFT]], zone="a", follows_walls=True)),
          "zone 'a': 0.500000 m2 of it lie outside", "metres"),
         (document(feature("zone", [LEFT], zone="a", follows_walls=True),
@@ -325,3 +325,14 @@ def test_an_arena_that_is_nowhere_is_named_with_the_nearest(tmp_path):
     with pytest.raises(InputError, match="comes not with zfcal") as caught:
         load_arena("two-room", tmp_path)
     assert caught.value.hint.startswith("Did you mean 'two-rooms'? There are circular, open-square")
+
+
+@pytest.mark.parametrize("kind", ["Polygon", "Feature"])
+def test_a_polygon_by_itself_is_told_what_is_missing(tmp_path, kind):
+    """The hint shows the collection that belongs round it."""
+    path = tmp_path / "tank.geojson"
+    ring = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+    path.write_text(json.dumps({"type": kind, "coordinates": [ring]}))
+    with pytest.raises(InputError, match=f"is a GeoJSON {kind}, expected a Fea") as error:
+        read_arena(path)
+    assert '{"role": "outline"}' in error.value.hint

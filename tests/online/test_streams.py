@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.online.streams import Work, work_of
+from zfcal.online.streams import Work, work_at, work_of
 
 
 @pytest.fixture
@@ -47,3 +47,34 @@ def test_a_path_below_no_trial_is_refused(trial):
     with pytest.raises(InputError, match="not in a trial") as error:
         work_of(Path("elsewhere/tracks/000000.parquet"))
     assert "zfcal init" in error.value.hint
+
+
+def test_a_slip_of_the_pen_is_not_the_whole_trial(trial):
+    """What is typed must be there; the hint names what is, and what is like it."""
+    with pytest.raises(InputError, match=r"^day/trakcs: no such file") as error:
+        work_at(trial / "trakcs")
+    assert "Did you mean day/tracks?" in error.value.hint
+    assert "day holds tracks, trial.toml." in error.value.hint
+
+
+def test_a_segment_that_is_not_there_is_named(trial):
+    """In a folder that holds nothing, or too much to name it all."""
+    with pytest.raises(InputError, match="no such file") as error:
+        work_at(trial / "tracks" / "000060.parquet")
+    assert "day/tracks holds nothing." in error.value.hint
+    for number in range(20):
+        (trial / "tracks" / f"{number:03d}").touch()
+    with pytest.raises(InputError) as error:
+        work_at(trial / "tracks" / "xyz")
+    assert "006, 007 and 12 more." in error.value.hint
+
+
+def test_what_is_there_can_be_typed(trial):
+    """A trial, a folder and a file of it."""
+    assert work_at(trial) == work_at(trial / "tracks") == work_of(trial / "trial.toml")
+
+
+def test_a_path_typed_below_no_trial_is_refused(trial):
+    """As one from a pipe."""
+    with pytest.raises(InputError, match="not in a trial"):
+        work_at(Path("elsewhere"))

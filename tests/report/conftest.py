@@ -23,6 +23,7 @@ from zfcal.parameters import gene_names, natural
 from zfcal.report import theme
 from zfcal.report.page import write_report
 from zfcal.report.panels import compose
+from zfcal.report.seen import see
 from zfcal.report.views import (
     FEATURE_NAMES,
     MODEL,
@@ -145,7 +146,7 @@ def rounds_of():
 def make_view(two_rooms, course, rounds_of, wander):
     """Return what makes all that is known of a trial; keywords replace parts of it."""
     samples = wander(two_rooms)
-    located = locate(samples, two_rooms)
+    seen = see([locate(samples, two_rooms)])
     fish = measure(samples.of_kind(0), two_rooms)
     robot = measure_robot(samples, two_rooms)
 
@@ -167,7 +168,7 @@ def make_view(two_rooms, course, rounds_of, wander):
             statistics={(540, "control"): fish, (540, "robot"): robot},
             rounds=rounds_of(two_rooms, n_windows),
             model_statistics=fish + robot,
-            located=located,
+            seen=seen,
             integration=Integration(
                 start_s=300,
                 end_s=540,
@@ -221,7 +222,7 @@ def drawn_trial(tmp_path_factory, write_small_trial, stub_model):
     """A trial with its report, drawn once for all tests: look at it, or copy it."""
     root = write_small_trial(tmp_path_factory.mktemp("drawn") / "trial")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("zfcal.report.gather.long_run", stub_model)
+        patch.setattr("zfcal.report.simulated.long_run", stub_model)
         write_report([root])
     return root
 
@@ -311,7 +312,7 @@ def stub_model(two_rooms, wander):
 @pytest.fixture
 def quick_model(monkeypatch, stub_model):
     """Put wandering agents in the place of the long simulation."""
-    monkeypatch.setattr("zfcal.report.gather.long_run", stub_model)
+    monkeypatch.setattr("zfcal.report.simulated.long_run", stub_model)
 
 
 @pytest.fixture

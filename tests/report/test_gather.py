@@ -1,5 +1,7 @@
 """Reading a trial for its report: all of it, or all that can be read."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -25,7 +27,7 @@ def test_a_trial_is_read_whole(small_trial):
     assert view.calibrated.unidentified == {"walls.alpha"}
     assert view.calibrated.intervals["walls.alpha"] == (0.1, 0.9)
     assert set(view.statistics) == {(240, "control"), (240, "robot")}
-    assert len(view.located) == 1200 * 5
+    assert view.seen.n_points == 1200 * 5
     assert view.tracked_s == pytest.approx(240)
     assert view.integration.start_s == 120
     assert view.model_statistics is not None
@@ -119,6 +121,16 @@ def test_a_gap_in_the_tracks_is_a_gap(small_trial):
     root = small_trial()
     (root / "tracks" / "000060.parquet").unlink()
 
-    k = np.unique(gather(root, unexpected).located.k)
+    seen = gather(root, unexpected).seen
 
-    assert k.tolist() == [*range(300), *range(600, 1200)]
+    assert (seen.first_k, seen.last_k) == (0, 1199)
+    assert seen.n_points == 900 * 5
+    assert np.unique(seen.last.k).tolist() == [*range(600, 1200)]
+
+
+def test_of_several_trials_no_model_is_simulated(small_trial, monkeypatch):
+    """A report over several shows nothing of what the models do."""
+    root = small_trial()
+    monkeypatch.setitem(sys.modules, "zfcal.report.simulated", None)
+
+    assert gather(root, unexpected, alone=False).model_statistics is None

@@ -62,11 +62,9 @@ def test_every_file_says_where_it_comes_from(make_view):
         command="analyse",
         version="1.2",
         options={"a": 1},
-        inputs={"x": "0" * 64},
     )
-    view = make_view(
-        "t", sources=[Source(path="stats/000120.parquet", sha256="ab" * 32, lineage=lineage)]
-    )
+    source = Source(path="stats/000120.parquet", sha256="ab" * 32, lineage=lineage, n_inputs=1)
+    view = make_view("t", sources=[source])
 
     (row,) = lineage_table([view]).rows
     (named, _) = lineage_table([view, view]).rows
@@ -77,6 +75,6 @@ def test_every_file_says_where_it_comes_from(make_view):
 
 def test_a_trial_without_anything_has_a_row_of_dashes(make_view):
     """A trial that was only just begun does not stop the table."""
-    empty = make_view(courses={}, integration=Integration(start_s=0, end_s=0), located=None)
+    empty = make_view(courses={}, integration=Integration(start_s=0, end_s=0), seen=None)
 
     assert trials_table([empty]).rows[0] == ["trial", "0.0", "0", *"–" * 6]

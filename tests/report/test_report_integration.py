@@ -10,6 +10,7 @@ from zfcal.artifacts.validation import check
 from zfcal.behaviour.located import locate
 from zfcal.report.document import integration_document
 from zfcal.report.integration import NOT_COMPARED, measure_integration
+from zfcal.report.seen import see
 from zfcal.report.views import FEATURE_NAMES, ROBOT
 
 
@@ -72,7 +73,7 @@ def test_halves_of_the_same_behaviour_are_alike(two_rooms, wander):
     samples = replace(
         minute, k=np.arange(3000), xy_m=again, confidence=np.ones(again.shape[:2], np.float32)
     )
-    found = measure_integration({}, locate(samples, two_rooms), has_robot=False, start_s=0)
+    found = measure_integration({}, see([locate(samples, two_rooms)]), has_robot=False, start_s=0)
 
     assert found.halves == pytest.approx(dict.fromkeys("DWOTS", 1.0), abs=1e-9)
 
@@ -86,14 +87,16 @@ def test_the_robot_is_in_neither_half(two_rooms, wander):
         minute, k=np.arange(3000), xy_m=xy_m, confidence=np.ones(xy_m.shape[:2], np.float32)
     )
 
-    found = measure_integration({}, locate(samples, two_rooms), has_robot=True, start_s=0)
+    found = measure_integration({}, see([locate(samples, two_rooms)]), has_robot=True, start_s=0)
 
     assert found.halves["S"] == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_short_recording_has_no_halves(two_rooms, wander):
     """Two minutes: what is needed and what there is are both named."""
-    found = measure_integration({}, locate(wander(two_rooms), two_rooms), has_robot=True, start_s=0)
+    seen = see([locate(wander(two_rooms), two_rooms)])
+
+    found = measure_integration({}, seen, has_robot=True, start_s=0)
 
     assert found.halves == {}
     assert any("120 s" in line and "600 s" in line for line in found.missing)

@@ -45,4 +45,4 @@ def test_windows_since_a_second(course):
 def test_a_trial_without_tracks_has_no_length(make_view):
     """Half a minute of samples is 120 s at 0.2 s; nothing is nothing."""
     assert make_view().tracked_s == pytest.approx(120.0)
-    assert make_view(located=None).tracked_s == 0.0
+    assert make_view(seen=None).tracked_s == 0.0

@@ -148,7 +148,7 @@ def test_all_parameters_known_is_said_without_reserve(make_view):
 def test_an_empty_trial_says_where_to_begin(make_view):
     """No tracks: import them, and nothing else is asked for."""
     empty = make_view(
-        located=None,
+        seen=None,
         statistics={},
         courses={},
         rounds=[],

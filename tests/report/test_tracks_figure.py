@@ -7,6 +7,7 @@ import pytest
 
 from zfcal.behaviour.located import locate
 from zfcal.report.panels import compose
+from zfcal.report.seen import grid_of, see, visits_of
 from zfcal.report.tracks_figure import density, path_pieces, tracks_picture
 from zfcal.tracks import FISH
 
@@ -42,7 +43,8 @@ def test_density_by_hand(arenas, wander):
     samples = wander(arena, n=1, n_samples=4, robot=False)
     samples.xy_m[:, 0] = [(0.501, 0.251)] * 3 + [(0.99, 0.99)]
 
-    share, extent = density(locate(samples, arena))
+    share = density(visits_of(locate(samples, arena)))
+    _, extent = grid_of(arena)
 
     assert share.shape == (60, 60)
     assert extent == pytest.approx((0, 1, 0, 1))
@@ -53,7 +55,7 @@ def test_density_by_hand(arenas, wander):
 @pytest.mark.parametrize("name", ["two-rooms", "ring", "own", "narrow"])
 def test_all_time_is_on_the_map(arenas, wander, name):
     """The shares sum to one, for every shape of tank."""
-    share, _ = density(locate(wander(arenas[name]), arenas[name]))
+    share = density(visits_of(locate(wander(arenas[name]), arenas[name])))
 
     assert share.sum() == pytest.approx(1.0)
     assert (share >= 0).all()
@@ -64,13 +66,13 @@ def test_nobody_seen_is_no_picture(arenas, wander):
     samples = wander(arenas["open-square"], n_samples=3)
     samples.xy_m[:] = np.nan
 
-    assert tracks_picture(locate(samples, arenas["open-square"])) is None
+    assert tracks_picture(see([locate(samples, arenas["open-square"])])) is None
 
 
 def test_fish_and_robot_have_a_map_each(arenas, wander):
     """Without a robot there is no empty map of one."""
     arena = arenas["two-rooms"]
-    both, fish = (locate(wander(arena, robot=robot), arena) for robot in (True, False))
+    both, fish = (see([locate(wander(arena, robot=robot), arena)]) for robot in (True, False))
 
     assert [panel.title for panel in tracks_picture(both).panels] == [
         "Paths, 0 to 120 s",
@@ -85,7 +87,7 @@ def test_paths_are_those_of_the_last_window(arenas, wander):
     arena = arenas["open-square"]
     located = locate(wander(arena, n_samples=900), arena)
 
-    picture = tracks_picture(located)
+    picture = tracks_picture(see([located]))
 
     assert picture.panels[0].title == "Paths, 60 to 180 s"
     assert picture.panels[1].title == "Fish, all 180 s"
@@ -96,7 +98,7 @@ def test_an_animal_that_stays_in_one_place_can_be_drawn(arenas, wander):
     arena = arenas["ring"]
     samples = wander(arena, n=1, n_samples=5, robot=False)
     samples = replace(samples, xy_m=np.repeat(samples.xy_m[:1], 5, axis=0))
-    figure = compose(tracks_picture(locate(samples, arena)))
+    figure = compose(tracks_picture(see([locate(samples, arena)])))
 
     figure.canvas.draw()
 
@@ -106,4 +108,4 @@ def test_an_animal_that_stays_in_one_place_can_be_drawn(arenas, wander):
 @pytest.mark.parametrize("name", ["two-rooms", "ring", "own", "narrow"])
 def test_no_text_covers_another(arenas, wander, covered_texts, name):
     """Titles, axes and colour bars have room in wide and in narrow tanks."""
-    assert covered_texts(tracks_picture(locate(wander(arenas[name]), arenas[name]))) == []
+    assert covered_texts(tracks_picture(see([locate(wander(arenas[name]), arenas[name])]))) == []

@@ -28,6 +28,10 @@ N_CORNERS = 256
 _BIN_NAMES = {"D": "distance_m", "W": "wall_distance_m", "V": "speed_m_s"}
 
 
+_BARE = ("Feature", "Polygon", "MultiPolygon", "LineString", "GeometryCollection")
+"""What a drawing program may save instead of a collection."""
+
+
 def read_arena(path: Path) -> Arena:
     """Read an arena from a GeoJSON file.
 
@@ -47,11 +51,23 @@ def read_arena(path: Path) -> Arena:
     """
     with written_by_people():
         document = read_json(path)
+    _check_collection(document, path)
     check(document, "arena", path)
     try:
         return arena_of(document, name=path.stem)
     except InputError as error:
         raise InputError(f"{path}: {error}", hint=error.hint) from error
+
+
+def _check_collection(document: Document, path: Path) -> None:
+    """Say of a polygon by itself what is missing round it: the schema would name its keys."""
+    if document.get("type") in _BARE:
+        outline = '{"type": "Feature", "properties": {"role": "outline"}, "geometry": ...}'
+        raise InputError(
+            f"{path}: is a GeoJSON {document['type']}, expected a FeatureCollection.",
+            hint='Put it in one: {"type": "FeatureCollection", "features": ['
+            f"{outline}]}}, the tank's polygon as the geometry.",
+        )
 
 
 def arena_of(document: Document, *, name: str = "arena") -> Arena:

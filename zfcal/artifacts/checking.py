@@ -9,7 +9,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from zfcal.arena import Arena
 from zfcal.artifacts import machine
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
-from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.freshness import hash_of
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
@@ -74,12 +74,23 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Place:
-    """What the check of one file needs to know; None for what could not be read."""
+    """What the check of one file needs to know; None for what could not be read.
+
+    `hashes` holds those of the inputs that were looked at, by their path relative to
+    the trial; None for one that is no file. The scores of a day name a million.
+    """
 
     root: Path
     now_s: float
     trial: Trial | None
     arena: Arena | None
+    hashes: dict[str, str | None] = field(default_factory=dict)
+
+    def hash_of(self, source: str) -> str | None:
+        if source not in self.hashes:
+            origin = self.root / source
+            self.hashes[source] = hash_of(origin) if origin.is_file() else None
+        return self.hashes[source]
 
 
 def check_trial(root: Path, *, now_s: float | None = None) -> list[Finding]:
@@ -227,13 +238,13 @@ def _lineage(place: _Place, path: Path, name: str) -> Iterator[Finding]:
         return
     again = f"Make it again with: zfcal {lineage.command} {place.root}"
     for source, sha256 in lineage.inputs.items():
-        origin = place.root / source
-        if not origin.is_file() and "/" not in source:
+        found = place.hash_of(source)
+        if found is None and "/" not in source:
             # What lay outside the trial is known by its bare name, wherever it is now.
             continue
-        if not origin.is_file():
+        if found is None:
             yield Finding(level=NOTE, where=name, says=f"its input {source} is gone")
-        elif hash_inputs(place.root, [origin]) != {source: sha256}:
+        elif found != sha256:
             says = f"is out of date: its input {source} has changed"
             yield Finding(level=WARNING, where=name, says=says, hint=again)
     if lineage.version != package_version():

@@ -16,6 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from zfcal.artifacts.arrays import array_of, dictionary_of, numbers_of
 from zfcal.errors import InputError
 
 _TYPES: dict[str, pa.DataType] = {
@@ -156,17 +157,16 @@ def problem_of(table: pa.Table, form: Form) -> str | None:
 
 def _array(column: Column, values: Any) -> pa.Array:
     kind = _TYPES[column.type]
+    from_arrow = isinstance(values, pa.Array | pa.ChunkedArray)
     if column.type == "dictionary":
-        plain = pa.array(values, type=pa.string())
-        codes = pc.index_in(plain, value_set=pa.array(column.values, type=pa.string()))
-        unknown = plain.filter(pc.is_null(codes))
-        if len(unknown):
-            message = f"column {column.name!r} holds {unknown[0].as_py()!r}"
-            raise ValueError(message)
-        return pa.DictionaryArray.from_arrays(codes.cast(pa.int8()), list(column.values))
-    if isinstance(values, pa.Array | pa.ChunkedArray):
+        try:
+            return dictionary_of(values.to_pylist() if from_arrow else values, column.values)
+        except ValueError as error:
+            message = f"column {column.name!r} holds {error}"
+            raise ValueError(message) from error
+    if from_arrow:
         return values.cast(kind)
-    return pa.array(values, type=kind, from_pandas=column.null and not column.nan)
+    return array_of(values, kind, nan_is_null=column.null and not column.nan)
 
 
 def _names_problem(form: Form, names: Sequence[str]) -> str | None:
@@ -208,19 +208,20 @@ def _unknown_value(values: pa.ChunkedArray, column: Column) -> str | None:
 
 
 def _number_problem(values: pa.ChunkedArray | pa.Array, column: Column) -> str | None:
-    known = pc.is_valid(values).to_numpy(zero_copy_only=False)
-    numbers = pc.fill_null(values, 0).to_numpy()
-    wrong = known & ~_allowed(numbers, column)
+    numbers = numbers_of(pc.drop_null(values))
+    wrong = ~_allowed(numbers, column)
     if not wrong.any():
         return None
-    row = int(np.argmax(wrong))
+    place = int(np.argmax(wrong))
+    known = pc.is_valid(values).to_numpy(zero_copy_only=False)
+    row = int(np.flatnonzero(known)[place])
     limits = [
         f"{word} {limit:g}"
         for word, limit in (("at least", column.minimum), ("at most", column.maximum))
         if limit is not None
     ]
     expected = " and ".join(limits) or "a finite number"
-    return f"is {numbers[row]} in row {row}, expected {expected}"
+    return f"is {numbers[place]} in row {row}, expected {expected}"
 
 
 def _allowed(numbers: np.ndarray[Any, Any], column: Column) -> np.ndarray[Any, Any]:
@@ -241,7 +242,7 @@ def _allowed(numbers: np.ndarray[Any, Any], column: Column) -> np.ndarray[Any, A
 def _order_problem(table: pa.Table, form: Form) -> str | None:
     if not form.sorted_by or table.num_rows < 2:
         return None
-    keys = [table.column(name).to_numpy() for name in form.sorted_by]
+    keys = [numbers_of(table.column(name)) for name in form.sorted_by]
     falls = np.zeros(table.num_rows - 1, dtype=bool)
     ties = np.ones(table.num_rows - 1, dtype=bool)
     for key in keys:
@@ -258,7 +259,7 @@ def _order_problem(table: pa.Table, form: Form) -> str | None:
 
 def _clock_problem(table: pa.Table) -> str | None:
     """Check that all rows of a frame have one time, and that later frames have later times."""
-    time_s, frame = table.column("time_s").to_numpy(), table.column("frame").to_numpy()
+    time_s, frame = (numbers_of(table.column(name)) for name in ("time_s", "frame"))
     same = np.diff(frame) == 0
     step = np.diff(time_s)
     wrong = np.where(same, step != 0, step <= 0)

@@ -10,8 +10,8 @@ from zfcal.artifacts.atomic import sha256_of, unreadable
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage, to_json
 from zfcal.errors import DamagedError, InputError
 
-_HASHES: dict[str, tuple[tuple[int, ...], str]] = {}
-"""For each path what its file looked like when it was hashed, and the hash."""
+_HASHES: dict[tuple[int, int], tuple[tuple[int, ...], str]] = {}
+"""For each inode what its file looked like when it was hashed, and the hash."""
 
 
 def hash_inputs(root: Path, paths: Iterable[Path]) -> dict[str, str]:
@@ -31,11 +31,15 @@ def hash_inputs(root: Path, paths: Iterable[Path]) -> dict[str, str]:
     InputError
         A file is missing or cannot be read.
     """
-    return dict(sorted((relative_to(root, path), _hash(path)) for path in paths))
+    return dict(sorted((relative_to(root, path), hash_of(path)) for path in paths))
 
 
 def relative_to(root: Path, path: Path) -> str:
     """Return a path as lineage states it: relative to the trial, with forward slashes."""
+    start, text = f"{root}{os.sep}", str(path)
+    if text.startswith(start) and ".." not in text and os.sep == "/":
+        # The common case, and the quick one: a trial of a day asks it a million times.
+        return text.removeprefix(start)
     return Path(os.path.relpath(path.absolute(), root.absolute())).as_posix()
 
 
@@ -135,14 +139,21 @@ def _shown(value: JSON) -> str:
     return value if isinstance(value, str) else to_json(value)
 
 
-def _hash(path: Path) -> str:
+def hash_of(path: Path | str) -> str:
+    """Return the SHA-256 of a file, which is read only if it has changed since.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be read.
+    """
     try:
-        status = path.stat()
+        status = os.stat(path)  # noqa: PTH116 - asked so often that making a Path would tell
     except OSError as error:
-        raise unreadable(path, error) from error
-    key = (status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino, status.st_dev)
-    name = str(path.absolute())
-    known = _HASHES.get(name)
-    if known is None or known[0] != key:
-        known = _HASHES[name] = (key, sha256_of(path))
+        raise unreadable(Path(path), error) from error
+    place = (status.st_dev, status.st_ino)
+    looks = (status.st_mtime_ns, status.st_ctime_ns, status.st_size)
+    known = _HASHES.get(place)
+    if known is None or known[0] != looks:
+        known = _HASHES[place] = (looks, sha256_of(Path(path)))
     return known[1]

@@ -129,16 +129,24 @@ def robot_ceiling(samples: SamplesOrLocated, arena: Arena) -> list[Scores]:
     """
     fish = locate(samples, arena).of_kind(FISH)
     place = fish_places(fish)
-    seen = np.bincount(place, minlength=1)
-    places = np.flatnonzero(seen >= _MIN_SHARE * seen.max())
-    if len(places) < _MIN_FISH:
-        return []
     group = measure(fish, arena)
     scores = []
-    for f in places:
+    for f in places_of_fish(np.bincount(place, minlength=1)):
         alone = measure_role(fish, place == f)
         scores.append(compare(alone, group - alone))
     return scores
+
+
+def places_of_fish(seen: NDArray[np.int64] | NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the places that were taken long enough to be a fish's; none if fewer than three.
+
+    Parameters
+    ----------
+    seen : ndarray of int, shape (place,)
+        Points of each place, at least one place.
+    """
+    places = np.flatnonzero(seen >= _MIN_SHARE * seen.max())
+    return places if len(places) >= _MIN_FISH else places[:0]
 
 
 def fish_places(located: Located) -> NDArray[np.intp]:
@@ -152,25 +160,41 @@ def fish_places(located: Located) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int, shape (point,)
+        A number per fish, from 0; see `piece_together`.
+    """
+    agents, first, column = np.unique(located.agent, return_index=True, return_inverse=True)
+    last = np.zeros(len(agents), dtype=np.int64)
+    last[column] = located.k  # ascending: the last one stays
+    return piece_together(located.k[first], last)[column]
+
+
+def piece_together(first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.intp]:
+    """Piece track ids together into as few fish as there must have been.
+
+    Parameters
+    ----------
+    first, last : ndarray of int64, shape (id,)
+        First and last sample of each id, in ascending order of the ids.
+
+    Returns
+    -------
+    ndarray of int, shape (id,)
         A number per fish, from 0. An id goes, in order of its first sample, to
         the fish that was lost last before it; so no fish has two ids at once.
         Which of several lost fish came back nobody knows: pieces can be mixed
         up, which draws the fish together a little.
     """
-    agents, first, column = np.unique(located.agent, return_index=True, return_inverse=True)
-    last = np.zeros(len(agents), dtype=np.int64)
-    last[column] = located.k  # ascending: the last one stays
-    place = np.zeros(len(agents), dtype=np.intp)
+    place = np.zeros(len(first), dtype=np.intp)
     free_after: list[int] = []
-    for a in np.argsort(located.k[first], kind="stable"):
-        free = [(end, p) for p, end in enumerate(free_after) if end < located.k[first[a]]]
+    for a in np.argsort(first, kind="stable"):
+        free = [(end, p) for p, end in enumerate(free_after) if end < first[a]]
         if free:
             place[a] = max(free)[1]
             free_after[place[a]] = int(last[a])
         else:
             place[a] = len(free_after)
             free_after.append(int(last[a]))
-    return place[column]
+    return place
 
 
 def halves_ceiling(
@@ -198,8 +222,13 @@ def halves_ceiling(
     located = locate(samples, arena)
     if not len(located):
         return None
-    since_s = (located.k - located.k[0]) * located.dt_s
-    odd = np.floor(since_s / block_s + 1e-9).astype(np.int64) % 2 == 1
+    odd = block_numbers(located, int(located.k[0]), block_s) % 2 == 1
     if not odd.any():
         return None
     return compare(measure(located.take(~odd), arena), measure(located.take(odd), arena))
+
+
+def block_numbers(located: Located, start_k: int, block_s: float) -> NDArray[np.int64]:
+    """Return in which block of time each point lies, counted from a sample, shape (point,)."""
+    since_s = (located.k - start_k) * located.dt_s
+    return np.floor(since_s / block_s + 1e-9).astype(np.int64)

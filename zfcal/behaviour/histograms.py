@@ -50,13 +50,13 @@ def bin_of(values: ArrayLike, limits: tuple[float, float]) -> NDArray[np.intp]:
 
 
 def count_by_zone(
-    zone: NDArray[np.int8], values: Floats, *, limits: tuple[float, float], n_zones: int
+    zone: NDArray[np.integer], values: Floats, *, limits: tuple[float, float], n_zones: int
 ) -> Ints:
     """Count values by zone and bin.
 
     Parameters
     ----------
-    zone : ndarray of int8, shape (value,)
+    zone : ndarray of int, shape (value,)
         Zone ids from 1; none is void.
     values : ndarray, shape (value,)
         Finite numbers, in the unit of the limits.

@@ -18,9 +18,9 @@ from zfcal.behaviour.rows import join_tables, statistics_to_rows
 from zfcal.errors import InputError
 from zfcal.online.control import ControlGroup
 from zfcal.online.events import LeftOut, Made, Note, Progress, Result, Tell
-from zfcal.online.opening import OpenTrial, Task, at_work, reason_to_make
+from zfcal.online.opening import OpenTrial, Task, at_work, tell_reason
 from zfcal.online.scoring import SCORINGS, Window, scores_of
-from zfcal.online.segments import Segments, segment_path
+from zfcal.online.segments import Pooled, Segments, segment_hashes, segment_name
 from zfcal.online.windows import starts_of, whole_segments, window_ends
 from zfcal.trial import second_of
 
@@ -67,27 +67,41 @@ class _Run:
     task: Task
     tell: Tell
     segments: Segments
+    whole: tuple[int, ...]
 
     @property
     def root(self) -> Path:
         return self.opened.trial.root
 
-    def stats_lineage(self, starts: list[int]) -> Lineage:
-        return self._lineage(STATS, starts, {})
+    def stats_lineage(self, hashes: dict[int, str]) -> Lineage:
+        return self._lineage(STATS, hashes, {})
 
-    def scores_lineage(self, starts: list[int]) -> Lineage:
-        return self._lineage(SCORES, starts, {"scoring": self.options.scoring})
+    def scores_lineage(self, hashes: dict[int, str]) -> Lineage:
+        return self._lineage(SCORES, hashes, {"scoring": self.options.scoring})
 
-    def _lineage(self, schema: str, starts: list[int], more: dict[str, JSON]) -> Lineage:
-        files = [*(segment_path(self.root, start) for start in starts), *self.opened.arena_files]
+    def _lineage(self, schema: str, hashes: dict[int, str], more: dict[str, JSON]) -> Lineage:
+        inputs = {segment_name(start): digest for start, digest in hashes.items()}
+        inputs |= hash_inputs(self.root, self.opened.arena_files)
         options: dict[str, JSON] = {**self.opened.clock_options, **more}
         # Without a robot there is no social case; with one the number of them does not matter.
         options["robot"] = self.opened.trial.n_robots > 0
         if self.control is not None:
-            files += self.control.files
+            inputs |= self.control.inputs
             options["control"] = self.control.options
-        inputs = hash_inputs(self.root, files)
         return Lineage(schema=schema, command="analyse", options=options, inputs=inputs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Output:
+    """An artifact that a window has, and why it is to be made; None if it is up to date."""
+
+    path: Path
+    lineage: Lineage
+    reason: str | None
+
+    @classmethod
+    def of(cls, path: Path, lineage: Lineage) -> _Output:
+        return cls(path=path, lineage=lineage, reason=stale_reason([path], lineage))
 
 
 def analyse(
@@ -130,6 +144,7 @@ def analyse(
             task=task,
             tell=tell,
             segments=segments,
+            whole=tuple(whole_segments(opened.trial)),
         )
         known = window_ends(opened.trial, tell)
         _tell_oddities(run, known)
@@ -143,7 +158,7 @@ def _tell_oddities(run: _Run, ends: list[int]) -> None:
     """Say where there is nothing to do yet, and which statistics have lost their tracks."""
     if run.task.ends_s is not None:
         return
-    tracks, n = run.root / "tracks", len(whole_segments(run.opened.trial))
+    tracks, n = run.root / "tracks", len(run.whole)
     if not ends:
         text = f"{tracks}: {n} whole segments of 60 s, and a window needs two; nothing to analyse."
         run.tell(Note(text=text))
@@ -158,52 +173,65 @@ def _tell_oddities(run: _Run, ends: list[int]) -> None:
 
 def _make_window(run: _Run, end_s: int) -> None:
     trial = run.opened.trial
-    stats, scores = (trial.path(folder, end_s, ".parquet") for folder in ("stats", "scores"))
-    own, pooled = list(starts_of(end_s)), _pooled_starts(run, end_s)
-    if not run.task.force and not _is_stale(run, (stats, own), (scores, pooled)):
-        reason_to_make(stats, run.stats_lineage(own), run.task, run.tell)
-        reason_to_make(scores, run.scores_lineage(pooled), run.task, run.tell)
+    hashes = segment_hashes(run.root, _pooled_starts(run, end_s))
+    own = {start: hashes[start] for start in starts_of(end_s)}
+    stats = _Output.of(trial.path("stats", end_s, ".parquet"), run.stats_lineage(own))
+    scores = _Output.of(trial.path("scores", end_s, ".parquet"), run.scores_lineage(hashes))
+    if not run.task.force and stats.reason is None and scores.reason is None:
+        _reason(run, stats)
+        _reason(run, scores)
         return
-    found = _read(run, sorted({*own, *pooled}))
-    gone = [segment_path(run.root, start).name for start in own if start not in found]
+    pooled = run.segments.pool(run.opened, hashes, run.tell) if _is_pooled(run) else None
+    found = _read(run, list(own), pooled)
+    gone = [Path(segment_name(start)).name for start in own if start not in found]
     if gone:
-        problem = f"{stats}: the window that ends at {end_s} s needs tracks/{', '.join(gone)}."
-        run.tell(LeftOut(path=stats, problem=problem))
+        problem = f"{stats.path}: the window that ends at {end_s} s needs tracks/{', '.join(gone)}."
+        run.tell(LeftOut(path=stats.path, problem=problem))
         return
+    if pooled is not None and pooled.problems:
+        # A damaged segment is no input: what is pooled without it holds until it is mended.
+        hashes = {s: digest for s, digest in hashes.items() if s not in pooled.problems}
+        scores = _Output.of(scores.path, run.scores_lineage(hashes))
     window = Window(
         end_s=end_s,
         points=join([found[start] for start in own]),
-        # A damaged segment is no input: what is pooled without it holds until it is mended.
-        pool=join([found[start] for start in pooled if start in found]),
+        pool=None if pooled is None else pooled.pool,
         has_robot=trial.n_robots > 0,
         control=run.control,
     )
-    _write_stats(run, stats, window, own)
-    _write_scores(run, scores, window, [start for start in pooled if start in found])
+    _write_stats(run, stats, window)
+    _write_scores(run, scores, window, next(iter(hashes)))
 
 
-def _is_stale(run: _Run, stats: tuple[Path, list[int]], scores: tuple[Path, list[int]]) -> bool:
-    made = ((stats, run.stats_lineage), (scores, run.scores_lineage))
-    return any(stale_reason([path], lineage(starts)) for (path, starts), lineage in made)
+def _reason(run: _Run, output: _Output) -> str | None:
+    return tell_reason(output.path, output.lineage, run.task, run.tell, reason=output.reason)
+
+
+def _is_pooled(run: _Run) -> bool:
+    """Return whether the robot is judged, over more than the window itself."""
+    return run.opened.trial.n_robots > 0 and run.options.scoring == "paper"
 
 
 def _pooled_starts(run: _Run, end_s: int) -> list[int]:
     """Return the segments over which the robot is judged; of a young trial the window's own."""
     own = list(starts_of(end_s))
-    if not run.opened.trial.n_robots or run.options.scoring != "paper":
+    if not _is_pooled(run):
         return own
     first = min(POOLED_FROM_S, own[0])
-    return [start for start in whole_segments(run.opened.trial) if first <= start < end_s]
+    return [start for start in run.whole if first <= start < end_s]
 
 
-def _read(run: _Run, starts: list[int]) -> dict[int, Located]:
+def _read(run: _Run, starts: list[int], pooled: Pooled | None) -> dict[int, Located]:
+    """Return a window's segments, save the damaged ones; what the pool has told is not told."""
+    if pooled is not None:
+        sound = [start for start in starts if start not in pooled.problems]
+        return {start: run.segments.read(run.opened, start) for start in sound}
     found = {start: run.segments.read_or_tell(run.opened, start, run.tell) for start in starts}
     return {start: located for start, located in found.items() if located is not None}
 
 
-def _write_stats(run: _Run, path: Path, window: Window, starts: list[int]) -> None:
-    lineage = run.stats_lineage(starts)
-    reason = reason_to_make(path, lineage, run.task, run.tell)
+def _write_stats(run: _Run, output: _Output, window: Window) -> None:
+    path, reason = output.path, _reason(run, output)
     if not reason:
         return
     cases = window.cases
@@ -217,19 +245,18 @@ def _write_stats(run: _Run, path: Path, window: Window, starts: list[int]) -> No
         "n_settled": {case: counts.n_settled for case, counts in cases.items()},
         "n_void": {case: counts.n_void for case, counts in cases.items()},
     }
-    write_table(path, make_table(STATS, rows), lineage, extra=extra)
+    write_table(path, make_table(STATS, rows), output.lineage, extra=extra)
     run.tell(Made(path=path, reason=reason))
     _tell_void(run, window)
 
 
-def _write_scores(run: _Run, path: Path, window: Window, starts: list[int]) -> None:
-    lineage = run.scores_lineage(starts)
-    reason = reason_to_make(path, lineage, run.task, run.tell)
+def _write_scores(run: _Run, output: _Output, window: Window, pooled_from_s: int) -> None:
+    path, reason = output.path, _reason(run, output)
     if not reason:
         return
     rows = scores_of(window, run.options.scoring)
-    extra: dict[str, JSON] = {"robot_pooled_from_s": starts[0]}
-    write_table(path, make_table(SCORES, rows), lineage, extra=extra)
+    extra: dict[str, JSON] = {"robot_pooled_from_s": pooled_from_s}
+    write_table(path, make_table(SCORES, rows), output.lineage, extra=extra)
     run.tell(Made(path=path, reason=reason))
     for compared, feature, value, ceiling in zip(
         *(rows[name] for name in ("compared", "feature", "value", "ceiling")), strict=True

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, reduce
+from dataclasses import dataclass, field
+from functools import reduce
 from operator import add
 from pathlib import Path
 from typing import Self
 
-from zfcal.artifacts.freshness import relative_to
+from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON
 from zfcal.behaviour.legacy import LegacyStatistics, measure_legacy
-from zfcal.behaviour.located import Located, join
-from zfcal.behaviour.statistics import Statistics, measure
+from zfcal.behaviour.pooling import Pool
+from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import InputError
 from zfcal.online.events import Tell
 from zfcal.online.opening import OpenTrial
-from zfcal.online.segments import Segments, segment_path
+from zfcal.online.segments import Segments, segment_hashes, segment_path
 from zfcal.online.windows import whole_segments
-from zfcal.tracks import ROBOT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,18 +26,26 @@ class ControlGroup:
 
     Parameters
     ----------
-    fish
-        Where they were, a stretch per trial.
-    files
-        The files that this stands on.
+    statistics
+        What they did, pooled.
+    inputs
+        SHA-256 of the files that this stands on, by their path relative to the
+        trial that is analysed.
     options
         For each trial, by its path relative to the one that is analysed, the
         settings that bear on the counts.
+    parts
+        For each trial the segments, in order.
+    segments
+        Reads them.
     """
 
-    fish: tuple[Located, ...]
-    files: tuple[Path, ...]
+    statistics: Statistics
+    inputs: dict[str, str]
     options: dict[str, JSON]
+    parts: tuple[tuple[OpenTrial, tuple[int, ...]], ...]
+    segments: Segments
+    _legacy: dict[float, LegacyStatistics] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -64,33 +71,47 @@ class ControlGroup:
         """
         if not roots:
             return None
-        fish, files = [], []
+        parts, statistics = [], []
+        inputs: dict[str, str] = {}
         options: dict[str, JSON] = {}
         for root in roots:
             other = segments.open(root)
             _check_comparable(opened, other)
-            found = {
-                start: segments.read_or_tell(other, start, tell)
-                for start in whole_segments(other.trial)
-            }
-            whole = {start: part for start, part in found.items() if part is not None}
-            _check_fish_only(root, whole)
-            fish.append(join([whole[start] for start in sorted(whole)]))
-            files += [segment_path(root, start) for start in sorted(whole)] + other.arena_files
+            hashes = segment_hashes(root, whole_segments(other.trial))
+            pooled = segments.pool(other, hashes, tell)
+            whole = [start for start in hashes if start not in pooled.problems]
+            _check_fish_only(other, pooled.pool, whole)
+            statistics.append(pooled.pool.fish())
+            parts.append((other, tuple(whole)))
+            files = [segment_path(root, start) for start in whole] + other.arena_files
+            inputs |= hash_inputs(opened.trial.root, files)
             options[relative_to(opened.trial.root, root)] = other.clock_options
-        return cls(fish=tuple(fish), files=tuple(files), options=options)
-
-    @cached_property
-    def statistics(self) -> Statistics:
-        """What they did, pooled."""
-        return reduce(add, (measure(part, part.arena) for part in self.fish))
+        return cls(
+            statistics=reduce(add, statistics),
+            inputs=inputs,
+            options=options,
+            parts=tuple(parts),
+            segments=segments,
+        )
 
     def legacy(self, extent_m: float) -> LegacyStatistics:
         """Return what they did as the authors' scripts count it, pooled."""
-        parts = [measure_legacy(part, part.arena, extent_m=extent_m) for part in self.fish]
-        names = ("distance", "n_distance", "occupation", "transition")
-        sums = {name: reduce(add, (getattr(part, name) for part in parts)) for name in names}
-        return LegacyStatistics(zone_names=parts[0].zone_names, **sums)
+        if extent_m not in self._legacy:
+            known = self.statistics
+            counts = [
+                measure_legacy(self.segments.read(opened, start), opened.arena, extent_m=extent_m)
+                for opened, starts in self.parts
+                for start in starts
+            ]
+            self._legacy[extent_m] = LegacyStatistics(
+                zone_names=known.zone_names,
+                distance=reduce(add, (one.distance for one in counts)),
+                n_distance=reduce(add, (one.n_distance for one in counts)),
+                # Steps from one segment to the next are in what is known.
+                occupation=known.occupation,
+                transition=known.transition,
+            )
+        return self._legacy[extent_m]
 
 
 def _check_comparable(opened: OpenTrial, other: OpenTrial) -> None:
@@ -118,15 +139,17 @@ def _check_comparable(opened: OpenTrial, other: OpenTrial) -> None:
             )
 
 
-def _check_fish_only(root: Path, whole: dict[int, Located]) -> None:
+def _check_fish_only(other: OpenTrial, pool: Pool, whole: list[int]) -> None:
+    root = other.trial.root
     if not whole:
         raise InputError(
             f"{root}: has no whole track segment to be a control.",
             hint=f"Import its tracks first: zfcal import SRC {root}",
         )
-    for start, part in whole.items():
-        if (part.kind == ROBOT).any():
-            raise InputError(
-                f"{segment_path(root, start)}: holds a robot, expected fish alone.",
-                hint="A control group is fish alone.",
-            )
+    if pool.first_robot_k is not None:
+        seen_s = pool.first_robot_k * other.trial.dt_s
+        start = max(start for start in whole if start <= seen_s + 0.5 * other.trial.dt_s)
+        raise InputError(
+            f"{segment_path(root, start)}: holds a robot, expected fish alone.",
+            hint="A control group is fish alone.",
+        )

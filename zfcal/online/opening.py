@@ -106,6 +106,13 @@ def reason_to_make(
         Options that do not bear on the result.
     """
     reason = stale_reason([path], expected, ignore_options=ignore)
+    return tell_reason(path, expected, task, tell, reason=reason)
+
+
+def tell_reason(
+    path: Path, expected: Lineage, task: Task, tell: Tell, *, reason: str | None
+) -> str | None:
+    """Return what `reason_to_make` does, where it is known already why an artifact is stale."""
     if reason is None and task.force:
         reason = "forced"
     if reason is None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from zfcal.behaviour.ceilings import Ceiling, robot_ceiling, summarise
+from zfcal.behaviour.ceilings import Ceiling, summarise
 from zfcal.behaviour.legacy import EXTENT_M, compare_legacy, measure_legacy
 from zfcal.behaviour.located import Located
+from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.rows import SCORES_COLUMNS, Table, join_tables, scores_to_rows
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import Statistics, measure, measure_robot
@@ -30,7 +31,8 @@ class Window:
     points
         All agents of the window.
     pool
-        All agents of the longer stretch over which the robot is judged.
+        What all agents did over the longer stretch on which the robot is judged;
+        None where it is not judged.
     has_robot
         Whether a robot is in the tank.
     control
@@ -39,7 +41,7 @@ class Window:
 
     end_s: int
     points: Located
-    pool: Located
+    pool: Pool | None
     has_robot: bool
     control: ControlGroup | None = None
 
@@ -79,7 +81,7 @@ def scores_of(window: Window, scoring: str) -> Table:
         paper = scoring == "paper"
         social = compare(cases["social"], cases["control"]) if paper else _legacy(window)
         made.append(("social-vs-control", social, None))
-    if window.has_robot and scoring == "paper":
+    if window.pool is not None and scoring == "paper":
         made.append(("robot-vs-fish", *_robot(window.pool)))
     tables = [
         scores_to_rows(scores, window_end_s=window.end_s, compared=compared, ceiling=ceiling)
@@ -88,11 +90,10 @@ def scores_of(window: Window, scoring: str) -> Table:
     return join_tables([{name: [] for name in SCORES_COLUMNS}, *tables])
 
 
-def _robot(pool: Located) -> tuple[Scores, Ceiling | None]:
-    fish = measure(pool.of_kind(FISH), pool.arena)
-    in_its_place = robot_ceiling(pool, pool.arena)
+def _robot(pool: Pool) -> tuple[Scores, Ceiling | None]:
+    in_its_place = pool.robot_ceiling()
     ceiling = summarise(in_its_place) if in_its_place else None
-    return compare(measure_robot(pool, pool.arena), fish), ceiling
+    return compare(pool.robot(), pool.fish()), ceiling
 
 
 def _legacy(window: Window) -> Scores:

@@ -7,15 +7,18 @@ located is remembered, by the content of the file.
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import final
 
 from zfcal.arena import Arena
-from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.freshness import hash_inputs, hash_of
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
+from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.sampling import sample
-from zfcal.errors import DamagedError, InputError
+from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.online.events import LeftOut, Tell
 from zfcal.online.opening import OpenTrial, open_trial
 from zfcal.tracks import Tracks
@@ -26,13 +29,32 @@ STEP_S = int(SEGMENT_S)
 END_KEY = "end_s"
 """Extra metadata of a segment: the second up to which the recording filled it."""
 
-_REMEMBERED = 512
-"""Segments kept in memory: a working day, some 100 MB with five agents at 5 Hz."""
+_REMEMBERED = 200_000
+"""Points kept in memory, some 12 MB: two hours of five agents at 5 Hz."""
+
+_AT_LEAST = 3
+"""Segments kept in memory however many points they hold: those of a window."""
+
+
+def segment_name(start_s: int) -> str:
+    """Return the path of the segment that starts at a second, relative to its trial."""
+    return f"tracks/{start_s:06d}.parquet"
 
 
 def segment_path(root: Path, start_s: int) -> Path:
     """Return the place of the segment that starts at a second."""
-    return root / "tracks" / f"{start_s:06d}.parquet"
+    return root / segment_name(start_s)
+
+
+def segment_hashes(root: Path, starts: Iterable[int]) -> dict[int, str]:
+    """Return the SHA-256 of segments by the second at which they start.
+
+    Raises
+    ------
+    InputError
+        One is missing or cannot be read.
+    """
+    return {start: hash_of(f"{root}/{segment_name(start)}") for start in starts}
 
 
 def segment_starts(root: Path) -> list[int]:
@@ -42,6 +64,25 @@ def segment_starts(root: Path) -> list[int]:
     """
     found = (second_of(path) for path in (root / "tracks").glob("*.parquet"))
     return sorted(second for second in found if second is not None and second % STEP_S == 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pooled:
+    """What everybody did over some segments.
+
+    Parameters
+    ----------
+    pool
+        The counts. They grow when more segments are pooled: ask before that.
+    hashes
+        SHA-256 of each segment, by its start.
+    problems
+        By their start, those that cannot be read and count nothing, and why.
+    """
+
+    pool: Pool
+    hashes: dict[int, str] = field(default_factory=dict)
+    problems: dict[int, ZfcalError] = field(default_factory=dict)
 
 
 @final
@@ -55,6 +96,7 @@ class Segments:
     def __init__(self) -> None:
         self._located: OrderedDict[tuple[str, ...], Located] = OrderedDict()
         self._arenas: dict[tuple[str, str], Arena] = {}
+        self._pooled: dict[tuple[str, ...], Pooled] = {}
 
     def open(self, root: Path) -> OpenTrial:
         """Open a trial; as long as its arena file stays, it is the very same arena."""
@@ -72,16 +114,18 @@ class Segments:
         DamagedError
             The file is damaged, of another schema, or holds what no tracker writes.
         """
-        trial = opened.trial
-        path = segment_path(trial.root, start_s)
-        content = hash_inputs(trial.root, [path])
-        clock = (str(trial.fps), str(trial.dt_s), str(id(opened.arena)))
-        key = (str(path.absolute()), *content.values(), *clock)
+        path = segment_path(opened.trial.root, start_s)
+        key = (str(path.absolute()), hash_of(path), *_clock(opened))
         if key not in self._located:
             self._located[key] = _locate(opened, path, start_s)
-            if len(self._located) > _REMEMBERED:
-                self._located.popitem(last=False)
+            self._forget()
         return self._located[key]
+
+    def _forget(self) -> None:
+        n_points = sum(map(len, self._located.values()))
+        while n_points > _REMEMBERED and len(self._located) > _AT_LEAST:
+            _, oldest = self._located.popitem(last=False)
+            n_points -= len(oldest)
 
     def read_or_tell(self, opened: OpenTrial, start_s: int, tell: Tell) -> Located | None:
         """Return what `read` does; None for a segment that is left out, which is told."""
@@ -91,6 +135,41 @@ class Segments:
             path = segment_path(opened.trial.root, start_s)
             tell(LeftOut(path=path, problem=str(error), hint=error.hint))
             return None
+
+    def pool(self, opened: OpenTrial, hashes: dict[int, str], tell: Tell) -> Pooled:
+        """Return what everybody did over some segments, each of which is read once.
+
+        Where the segments that were pooled the last time come first again,
+        unchanged, the others are added to them.
+
+        Parameters
+        ----------
+        opened
+            The trial.
+        hashes
+            The segments by their start, in order of time, from `segment_hashes`.
+        tell
+            Hears of segments that are left out.
+        """
+        key = (str(opened.trial.root.absolute()), *_clock(opened))
+        known = self._pooled.get(key)
+        if known is None or [*known.hashes.items()] != [*hashes.items()][: len(known.hashes)]:
+            known = self._pooled[key] = Pooled(pool=Pool(opened.arena))
+        for start, digest in [*hashes.items()][len(known.hashes) :]:
+            try:
+                known.pool.add(self.read(opened, start))
+            except (DamagedError, InputError) as error:
+                known.problems[start] = error
+            known.hashes[start] = digest
+        for start, problem in known.problems.items():
+            path = segment_path(opened.trial.root, start)
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
+        return known
+
+
+def _clock(opened: OpenTrial) -> tuple[str, ...]:
+    """Return what else bears on where everybody was; an arena that was opened stays the same."""
+    return str(opened.trial.fps), str(opened.trial.dt_s), str(id(opened.arena))
 
 
 def _locate(opened: OpenTrial, path: Path, start_s: int) -> Located:

@@ -6,15 +6,21 @@ the commands then do with it is in the stages.
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
 from zfcal.artifacts.settings import find_trial
+from zfcal.errors import InputError
 from zfcal.trial import CONFIG_NAME, second_of
 from zfcal.units import SEGMENT_S
 
 _ENDS_AFTER_S = {"tracks": (int(SEGMENT_S), 2 * int(SEGMENT_S)), "stats": (0,), "scores": (0,)}
 """By folder, what to add to the number of a file to get the ends of its windows."""
+
+
+_MOST_NAMED = 8
+"""Files and folders that a hint names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +59,29 @@ def work_of(path: Path) -> Work:
     if second is None or after_s is None:
         return Work(root=root)
     return Work(root=root, ends_s=frozenset(second + add_s for add_s in after_s))
+
+
+def work_at(path: Path) -> Work:
+    """Return what `work_of` does, for a path that a person has typed.
+
+    Raises
+    ------
+    InputError
+        It is not there, or lies in no trial. What came through a pipe may be gone
+        again; a slip of the pen in a trial must not set all of it to work.
+    """
+    work = work_of(path)
+    if not path.exists():
+        folder = next(parent for parent in path.parents if parent.is_dir())
+        names = sorted(part.name for part in folder.iterdir() if not part.name.startswith("."))
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        near = difflib.get_close_matches(path.name, names, n=1)
+        meant = f"Did you mean {folder / near[0]}? " if near else ""
+        raise InputError(
+            f"{path}: no such file or folder in the trial {work.root}.",
+            hint=f"{meant}{folder} holds {', '.join(names[:_MOST_NAMED]) or 'nothing'}{more}.",
+        )
+    return work
 
 
 def _root_of(path: Path) -> Path:

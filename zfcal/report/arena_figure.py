@@ -12,11 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from zfcal.arena import Arena, Zone
 from zfcal.report import theme
 from zfcal.report.panels import Entry, Panel, Picture, write_picture
+
+Field = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 WIDTH_IN = 5.4
 _TALLEST_IN = 6.4
@@ -57,10 +60,11 @@ def arena_picture(arena: Arena, *, width_in: float = WIDTH_IN) -> Picture:
 def _panel(arena: Arena, width_in: float) -> Panel:
     x0, y0, x1, y1 = arena.outline.bounds
     names = ", ".join(arena.zone_names)
+    field = _distance_field(arena)
     return Panel(
         title=f"{x1 - x0:.2f} by {y1 - y0:.2f} m",
         alt=f"Plan of the arena {arena.name}, {x1 - x0:.2f} by {y1 - y0:.2f} m, zones {names}.",
-        draw=lambda axes: _draw(axes, arena, width_in),
+        draw=lambda axes: _draw(axes, arena, width_in, field),
         size_in=arena_size_in(arena, width_in),
     )
 
@@ -152,20 +156,26 @@ def paint_zones(axes: Axes, arena: Arena, *, alpha: float) -> None:
             )
 
 
-def _draw(axes: Axes, arena: Arena, width_in: float) -> None:
+def _draw(axes: Axes, arena: Arena, width_in: float, field: Field) -> None:
     axes.grid(visible=False)
     paint_walls(axes, arena)
     paint_zones(axes, arena, alpha=0.35)
-    _paint_distances(axes, arena)
+    _paint_distances(axes, arena, field)
     _paint_names(axes, arena, m_per_in=arena.extent_m / (width_in - 0.9))
     _paint_scale(axes, arena)
 
 
-def _paint_distances(axes: Axes, arena: Arena) -> None:
+def _distance_field(arena: Arena) -> Field:
+    """Return x, y and the distance to the wall on a grid, NaN outside, in metres."""
     x0, y0, x1, y1 = arena.outline.bounds
     x_m, y_m = np.meshgrid(np.linspace(x0, x1, _GRID_POINTS), np.linspace(y0, y1, _GRID_POINTS))
     inside = shapely.contains_xy(arena.outline, x_m, y_m)
     distance_m = np.where(inside, arena.wall_distance(np.stack([x_m, y_m], axis=-1)), np.nan)
+    return x_m, y_m, distance_m
+
+
+def _paint_distances(axes: Axes, arena: Arena, field: Field) -> None:
+    x_m, y_m, distance_m = field
     step_m = contour_step_m(arena)
     levels = np.arange(step_m, np.nanmax(distance_m), step_m)
     if levels.size:

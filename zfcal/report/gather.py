@@ -6,7 +6,7 @@ A file that is damaged is left out and named; the rest is still shown.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,13 @@ from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
-from zfcal.behaviour.located import Located, join, locate
+from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.integration import measure_integration
-from zfcal.report.simulated import long_run
+from zfcal.report.seen import see
 from zfcal.report.views import Course, CourseKey, Round, Source, TrialView
 from zfcal.trial import Trial, second_of
 from zfcal.units import SEGMENT_S
@@ -96,7 +96,7 @@ def input_files(root: Path) -> list[Path]:
     return files
 
 
-def gather(root: Path, on_damage: Damage) -> TrialView:
+def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
     """Read all that the report shows of a trial.
 
     Parameters
@@ -105,6 +105,9 @@ def gather(root: Path, on_damage: Damage) -> TrialView:
         The trial's directory.
     on_damage
         Hears of each file that is left out.
+    alone
+        Whether the report is of this trial alone; one of several shows nothing of
+        what the models do, which is then not simulated.
 
     Raises
     ------
@@ -119,7 +122,7 @@ def gather(root: Path, on_damage: Damage) -> TrialView:
         r for second, path in reader.files("models", ".toml") if (r := _round(reader, second, path))
     ]
     calibrated = next((r for r in reversed(rounds) if r.second > 0), None)
-    located = _located(reader)
+    seen = see(_stretches(reader))
     return TrialView(
         root=root,
         trial=trial,
@@ -127,16 +130,25 @@ def gather(root: Path, on_damage: Damage) -> TrialView:
         courses=courses,
         statistics=_statistics(reader, None if calibrated is None else calibrated.second),
         rounds=rounds,
-        model_statistics=None if calibrated is None else long_run(calibrated, trial, arena),
-        located=located,
+        model_statistics=_simulated(calibrated, trial, arena) if alone else None,
+        seen=seen,
         integration=measure_integration(
-            courses, located, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
+            courses, seen, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
         ),
         sources=list(_sources(reader)),
         left_out=list(reader.damaged.values()),
         scoring=str(scored.get("scoring", "paper")),
         has_control_trials="control" in scored,
     )
+
+
+def _simulated(calibrated: Round | None, trial: Trial, arena: Arena) -> Statistics | None:
+    if calibrated is None:
+        return None
+    # It brings the compiler along, which takes longer than the simulation.
+    from zfcal.report.simulated import long_run
+
+    return long_run(calibrated, trial, arena)
 
 
 def _courses(reader: _Reader) -> tuple[dict[CourseKey, Course], dict[str, Any]]:
@@ -197,14 +209,12 @@ def _round(reader: _Reader, second: int, path: Path) -> Round | None:
     )
 
 
-def _located(reader: _Reader) -> Located | None:
-    """Return where everybody was, over all segments that can be read."""
-    parts: list[Located] = []
+def _stretches(reader: _Reader) -> Iterator[Located]:
+    """Yield where everybody was, for each segment that can be read."""
     for start_s, path in reader.files("tracks", ".parquet"):
         part = reader.attempt(path, lambda p, s=start_s: _locate(reader, p, s))  # type: ignore[misc]
         if part is not None:
-            parts.append(part)
-    return join(parts) if parts else None
+            yield part
 
 
 def _locate(reader: _Reader, path: Path, start_s: int) -> Located:
@@ -233,7 +243,13 @@ def _sources(reader: _Reader) -> Iterator[Source]:
             lineage = reader.attempt(path, read_lineage)
             if isinstance(lineage, Lineage):
                 (digest,) = hash_inputs(root, [path]).values()
-                yield Source(path=relative_to(root, path), sha256=digest, lineage=lineage)
+                # Of a day's recording the inputs of all scores would be a million.
+                yield Source(
+                    path=relative_to(root, path),
+                    sha256=digest,
+                    lineage=replace(lineage, inputs={}),
+                    n_inputs=len(lineage.inputs),
+                )
 
 
 def _ignore(_: DamagedError) -> None:

@@ -10,10 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from zfcal.behaviour.ceilings import halves_ceiling
-from zfcal.behaviour.located import Located
+from zfcal.report.seen import Seen
 from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integration, Mark
-from zfcal.tracks import FISH
 
 LATE_S = 300
 """From here on the robot is judged (Cazenille et al.: scores have settled by then)."""
@@ -26,7 +24,7 @@ HALVES_MIN_S = 600.0
 
 def measure_integration(
     courses: Mapping[CourseKey, Course],
-    located: Located | None,
+    seen: Seen | None,
     *,
     has_robot: bool,
     start_s: int,
@@ -37,7 +35,7 @@ def measure_integration(
     ----------
     courses
         The scores over time.
-    located
+    seen
         All agents of the trial; None without tracks.
     has_robot
         Whether the trial has one.
@@ -64,7 +62,7 @@ def measure_integration(
         missing.append(
             "There is no ceiling for the robot: to put a fish in its place needs three fish."
         )
-    halves, why = _halves(located)
+    halves, why = _halves(seen)
     return Integration(
         start_s=start_s,
         end_s=end_s,
@@ -89,18 +87,17 @@ def _robot(courses: Mapping[CourseKey, Course]) -> tuple[dict[str, Mark], int]:
     return marks, end_s
 
 
-def _halves(located: Located | None) -> tuple[dict[str, float], str]:
+def _halves(seen: Seen | None) -> tuple[dict[str, float], str]:
     """Return the fish of every other minute against the others, or why not."""
-    if located is None or not len(located):
+    if seen is None or not seen.n_points:
         return {}, "There are no tracks."
-    fish = located.of_kind(FISH)
-    length_s = (int(located.k[-1]) - int(located.k[0]) + 1) * located.dt_s
-    if length_s < HALVES_MIN_S - located.dt_s:
+    length_s = (seen.last_k - seen.first_k + 1) * seen.dt_s
+    if length_s < HALVES_MIN_S - seen.dt_s:
         return {}, (
             f"The recording is {length_s:.0f} s long; to compare its halves with each other it "
             f"needs {HALVES_MIN_S:.0f} s."
         )
-    scores = halves_ceiling(fish, located.arena)
+    scores = seen.halves.scores()
     if scores is None:
         return {}, "There are no fish in one half of the recording."
     named = {"D": scores.I_D, "W": scores.I_W, "O": scores.I_O, "T": scores.I_T, "S": scores.S}

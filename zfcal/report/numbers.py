@@ -102,7 +102,7 @@ def lineage_table(views: Sequence[TrialView]) -> Table:
             source.lineage.command,
             source.lineage.version,
             _NONE if source.lineage.seed is None else str(source.lineage.seed),
-            str(len(source.lineage.inputs)),
+            str(source.n_inputs),
             source.sha256[:12],
             _short(to_json(dict(source.lineage.options))),
         ]

@@ -66,7 +66,7 @@ def write_report(
     """
     place = _place(roots, out_dir)
     lineage = _lineage(roots, place)
-    views = [gather(root, on_damage or _ignore) for root in roots]
+    views = [gather(root, on_damage or _ignore, alone=len(roots) == 1) for root in roots]
     _check_one_arena(views)
     pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []

@@ -22,7 +22,7 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
         *_scores([view]),
         _statistics(view),
         parameters_picture(view.rounds),
-        None if view.located is None else tracks_picture(view.located),
+        None if view.seen is None else tracks_picture(view.seen),
         arena_picture(view.arena, width_in=_ARENA_IN),
     )
     return [picture for picture in made if picture is not None]

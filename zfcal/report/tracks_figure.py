@@ -17,6 +17,7 @@ from zfcal.behaviour.located import Located
 from zfcal.report import theme
 from zfcal.report.arena_figure import arena_size_in, paint_walls, paint_zones
 from zfcal.report.panels import Entry, Panel, Picture
+from zfcal.report.seen import Seen, Visits, grid_of
 from zfcal.tracks import FISH, KINDS, ROBOT
 from zfcal.units import WINDOW_S
 
@@ -26,9 +27,6 @@ _WIDTH_IN = 3.4
 _BAR_IN = 0.6
 """Room for the bar that tells what the colours of a map mean."""
 
-_CELLS = 60
-"""Squares of the density map along the longer side of the tank."""
-
 _SLIVER = 0.3
 """A square counts as having at least this share of its area in the tank."""
 
@@ -36,36 +34,34 @@ _BRIGHTEST = 0.995
 """The squares above this quantile share the brightest colour."""
 
 
-def tracks_picture(located: Located) -> Picture | None:
+def tracks_picture(seen: Seen) -> Picture | None:
     """Return paths of the last window and maps of the whole recording; None without a point.
 
     Parameters
     ----------
-    located
-        All agents of a trial on the model's clock.
+    seen
+        All agents of a trial.
     """
-    if not len(located):
+    if not seen.n_points:
         return None
-    arena = located.arena
+    arena = seen.arena
     width_in, height_in = arena_size_in(arena, _WIDTH_IN)
-    end_s = float(located.k[-1] + 1) * located.dt_s
-    start_s = max(float(located.k[0]) * located.dt_s, end_s - WINDOW_S)
-    last = located.between(start_s, end_s)
-    kinds = [kind for kind in (FISH, ROBOT) if (located.kind == kind).any()]
+    start_s = max(float(seen.first_k) * seen.dt_s, seen.end_s - WINDOW_S)
     paths = Panel(
-        title=f"Paths, {start_s:.0f} to {end_s:.0f} s",
-        alt=f"Paths of {_count(last)} over the plan of the arena {arena.name}.",
-        draw=partial(_draw_paths, located=last),
+        title=f"Paths, {start_s:.0f} to {seen.end_s:.0f} s",
+        alt=f"Paths of {_count(seen.last)} over the plan of the arena {arena.name}.",
+        draw=partial(_draw_paths, located=seen.last),
         size_in=(width_in, height_in),
     )
+    area_m2 = _area_inside_m2(arena)
     maps = [
         Panel(
-            title=f"{KINDS[kind].capitalize()}, all {end_s:.0f} s",
-            alt=_describe_map(located.of_kind(kind), KINDS[kind]),
-            draw=partial(_draw_density, located=located.of_kind(kind)),
+            title=f"{KINDS[kind].capitalize()}, all {seen.end_s:.0f} s",
+            alt=_describe_map(visits, arena.zone_names, KINDS[kind]),
+            draw=partial(_draw_density, arena=arena, visits=visits, area_m2=area_m2),
             size_in=(width_in + _BAR_IN, height_in),
         )
-        for kind in kinds
+        for kind, visits in seen.visits.items()
     ]
     colours = {FISH: theme.FISH, ROBOT: theme.ROBOT}
     return Picture(
@@ -73,7 +69,8 @@ def tracks_picture(located: Located) -> Picture | None:
         title="Tracks",
         panels=(paths, *maps),
         key=tuple(
-            Entry(label=f"{KINDS[kind]}, path", colour=colours[kind], mark="line") for kind in kinds
+            Entry(label=f"{KINDS[kind]}, path", colour=colours[kind], mark="line")
+            for kind in seen.visits
         ),
         note="Paths break where an animal was not seen. The maps tell how many times as long an "
         "animal was in a place as if it were everywhere alike.",
@@ -85,9 +82,8 @@ def _count(located: Located) -> str:
     return " and ".join(f"{n} {kind} tracks" for kind, n in ids.items() if n) or "nobody"
 
 
-def _describe_map(located: Located, who: str) -> str:
-    names = located.arena.zone_names
-    share = np.bincount(located.zone, minlength=len(names) + 1) / len(located)
+def _describe_map(visits: Visits, names: tuple[str, ...], who: str) -> str:
+    share = visits.zones / visits.zones.sum()
     said = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share[1:], strict=True))
     return f"Map of where the {who} spent the time: {said}."
 
@@ -122,14 +118,13 @@ def path_pieces(located: Located) -> list[Floats]:
     return [piece for piece in np.split(xy_m, breaks) if len(piece) > 1]
 
 
-def _draw_density(axes: Axes, *, located: Located) -> None:
+def _draw_density(axes: Axes, *, arena: Arena, visits: Visits, area_m2: Floats) -> None:
     axes.grid(visible=False)
-    paint_walls(axes, located.arena)
-    share, extent = density(located)
-    area_m2 = _area_inside_m2(located.arena, extent, share.shape)
+    paint_walls(axes, arena)
+    _, extent = grid_of(arena)
     # A square that the wall cuts to a sliver would stand out for a single visit.
     floor_m2 = _SLIVER * float(area_m2.max())
-    times = share * located.arena.outline.area / np.maximum(area_m2, floor_m2)
+    times = density(visits) * arena.outline.area / np.maximum(area_m2, floor_m2)
     times = np.ma.masked_array(times, area_m2 <= 0)
     brightest = float(np.quantile(times.compressed(), _BRIGHTEST))
     # A square root: else the corner where a fish rests is all that is seen.
@@ -150,36 +145,14 @@ def _draw_density(axes: Axes, *, located: Located) -> None:
     bar.outline.set_visible(False)
 
 
-def density(located: Located) -> tuple[Floats, tuple[float, float, float, float]]:
-    """Return the share of time in each square of a grid over the tank.
-
-    Parameters
-    ----------
-    located
-        At least one point.
-
-    Returns
-    -------
-    share : ndarray, shape (row, column)
-        Rows go up (y), columns right (x); sums to one over the points inside.
-    extent : tuple of float
-        ``x0, x1, y0, y1`` of the grid in metres.
-    """
-    x0, y0, x1, y1 = located.arena.outline.bounds
-    cell_m = located.arena.extent_m / _CELLS
-    columns, rows = (max(1, int(np.ceil(length / cell_m - 1e-9))) for length in (x1 - x0, y1 - y0))
-    extent = (x0, x0 + columns * cell_m, y0, y0 + rows * cell_m)
-    seen_m = located.xy_m[located.zone > 0]
-    counts, _, _ = np.histogram2d(
-        seen_m[:, 1], seen_m[:, 0], bins=(rows, columns), range=(extent[2:], extent[:2])
-    )
-    return counts / max(counts.sum(), 1.0), extent
+def density(visits: Visits) -> Floats:
+    """Return the share of time in each square, shape (row, column); the shares sum to one."""
+    return visits.cells / max(visits.cells.sum(), 1.0)
 
 
-def _area_inside_m2(
-    arena: Arena, extent: tuple[float, float, float, float], shape: tuple[int, ...]
-) -> Floats:
-    """Return how much of each square lies in the tank, in square metres."""
+def _area_inside_m2(arena: Arena) -> Floats:
+    """Return how much of each square of the grid lies in the tank, in square metres."""
+    shape, extent = grid_of(arena)
     x, dx = np.linspace(*extent[:2], shape[1], endpoint=False, retstep=True)
     y, dy = np.linspace(*extent[2:], shape[0], endpoint=False, retstep=True)
     x_m, y_m = np.meshgrid(x, y)

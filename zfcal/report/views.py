@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.artifacts.lineage import Lineage
-from zfcal.behaviour.located import Located
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
+from zfcal.report.seen import Seen
 from zfcal.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -153,11 +153,15 @@ class Round:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """One artifact and where it comes from; the path is relative to its trial."""
+    """One artifact and where it comes from; the path is relative to its trial.
+
+    The lineage names no inputs: there are ``n_inputs``, and `zfcal inspect` shows them.
+    """
 
     path: str
     sha256: str
     lineage: Lineage
+    n_inputs: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,9 +208,10 @@ class TrialView:
     rounds
         The models, the starting one first.
     model_statistics
-        What the last calibrated model does in a long simulation; None without.
-    located
-        All agents on the model's clock; None without tracks.
+        What the last calibrated model does in a long simulation; None without
+        one, and where it is not shown.
+    seen
+        All agents; None without tracks.
     integration
         The robot among the fish.
     sources
@@ -226,7 +231,7 @@ class TrialView:
     statistics: Mapping[tuple[int, str], Statistics]
     rounds: Sequence[Round]
     model_statistics: Statistics | None
-    located: Located | None
+    seen: Seen | None
     integration: Integration
     sources: Sequence[Source]
     left_out: Sequence[str] = ()
@@ -246,9 +251,7 @@ class TrialView:
     @property
     def tracked_s(self) -> float:
         """Seconds of the recording up to the last sample; 0 without tracks."""
-        if self.located is None or not len(self.located):
-            return 0.0
-        return float(self.located.k[-1] + 1) * self.located.dt_s
+        return 0.0 if self.seen is None else self.seen.end_s
 
     def course(self, compared: str, feature: str, zone: str | None = None) -> Course:
         """Return a score over time, empty where there is none."""
