@@ -1,7 +1,5 @@
 """What a tracker did to positions, found from the positions alone."""
 
-import math
-
 import numpy as np
 import pytest
 import shapely
@@ -93,11 +91,8 @@ def test_the_depth_beyond_a_straight_wall_by_hand(worlds):
 
 
 def test_without_frames_between_steps_and_without_arena_nothing_is_known(worlds, walk):
-    """5 Hz and a step of 0.2 s: the noise is NaN, and says so."""
-    found = estimate_noise(worlds.tracks_of(walk, fps=5.0), fps=5.0, dt_s=0.2)
-
-    assert math.isnan(found.sd_m)
-    assert found.how == "unknown"
+    """5 Hz and a step of 0.2 s: None, unless the noise is stated."""
+    assert estimate_noise(worlds.tracks_of(walk, fps=5.0), fps=5.0, dt_s=0.2) is None
 
 
 def test_losses_by_hand(worlds):
@@ -106,7 +101,7 @@ def test_losses_by_hand(worlds):
     xy[40:, 1] = np.nan
     xy[:50, 2] = np.nan
 
-    found = estimate_noise(worlds.tracks_of(xy, fps=10.0), fps=10.0, dt_s=0.2)
+    found = estimate_noise(worlds.tracks_of(xy, fps=10.0), fps=10.0, dt_s=0.2, stated_m=0.0)
 
     assert found.missing == pytest.approx(10 / 200)
     assert found.gap_s == pytest.approx(1.0)

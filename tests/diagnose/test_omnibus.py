@@ -9,7 +9,7 @@ from scipy.stats import chi2, kstest, norm
 
 from zfcal.diagnose.chances import by_context, normal_of, rare_by_context
 from zfcal.diagnose.kernels import cell_ranks, rare_headings
-from zfcal.diagnose.omnibus import judge, omnibus, statistics
+from zfcal.diagnose.omnibus import judge, omnibus, pulses, statistics
 from zfcal.diagnose.ranks import heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.surroundings import probabilities, signed_angle, surroundings
 from zfcal.model.scene import Moves
@@ -174,6 +174,22 @@ def test_a_preferred_distance_is_noticed(base, worlds):
 
     assert found.p < 1e-3
     assert "nearest neighbour" in found.worst
+
+
+def test_pulses_by_hand():
+    """A series that is 1 in one sample of fifty has all harmonics of its period alike: with 20
+    of them, twice the power of white noise each, and 40 degrees of freedom it cannot be missed;
+    white noise gives nothing.
+    """
+    rng = np.random.default_rng(11)
+    comb = np.zeros((1, 5000))
+    comb[0, ::50] = 1.0
+    white = rng.normal(size=(1, 5000))
+
+    assert pulses(comb - comb.mean(), 0.2) > 20
+    assert pulses(white, 0.2) < 3
+    assert pulses(white + 2.0 * comb, 0.2) > 5
+    assert math.isnan(pulses(white[:, :20], 0.2))
 
 
 def test_a_startle_that_spreads_is_noticed(base):
