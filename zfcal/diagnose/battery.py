@@ -54,6 +54,10 @@ UNITS = {
     "nearest neighbour's distance": "m",
     "wall distance": "m",
     "speed": "m/s",
+    "speed in the upper left quarter": "m/s",
+    "speed in the upper right quarter": "m/s",
+    "speed in the lower left quarter": "m/s",
+    "speed in the lower right quarter": "m/s",
     "speed in company": "m/s",
     "speed after a fast step": "m/s",
     "speed beside fast neighbours": "m/s",
@@ -223,11 +227,28 @@ def speed_statistics(scene: Scene, fitted: Fitted) -> Iterator[Steps]:
         yield Steps(
             statistic=name, rows=rows, observed=observed, expected=expected, variance=variance
         )
+    for name, rows in _quarters(scene, about):
+        yield Steps(
+            statistic=f"speed in the {name} quarter",
+            rows=rows,
+            observed=observed,
+            expected=expected,
+            variance=variance,
+        )
     for name, rows in (("stillness", everywhere), ("stillness after stillness", was_still)):
         yield Steps(
             statistic=name, rows=rows, observed=still.astype(np.float64),
             expected=still_mean, variance=still_variance,
         )  # fmt: skip
+
+
+def _quarters(scene: Scene, about: Surroundings) -> Iterator[tuple[str, Rows]]:
+    x0, y0, x1, y1 = scene.arena.outline.bounds
+    upper, right = about.y_m > (y0 + y1) / 2, about.x_m > (x0 + x1) / 2
+    yield "upper left", upper & ~right
+    yield "upper right", upper & right
+    yield "lower left", ~upper & ~right
+    yield "lower right", ~upper & right
 
 
 def _median(values: Floats) -> float:

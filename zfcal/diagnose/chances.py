@@ -37,7 +37,7 @@ def normal_of_tail(tail: float) -> float:
     return -float(ndtri(min(max(tail, _LEAST_TAIL), _MOST_TAIL)))
 
 
-def by_context(values: Floats, bins: Ints, variance: Floats | None = None) -> float:
+def by_context(values: Floats, bins: Ints) -> float:
     """Return how far scores differ from 0 in the bins of a context.
 
     Parameters
@@ -46,16 +46,39 @@ def by_context(values: Floats, bins: Ints, variance: Floats | None = None) -> fl
         Of mean 0 and variance 1; NaN where there is none.
     bins : ndarray of int64, shape (step,)
         -1 for none. A bin with fewer than 20 steps is left out.
-    variance : ndarray, shape (step, degree)
-        Of the values, where it is not 1.
     """
     rows = (bins >= 0) & np.isfinite(values[:, 0])
     if not rows.any():
         return math.nan
     count = np.bincount(bins[rows])
     enough = count >= LEAST_IN_BIN
-    spread = np.ones_like(values) if variance is None else variance
     sums = np.stack([np.bincount(bins[rows], column[rows]) for column in values.T])
-    whole = np.stack([np.bincount(bins[rows], column[rows]) for column in spread.T])
-    kept = enough & (whole > 0)
+    chi2 = (sums[:, enough] ** 2 / count[enough]).sum()
+    return normal_of(float(chi2), int(enough.sum()) * values.shape[1])
+
+
+def rare_by_context(residual: Floats, variance: Floats, bins: Ints, largest: float) -> float:
+    r"""Return how far residuals of which few are large differ from 0 in the bins of a context.
+
+    A bin's sum S of residuals with variance V, none above c, counts as
+    :math:`S^2 / (V + c \max(S, 0) / 3)`: by Freedman's inequality (1975, Annals of
+    Probability 3: 100-118) twice the least that the logarithm of its tail can be, so that a few
+    rare values do not decide.
+
+    Parameters
+    ----------
+    residual, variance : ndarray, shape (step,)
+        NaN where there is none.
+    bins : ndarray of int64, shape (step,)
+        -1 for none. A bin with fewer than 20 steps is left out.
+    largest
+        The bound c.
+    """
+    rows = (bins >= 0) & np.isfinite(residual)
+    if not rows.any():
+        return math.nan
+    enough = np.bincount(bins[rows]) >= LEAST_IN_BIN
+    sums = np.bincount(bins[rows], residual[rows])[enough]
+    whole = np.bincount(bins[rows], variance[rows])[enough] + largest * np.maximum(sums, 0) / 3
+    kept = whole > 0
     return normal_of(float((sums[kept] ** 2 / whole[kept]).sum()), int(kept.sum()))

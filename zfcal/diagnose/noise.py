@@ -56,9 +56,9 @@ class Noise:
     Parameters
     ----------
     sd_m
-        Standard deviation of each coordinate in each frame, in metres; NaN if unknown.
+        Standard deviation of each coordinate in each frame, in metres.
     how
-        ``stated``, ``straight steps``, ``quiet stretches``, ``beyond the wall`` or ``unknown``.
+        ``stated``, ``straight steps``, ``quiet stretches`` or ``beyond the wall``.
     quantum_m
         Smallest spacing between coordinates; 0 where there is none to be seen.
     missing
@@ -85,7 +85,7 @@ def estimate_noise(
     arena: Arena | None = None,
     stated_m: float | None = None,
 ) -> Noise | None:
-    """Return how exact positions are; None where there are fewer than three frames.
+    """Return how exact positions are; None where it cannot be told.
 
     Parameters
     ----------
@@ -105,6 +105,8 @@ def estimate_noise(
     sd_m, how = _level(tracks, fps, max(1, round(fps * dt_s)), arena)
     if stated_m is not None:
         sd_m, how = stated_m, "stated"
+    if not math.isfinite(sd_m):
+        return None
     missing, gap_s, swaps = _losses(tracks, fps)
     return Noise(
         sd_m=sd_m,

@@ -10,7 +10,8 @@ when the model is right. Asked are:
 * bursts: correlation of all agents' scores within 1, 3, 10 and 30 s;
 * pulses at regular times: the periodogram of the scores' sum over agents, summed over
   harmonics of a fundamental (de Jager et al. 1989, Astronomy and Astrophysics 221: 180-190),
-  the largest of all fundamentals.
+  the largest of all fundamentals;
+* what is `rare`: headings that the model hardly expects, and runs of like speeds.
 
 Each is turned into a standard normal number z that is large where the model is wrong, and
 the largest of all counts.
@@ -24,11 +25,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtr, ndtri
+from scipy.special import chdtrc, ndtr
 from scipy.stats import t as student
 
 from zfcal.diagnose.battery import speed_factor
-from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
+from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of, normal_of_tail
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
@@ -45,8 +46,8 @@ _BURSTS_S = (1.0, 3.0, 10.0, 30.0)
 _HARMONICS = (1, 5, 20)
 _SHORTEST_PERIOD_S = 5.0
 _LEAST_PULSES = 4
+_AXES = ("angle to the x axis", "angle to the y axis")
 _PRIOR_WEIGHT = 10.0
-_Z_MAX = 37.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +105,7 @@ def statistics(
         The second table of ``fitted.tables()``, where it is at hand.
     """
     made: dict[str, float] = {}
+    compass: list[Floats] = []
     probability = probabilities(fitted, table)
     for scores in _scored(scene, fitted, rng, probability):
         if scores.known.sum() < LEAST_IN_BIN:
@@ -114,6 +116,10 @@ def statistics(
             made[f"{scores.name} by {name}"] = by_context(scores.values, bins)
         made |= dict(_serial(scores, scene))
         made |= dict(_in_time(scores, scene))
+        if scores.name in _AXES:
+            compass.append(_summed_up(scores, scene)[0])
+    if compass:
+        made["compass: pulses"] = pulses(np.stack(compass), scene.dt_s)
     made |= rare_statistics(scene, fitted, probability)
     made |= run_statistics(scene, fitted, rng)
     return {name: z for name, z in made.items() if math.isfinite(z)}
@@ -175,23 +181,22 @@ def _products(values: Floats, other: Ints) -> float:
     return normal_of(float(chi2), product.shape[1])
 
 
-def _in_time(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
+def _summed_up(scores: _Scores, scene: Scene, power: int = 1) -> Floats:
+    """Return sums of scores, or of their squares, over agents, shape (degree, sample)."""
     known = scores.known
-    at, n = scores.steps.at[known], len(scene.k)
-    columns = scores.values[known].T
-    sums = _summed(at, columns, n)
-    squares = _summed(at, columns**2, n)
+    made = np.zeros((DEGREES, len(scene.k)))
+    for row, column in enumerate(scores.values[known].T):
+        made[row] = np.bincount(scores.steps.at[known], column**power, len(scene.k))
+    return made
+
+
+def _in_time(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
+    sums, squares = _summed_up(scores, scene), _summed_up(scores, scene, 2)
     for length_s in _BURSTS_S:
         per = max(1, round(length_s / scene.dt_s))
         yield f"{scores.name}: bursts of {length_s:g} s", _burst(sums, squares, per)
-    yield f"{scores.name}: pulses", _pulses(sums, scene.dt_s)
-
-
-def _summed(at: Ints, columns: Floats, n: int) -> Floats:
-    made = np.zeros((len(columns), n))
-    for row, column in enumerate(columns):
-        made[row] = np.bincount(at, column, n)
-    return made
+    for series, which in zip(sums, ("", " of size"), strict=True):
+        yield f"{scores.name}: pulses{which}", pulses(series[None], scene.dt_s)
 
 
 def _burst(sums: Floats, squares: Floats, per: int) -> float:
@@ -207,30 +212,32 @@ def _burst(sums: Floats, squares: Floats, per: int) -> float:
     return float((pairs.sum(axis=1) / spread).sum() / math.sqrt(DEGREES))
 
 
-def _pulses(sums: Floats, dt_s: float) -> float:
+def pulses(sums: Floats, dt_s: float) -> float:
     """Return the largest sum of a periodogram over harmonics, as a normal number.
 
     The grid of fundamentals is as fine as the highest harmonic needs.
+
+    Parameters
+    ----------
+    sums : ndarray, shape (series, sample)
+        Of mean 0; the powers of several series, each scaled to its own, are added.
+    dt_s
+        Between samples.
     """
     n = sums.shape[1]
-    power = np.abs(np.fft.rfft(sums, axis=1)) ** 2 / (sums**2).sum(axis=1, keepdims=True) * 2
-    duration_s = n * dt_s
-    best = math.inf
+    whole = np.maximum((sums**2).sum(axis=1, keepdims=True), 1e-300)
+    power = (np.abs(np.fft.rfft(sums, axis=1)) ** 2 / whole * 2).sum(axis=0)
+    tail, tried = 1.0, 0
     for harmonics in _HARMONICS:
-        high = min(duration_s / _SHORTEST_PERIOD_S, (power.shape[1] - 1) / harmonics)
+        high = min(n * dt_s / _SHORTEST_PERIOD_S, (power.size - 1) / harmonics)
         fundamental = np.arange(_LEAST_PULSES, high, 1 / harmonics)
         if not fundamental.size:
             continue
         at = np.rint(fundamental[:, None] * np.arange(1, harmonics + 1)).astype(np.int64)
-        whole = power[:, at].sum(axis=(0, 2))
-        df = 2 * harmonics * sums.shape[0]
-        best = min(best, float(chdtrc(df, whole.max())) * fundamental.size)
-    best *= len(_HARMONICS)
-    return -float(ndtri(min(best, 1 - 1e-9))) if best > 0 else _Z_MAX
-
-
-def _tail(z: float) -> float:
-    return float(ndtr(-z))
+        most = float(power[at].sum(axis=1).max())
+        tried += 1
+        tail = min(tail, float(chdtrc(2 * harmonics * len(sums), most)) * fundamental.size)
+    return normal_of_tail(tail * tried) if tried else math.nan
 
 
 def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = ()) -> Omnibus:
@@ -254,7 +261,7 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
         df = max(drawn.size - 1, 0) + _PRIOR_WEIGHT
         spread = math.sqrt((squares + _PRIOR_WEIGHT) / df * (1 + 1 / max(drawn.size, 1)))
         made[name] = (z - centre) / spread if n else z
-        tails[name] = float(student.sf(made[name], df)) if n else _tail(z)
+        tails[name] = float(student.sf(made[name], df)) if n else float(ndtr(-z))
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr, bdtrc
 
 from zfcal.diagnose.battery import speed_factor
-from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of_tail
+from zfcal.diagnose.chances import LEAST_IN_BIN, normal_of_tail, rare_by_context
 from zfcal.diagnose.contexts import contexts
 from zfcal.diagnose.kernels import rare_headings
 from zfcal.diagnose.ranks import speed_ranks
@@ -65,14 +65,15 @@ def rare_statistics(scene: Scene, fitted: Fitted, probability: Floats) -> dict[s
     variance = np.empty(axis.shape[:2])
     rare_headings(probability, turns.taken, axis, _FLOOR, residual, variance)
     residual[~fitted.used] = np.nan
-    sorted_by = contexts(scene, turns, about)
-    everywhere = np.zeros(len(turns), dtype=np.int64)
+    found = contexts(scene, turns, about)
+    sorted_by = {"": np.zeros(len(turns), dtype=np.int64)}
+    sorted_by |= {f" by {context}": found[context] for context in _CONTEXTS}
     made = {}
     for column, name in enumerate(names):
-        own, spread = residual[:, [column]], variance[:, [column]]
-        made[f"rare headings {name}"] = by_context(own, everywhere, spread)
-        for context in _CONTEXTS:
-            made[f"rare headings {name} by {context}"] = by_context(own, sorted_by[context], spread)
+        own, spread = residual[:, column], variance[:, column]
+        for context, bins in sorted_by.items():
+            z = rare_by_context(own, spread, bins, 1 / _FLOOR)
+            made[f"rare headings {name}{context}"] = z
     return made
 
 
