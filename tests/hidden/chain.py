@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from hidden.kernels import DT_S
+from hidden.states import DT_S
 
 _SWAP_M = 0.03
 

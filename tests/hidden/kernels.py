@@ -1,215 +1,67 @@
 """The second simulator's loops: where, what is seen, which way, how fast.
 
-All of them stand in one file, so that the compiler's cache knows when one of
-them has changed. Lengths are metres, times seconds, angles radians.
+They stand in one file, so that the compiler's cache knows when one of them has
+changed; of `hidden.states` and `hidden.geometry` it does not: touch this file after
+an edit there. Lengths are metres, times seconds, angles radians.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-DT_S = 0.2
-N_CELLS = 180
-"""Headings are drawn from cells of two degrees, uniform within a cell."""
-CELL_RAD = 2 * math.pi / N_CELLS
-ANGLE = -math.pi + (np.arange(N_CELLS) + 0.5) * CELL_RAD
-COS, SIN = np.cos(ANGLE), np.sin(ANGLE)
-SHORT_M = 0.002
-"""A displacement that is shorter has no heading on a recording."""
-
-# One column of a plan's strengths per effect.
-(
-    ALIGNMENT, WALL_PERSISTENCE, GROUP_COHESION, INTERACTION_RANGE, REAR_BLIND_ZONE,
-    LEADER_FOLLOWING, REACTION_DELAY, COLLECTIVE_DEPARTURE, PLACE_PREFERENCE, DIRECTIONAL_DRIFT,
-    TURNING_BIAS, TURNING_MEMORY, SPEED_MATCHING, CROWDING, BURST_AND_COAST, SPEED_TURN_COUPLING,
-    FREEZING, FATIGUE, HABITUATION, BOLDNESS, ROBOT_AVOIDANCE,
-    WAXING_WALLS, STARTLE, SOUND, KEPT_DISTANCE, ONE_EYE, LIT_ROOM, N_EFFECTS,
-) = range(28)  # fmt: skip
-
-FREEZE_S = 3.0
-FROZEN_M_S = 0.002
-STARTLE_STEPS = 3
-STARTLE_REST_STEPS = 15
-DEPARTURE_STEPS = 15
-
-
-class World(NamedTuple):
-    """A tank: corners (corner, 2), and the strip's width."""
-
-    outline: Floats
-    corridor: Floats
-    mouths: Floats
-    wall_zone_m: float
-
-
-class Law(NamedTuple):
-    """Parameters by zone id, row 0 unused; ``speed`` holds shares of bins of 0.02 m/s."""
-
-    kappa_0: Floats
-    kappa_f: Floats
-    alpha: Floats
-    gamma: Floats
-    speed: Floats
-    scale_0: Floats
-    scale_f: Floats
-    fov_rad: float
-
-
-class Plan(NamedTuple):
-    """What is hidden: strengths (agent, effect), and where and who it touches."""
-
-    strength: Floats
-    place: Floats
-    speaker: Floats
-    compass_rad: float
-    phase_rad: float
-    bold: Floats
-    robot: int
-
-
-class Past(NamedTuple):
-    """A run: states at 0 ... T, steps 0 ... T - 1, and the log densities of its steps.
-
-    ``xy`` (T + 1, agent, 2), ``heading`` and ``zone`` (T + 1, agent); ``turn``,
-    ``speed``, ``score`` (speed's normal score), ``frozen`` and ``startled`` (T, agent);
-    ``log_heading`` and ``log_speed`` (T, agent); ``left`` (room, agent), step at which
-    an agent last left a room.
-    """
-
-    xy: Floats
-    heading: Floats
-    zone: Ints
-    turn: Floats
-    speed: Floats
-    score: Floats
-    frozen: Ints
-    startled: Ints
-    log_heading: Floats
-    log_speed: Floats
-    left: Ints
-    first: int
-
-
-@njit(cache=True)
-def wrap(angle):
-    """Return an angle in [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-@njit(cache=True)
-def within(x, y, corners):
-    """Tell whether a polygon holds a point, by crossings of a ray."""
-    inside = False
-    n = len(corners)
-    for a in range(n):
-        b = (a + 1) % n
-        if (corners[a, 1] > y) != (corners[b, 1] > y):
-            share = (y - corners[a, 1]) / (corners[b, 1] - corners[a, 1])
-            if x < corners[a, 0] + share * (corners[b, 0] - corners[a, 0]):
-                inside = not inside
-    return inside
-
-
-@njit(cache=True)
-def nearest_on(x, y, corners):
-    """Return distance to a polygon's border, the nearest point, and its side's direction."""
-    best, at_x, at_y, along = math.inf, 0.0, 0.0, 0.0
-    n = len(corners)
-    for a in range(n):
-        b = (a + 1) % n
-        dx, dy = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
-        t = ((x - corners[a, 0]) * dx + (y - corners[a, 1]) * dy) / (dx * dx + dy * dy)
-        t = min(1.0, max(0.0, t))
-        px, py = corners[a, 0] + t * dx, corners[a, 1] + t * dy
-        d = (x - px) ** 2 + (y - py) ** 2
-        if d < best:
-            best, at_x, at_y, along = d, px, py, math.atan2(dy, dx)
-    return math.sqrt(best), at_x, at_y, along
-
-
-@njit(cache=True)
-def zone_of(x, y, world):
-    """Return the zone id of a point."""
-    if not within(x, y, world.outline):
-        return 0
-    if within(x, y, world.corridor):
-        return 1
-    return 2 if nearest_on(x, y, world.outline)[0] < world.wall_zone_m else 3
-
-
-@njit(cache=True)
-def clear_m(x, y, world):
-    """Return a distance within which no other zone begins."""
-    wall = nearest_on(x, y, world.outline)[0]
-    door = nearest_on(x, y, world.corridor)[0] if len(world.corridor) else math.inf
-    return min(wall, abs(wall - world.wall_zone_m), door)
-
-
-@njit(cache=True)
-def wall_rad(x, y, world):
-    """Return the direction along the nearest wall."""
-    d, px, py, along = nearest_on(x, y, world.outline)
-    return along if d < 1e-9 else math.atan2(py - y, px - x) + math.pi / 2
-
-
-@njit(cache=True)
-def triangle_sr(a, b, c):
-    """Return the solid angle of a triangle seen from the origin (Van Oosterom, Strackee)."""
-    la, lb, lc = np.sqrt((a * a).sum()), np.sqrt((b * b).sum()), np.sqrt((c * c).sum())
-    triple = (
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-        + a[1] * (b[2] * c[0] - b[0] * c[2])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-    )
-    ab, bc, ca = (a * b).sum(), (b * c).sum(), (c * a).sum()
-    return 2 * abs(math.atan2(abs(triple), la * lb * lc + ab * lc + bc * la + ca * lb))
-
-
-@njit(cache=True)
-def body_sr(dx, dy, heading):
-    """Return the solid angle of a body of 20 x 20 x 10 mm with its head at (dx, dy)."""
-    c, s = math.cos(heading), math.sin(heading)
-    third = 0.02 / 3
-    points = np.empty((4, 3))
-    points[0] = np.array([dx, dy, 0.0])
-    points[1] = np.array([dx - 0.02 * c, dy - 0.02 * s, 0.0])
-    points[2] = np.array([dx - third * c - 0.01 * s, dy - third * s + 0.01 * c, 0.0])
-    points[3] = np.array([dx - third * c + 0.01 * s, dy - third * s - 0.01 * c, 0.0])
-    a, b, widest = 0, 1, -1.0
-    for p in range(4):
-        for q in range(p + 1, 4):
-            gap = abs(wrap(math.atan2(points[p, 1], points[p, 0])
-                           - math.atan2(points[q, 1], points[q, 0])))  # fmt: skip
-            if gap > widest:
-                a, b, widest = p, q, gap
-    top = np.array([dx - third * c, dy - third * s, 0.005])
-    bottom = np.array([dx - third * c, dy - third * s, -0.005])
-    return triangle_sr(points[a], top, points[b]) + triangle_sr(points[a], points[b], bottom)
+from hidden.geometry import body_sr, clear_m, wall_rad, within, wrap, zone_of
+from hidden.states import (
+    ALIGNMENT,
+    ANGLE,
+    BLIND_RAD,
+    BOLDNESS,
+    BURST_AND_COAST,
+    CELL_RAD,
+    COLLECTIVE_DEPARTURE,
+    COS,
+    CROWDING,
+    DEPARTURE_STEPS,
+    DIRECTIONAL_DRIFT,
+    DT_S,
+    FATIGUE,
+    FELT_M,
+    FREEZE_S,
+    FREEZING,
+    FROZEN_M_S,
+    GROUP_COHESION,
+    HABITUATION,
+    INTERACTION_RANGE,
+    KEPT_DISTANCE,
+    LATE_STEPS,
+    LEADER_FOLLOWING,
+    LIT_ROOM,
+    N_CELLS,
+    ONE_EYE,
+    PLACE_PREFERENCE,
+    REACTION_DELAY,
+    REAR_BLIND_ZONE,
+    ROBOT_AVOIDANCE,
+    SIN,
+    SOUND,
+    SPEED_MATCHING,
+    SPEED_TURN_COUPLING,
+    STARTLE,
+    STARTLE_REST_STEPS,
+    STARTLE_STEPS,
+    TURNING_BIAS,
+    TURNING_MEMORY,
+    WALL_PERSISTENCE,
+    WAXING_WALLS,
+)
 
 
 @njit(cache=True)
 def room_of(x, y):
     """Return the room of a point: 0 up left, 1 down right."""
     return 0 if y > x else 1
-
-
-@njit(cache=True)
-def seen_from(i, j, t, past, plan):
-    """Return where agent i takes agent j to be, and its heading: now, or a moment ago."""
-    delay = plan.strength[i, REACTION_DELAY] / DT_S
-    back = min(int(delay), t)
-    share = delay - int(delay) if back < t else 0.0
-    a, b = past.xy[t - back, j], past.xy[max(t - back - 1, 0), j]
-    x, y = (1 - share) * a[0] + share * b[0], (1 - share) * a[1] + share * b[1]
-    return x, y, past.heading[t - back, j]
 
 
 @njit(cache=True)
@@ -226,44 +78,52 @@ def attention(i, j, t, bearing, distance, past, plan):
         factor *= max(0.0, 1 - s[HABITUATION] * max(0, t - past.first) * DT_S / 1800)
     if s[ROBOT_AVOIDANCE] > 0 and j == plan.robot:
         factor *= max(0.0, 1 - s[ROBOT_AVOIDANCE])
+    if s[REAR_BLIND_ZONE] > 0:
+        off_axis = abs(wrap(bearing - past.heading[t, i]))
+        factor *= 1 - s[REAR_BLIND_ZONE] / (1 + math.exp(-(off_axis - BLIND_RAD) / 0.1))
     if s[ONE_EYE] > 0 and wrap(bearing - past.heading[t, i]) < 0:
         factor *= 1 - s[ONE_EYE]
     return factor
 
 
 @njit(cache=True)
-def add_neighbours(i, t, law, past, plan, out):
-    """Add the heading component of each neighbour in view; weights are solid angles."""
+def add_mode(out, weight, mode_rad, kappa, scale):
+    """Add one bell to the cells."""
+    if weight <= 0:
+        return
+    c, s = math.cos(mode_rad), math.sin(mode_rad)
+    for k in range(N_CELLS):
+        out[k] += weight * scale * math.exp(kappa * (COS[k] * c + SIN[k] * s - 1))
+
+
+@njit(cache=True)
+def add_neighbour(i, j, t, law, past, plan, out):
+    """Add the heading component of one neighbour if it is in view; its weight is a solid angle."""
     x, y, phi = past.xy[t, i, 0], past.xy[t, i, 1], past.heading[t, i]
-    zone = past.zone[t, i]
+    zone, s = past.zone[t, i], plan.strength[i]
     kappa, scale, alpha = law.kappa_f[zone], law.scale_f[zone], law.alpha[zone]
-    s = plan.strength[i]
-    fov = law.fov_rad - s[REAR_BLIND_ZONE]
-    for j in range(past.xy.shape[1]):
-        if j == i:
-            continue
-        xj, yj, phi_j = seen_from(i, j, t, past, plan)
-        dx, dy = xj - x, yj - y
-        bearing, distance = math.atan2(dy, dx), math.hypot(dx, dy)
-        if abs(wrap(bearing - phi)) > fov:
-            continue
-        sr = body_sr(dx, dy, phi_j)
-        weight = alpha * sr * attention(i, j, t, bearing, distance, past, plan)
-        away = 0.0
-        if s[KEPT_DISTANCE] > 0 and 0.02 <= distance < 0.08:
-            away = weight * s[KEPT_DISTANCE]
-        elif s[ROBOT_AVOIDANCE] > 1 and j == plan.robot:
-            away = alpha * sr * (s[ROBOT_AVOIDANCE] - 1)
-            weight += away
-        if distance < 0.02:
-            bearing += math.pi
-        c, d = math.cos(bearing), math.sin(bearing)
-        for k in range(N_CELLS):
-            cosine = COS[k] * c + SIN[k] * d
-            if weight > away:
-                out[k] += (weight - away) * scale * math.exp(kappa * (cosine - 1))
-            if away > 0:
-                out[k] += away * scale * math.exp(kappa * (-cosine - 1))
+    dx, dy = past.xy[t, j, 0] - x, past.xy[t, j, 1] - y
+    bearing, distance = math.atan2(dy, dx), math.hypot(dx, dy)
+    if abs(wrap(bearing - phi)) > law.fov_rad:
+        return
+    sr = body_sr(dx, dy, past.heading[t, j])
+    weight = alpha * sr * attention(i, j, t, bearing, distance, past, plan)
+    away = 0.0
+    if s[KEPT_DISTANCE] > 0 and 0.02 <= distance < 0.08:
+        away = weight * max(0.0, s[KEPT_DISTANCE] - 1)
+        weight = weight * max(0.0, 1 - s[KEPT_DISTANCE]) + away
+    elif s[ROBOT_AVOIDANCE] > 1 and j == plan.robot:
+        away = alpha * sr * (s[ROBOT_AVOIDANCE] - 1)
+        weight += away
+    if s[REACTION_DELAY] > 0 and distance > FELT_M and t >= LATE_STEPS:
+        then = past.xy[t - LATE_STEPS, j]
+        late = s[REACTION_DELAY] * weight
+        add_mode(out, late, math.atan2(then[1] - y, then[0] - x), kappa, scale)
+        weight -= late
+    if distance < 0.02:
+        bearing += math.pi
+    add_mode(out, weight - away, bearing, kappa, scale)
+    add_mode(out, away, bearing + math.pi, kappa, scale)
 
 
 @njit(cache=True)
@@ -271,9 +131,7 @@ def company(i, t, past, reach_m):
     """Return the mean heading of the others within reach, as a vector, and how many."""
     c, s, n = 0.0, 0.0, 0
     for j in range(past.xy.shape[1]):
-        d = math.hypot(
-            past.xy[t, j, 0] - past.xy[t, i, 0], past.xy[t, j, 1] - past.xy[t, i, 1]
-        )
+        d = math.hypot(past.xy[t, j, 0] - past.xy[t, i, 0], past.xy[t, j, 1] - past.xy[t, i, 1])
         if j != i and d < reach_m:
             c, s, n = c + math.cos(past.heading[t, j]), s + math.sin(past.heading[t, j]), n + 1
     return c, s, n
@@ -287,14 +145,6 @@ def offset_of(i, t, past, plan):
     if s[TURNING_MEMORY] != 0 and t > 0 and abs(past.turn[t - 1, i]) < 1.2:
         offset += s[TURNING_MEMORY] * past.turn[t - 1, i]
     return offset
-
-
-@njit(cache=True)
-def add_mode(out, weight, mode_rad, kappa, scale):
-    """Add one bell to the cells."""
-    c, s = math.cos(mode_rad), math.sin(mode_rad)
-    for k in range(N_CELLS):
-        out[k] += weight * scale * math.exp(kappa * (COS[k] * c + SIN[k] * s - 1))
 
 
 @njit(cache=True)
@@ -330,17 +180,17 @@ def add_base(i, t, world, law, past, plan, out):
 
 @njit(cache=True)
 def head_for_group(i, t, past, plan, out):
-    """Now and then aim within 60 degrees of the centroid of all others, the farther the oftener."""
+    """Favour a sector about the centroid of all others, seen or not, the more the farther."""
     n = past.xy.shape[1]
     x, y = past.xy[t, i, 0], past.xy[t, i, 1]
     dx = (past.xy[t, :, 0].sum() - x) / max(n - 1, 1) - x
     dy = (past.xy[t, :, 1].sum() - y) / max(n - 1, 1) - y
-    share = min(0.9, plan.strength[i, GROUP_COHESION] * (1 - math.exp(-math.hypot(dx, dy) / 0.2)))
-    bearing, total = math.atan2(dy, dx), out.sum() * CELL_RAD
+    weight = plan.strength[i, GROUP_COHESION] * (1 - math.exp(-math.hypot(dx, dy) / 0.2))
+    bearing = math.atan2(dy, dx)
     for k in range(N_CELLS):
         gap = abs(wrap(ANGLE[k] - bearing))
-        sector = (1 + math.cos(3 * gap)) * 3 / (2 * math.pi) if gap < math.pi / 3 else 0.0
-        out[k] = (1 - share) * out[k] + share * total * sector
+        if gap < math.pi / 2:
+            out[k] *= 1 + weight * (1 + math.cos(2 * gap)) / 2
 
 
 @njit(cache=True)
@@ -363,6 +213,16 @@ def lean_toward(out, weight, x, y, to_x, to_y):
     c, s = math.cos(bearing), math.sin(bearing)
     for k in range(N_CELLS):
         out[k] *= 1 + weight * (1 + COS[k] * c + SIN[k] * s) / 2
+
+
+@njit(cache=True)
+def approach_door(i, x, y, world, plan, out):
+    """Let the bold lean to a door within 15 cm, and the shy away from it."""
+    mouth, zest = world.mouths[room_of(x, y)], plan.strength[i, BOLDNESS] * plan.bold[i]
+    if math.hypot(mouth[0] - x, mouth[1] - y) < 0.15:
+        sign = 1.0 if zest > 0 else -1.0
+        to_x, to_y = x + sign * (mouth[0] - x), y + sign * (mouth[1] - y)
+        lean_toward(out, math.exp(abs(zest)) - 1, x, y, to_x, to_y)
 
 
 @njit(cache=True)
@@ -397,13 +257,17 @@ def heading_cells(i, t, v, world, law, past, plan, out):
     x, y = past.xy[t, i, 0], past.xy[t, i, 1]
     out[:] = 0.0
     add_base(i, t, world, law, past, plan, out)
-    add_neighbours(i, t, law, past, plan, out)
+    for j in range(past.xy.shape[1]):
+        if j != i:
+            add_neighbour(i, j, t, law, past, plan, out)
     if s[GROUP_COHESION] > 0:
         head_for_group(i, t, past, plan, out)
     pull = departure_pull(i, t, past, plan) if s[COLLECTIVE_DEPARTURE] > 0 else 0.0
     if pull > 0:
         mouth = world.mouths[room_of(x, y)]
         lean_toward(out, pull, x, y, mouth[0], mouth[1])
+    if s[BOLDNESS] > 0 and past.zone[t, i] != 1:
+        approach_door(i, x, y, world, plan, out)
     if s[SOUND] > 0 and t >= past.first and (t - past.first + 150) % 300 < 15:
         lean_toward(out, s[SOUND], x, y, 2 * x - plan.speaker[0], 2 * y - plan.speaker[1])
     weigh_landing(i, t, v, world, law, past, plan, pull, out)
@@ -452,29 +316,81 @@ def pace_of_nearest(i, t, past):
 
 
 @njit(cache=True)
+def normal_share(score):
+    """Return the share of a normal law below a score."""
+    return 0.5 * (1 + math.erf(score / math.sqrt(2)))
+
+
+@njit(cache=True)
+def normal_score(share):
+    """Return the score below which a share of a normal law lies, by halving."""
+    low, high = -9.0, 9.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        if normal_share(middle) < share:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+@njit(cache=True)
 def draw_speed(i, t, law, past, plan, rng):
-    """Return a speed, its log density and its normal score."""
+    """Return a speed, its normal score, and what the effects made of the raw draw.
+
+    The speed is ``scale`` times the raw draw plus ``shift``.
+    """
     s, shares = plan.strength[i], law.speed[past.zone[t, i]]
-    score, log_density = rng.normal(0.0, 1.0), 0.0
+    score = rng.normal(0.0, 1.0)
     if s[BURST_AND_COAST] > 0 and t > 0:
-        r, last = s[BURST_AND_COAST], past.score[t - 1, i]
-        score = r * last + math.sqrt(1 - r * r) * score
-        off = (score - r * last) ** 2 / (1 - r * r)
-        log_density += 0.5 * (score * score - off) - 0.5 * math.log(1 - r * r)
-    u = 0.5 * (1 + math.erf(score / math.sqrt(2)))
-    b = 0
+        r = s[BURST_AND_COAST]
+        score = r * past.score[t - 1, i] + math.sqrt(1 - r * r) * score
+    u, b = normal_share(score), 0
     while b < 9 and u > shares[b]:
         u -= shares[b]
         b += 1
-    v = 0.02 * (b + min(1.0, u / shares[b]))
-    log_density += math.log(shares[b] / 0.02)
-    factor = speed_factor(i, t, past, plan)
-    v, log_density = v * factor, log_density - math.log(factor)
+    scale, shift = speed_factor(i, t, past, plan), 0.0
     if s[SPEED_MATCHING] > 0 and t > 0:
-        w = s[SPEED_MATCHING]
-        v = (1 - w) * v + w * pace_of_nearest(i, t, past)
-        log_density -= math.log(1 - w)
-    return v, log_density, score
+        scale *= 1 - s[SPEED_MATCHING]
+        shift = s[SPEED_MATCHING] * pace_of_nearest(i, t, past)
+    return scale * 0.02 * (b + min(1.0, u / shares[b])) + shift, score, scale, shift
+
+
+@njit(cache=True)
+def speed_bin(v):
+    """Return the bin of a speed: below 2.5 mm/s, up to 2 cm/s, and every 2 cm/s from there."""
+    if v < 0.02:
+        return 0 if v < 0.0025 else 1
+    return 1 + min(38, int(v / 0.02))
+
+
+@njit(cache=True)
+def share_below(v, i, t, scale, shift, law, past, plan):
+    """Return the probability of a lower speed, given all that came before."""
+    shares, raw = law.speed[past.zone[t, i]], (v - shift) / scale / 0.02
+    below = 0.0
+    for b in range(10):
+        below += shares[b] * min(1.0, max(0.0, raw - b))
+    r = plan.strength[i, BURST_AND_COAST]
+    if r > 0 and t > 0 and 0 < below < 1:
+        below = (normal_score(below) - r * past.score[t - 1, i]) / math.sqrt(1 - r * r)
+        return normal_share(below)
+    return below
+
+
+@njit(cache=True)
+def note_speed(i, t, scale, shift, law, past, plan):
+    """Add the log probability of the bin that a speed is in.
+
+    Of the bin, not of the speed: the edges of the speeds' histogram are sharp, and what
+    an effect does to them could be seen by nobody.
+    """
+    b = speed_bin(past.speed[t, i])
+    low = 0.0 if b == 0 else (0.0025 if b == 1 else 0.02 * (b - 1))
+    high = 0.0025 if b == 0 else 0.02 * b
+    mass = share_below(high, i, t, scale, shift, law, past, plan)
+    mass -= share_below(low, i, t, scale, shift, law, past, plan)
+    past.log_speed[t, i] += math.log(max(mass, 1e-4))
 
 
 @njit(cache=True)
@@ -505,7 +421,11 @@ def startle(i, t, past, plan, rng):
 
 @njit(cache=True)
 def go(i, t, theta, v, world, past, plan):
-    """Move an agent: a current may carry it on, as long as it stays inside."""
+    """Move an agent and return the speed that it gains from a current.
+
+    The current carries it on as long as it stays inside.
+    """
+    along = 0.0
     x = past.xy[t, i, 0] + v * DT_S * math.cos(theta)
     y = past.xy[t, i, 1] + v * DT_S * math.sin(theta)
     current = plan.strength[i, DIRECTIONAL_DRIFT] * DT_S
@@ -516,23 +436,23 @@ def go(i, t, theta, v, world, past, plan):
             dx, dy = to_x - past.xy[t, i, 0], to_y - past.xy[t, i, 1]
             carried = max(math.hypot(dx, dy) / DT_S, 1e-6)
             # The density of displacements in the plane is f(theta) f(v) / v.
-            past.log_speed[t, i] += math.log(carried / max(v, 1e-6))
+            past.log_heading[t, i] += math.log(carried / max(v, 1e-6))
             x, y, theta, v = to_x, to_y, math.atan2(dy, dx), carried
+            along = current / DT_S * math.cos(plan.compass_rad - theta)
     past.xy[t + 1, i, 0], past.xy[t + 1, i, 1] = x, y
     past.heading[t + 1, i], past.speed[t, i] = theta, v
     past.turn[t, i] = wrap(theta - past.heading[t, i])
+    return along
 
 
 @njit(cache=True)
-def slow_in_turn(i, t, theta, v, world, past, plan):
-    """Return the speed that is left in a turn."""
-    kept = 1 - plan.strength[i, SPEED_TURN_COUPLING] * abs(wrap(theta - past.heading[t, i])) / math.pi
+def kept_in_turn(i, t, theta, v, world, past, plan):
+    """Return the share of the speed that is left in a turn."""
+    turn = abs(wrap(theta - past.heading[t, i]))
+    kept = 1 - plan.strength[i, SPEED_TURN_COUPLING] * turn / math.pi
     x = past.xy[t, i, 0] + kept * v * DT_S * math.cos(theta)
     y = past.xy[t, i, 1] + kept * v * DT_S * math.sin(theta)
-    if kept >= 1 or not within(x, y, world.outline):
-        return v
-    past.log_speed[t, i] -= math.log(kept)
-    return kept * v
+    return kept if within(x, y, world.outline) else 1.0
 
 
 @njit(cache=True)
@@ -552,7 +472,6 @@ def stand(i, t, world, past, rng):
     if within(x, y, world.outline):
         past.xy[t + 1, i, 0], past.xy[t + 1, i, 1], past.speed[t, i] = x, y, v
     past.frozen[t, i] = 1
-    past.log_speed[t, i] -= math.log(FROZEN_M_S)
 
 
 @njit(cache=True)
@@ -590,14 +509,18 @@ def one_step(i, t, world, law, past, plan, rng, cells):
         flees, begins, chance = startle(i, t, past, plan, rng)
         past.startled[t, i] = 1 if begins else 0
     for _ in range(50):
-        v, log_density, score = draw_speed(i, t, law, past, plan, rng)
+        v, score, scale, shift = draw_speed(i, t, law, past, plan, rng)
         if flees:
-            v, log_density = 0.14 + 0.06 * rng.random(), -math.log(0.06)
+            v = 0.14 + 0.06 * rng.random()
         drawn, theta = draw_heading(i, t, v, world, law, past, plan, rng, cells)
         if drawn:
-            past.log_speed[t, i], past.score[t, i] = chance + log_density, score
-            v = slow_in_turn(i, t, theta, v, world, past, plan)
-            go(i, t, theta, v, world, past, plan)
+            past.log_speed[t, i], past.score[t, i] = chance, score
+            kept = kept_in_turn(i, t, theta, v, world, past, plan)
+            shift = kept * shift + go(i, t, theta, kept * v, world, past, plan)
+            if flees:
+                past.log_speed[t, i] -= math.log(3)  # one bin in three
+            else:
+                note_speed(i, t, kept * scale, shift, law, past, plan)
             return
     stay(i, t, past)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import i0e
 
-from hidden import kernels
+from hidden import geometry, kernels, states
 from hidden.worlds import WALL_ZONE_M, Floats, Tank
 
 # Shares of speeds of AB zebrafish in bins of 0.02 m/s, as published.
@@ -86,36 +86,37 @@ def shifted(rng: np.random.Generator) -> Base:
     )
 
 
-def law_of(base: Base) -> kernels.Law:
+def law_of(base: Base) -> states.Law:
     """Return the parameters as the loops take them."""
 
     def scale(kappa):
         return 1 / (2 * math.pi * i0e(kappa))
 
-    return kernels.Law(
+    return states.Law(
         base.kappa_0, base.kappa_f, base.alpha, base.gamma, base.speed,
         scale(base.kappa_0), scale(base.kappa_f), base.fov_rad,
     )  # fmt: skip
 
 
-def world_of(tank: Tank) -> kernels.World:
+def world_of(tank: Tank) -> geometry.World:
     """Return a tank as the loops take it."""
-    mouths = tank.mouths if len(tank.mouths) else np.zeros((2, 2))
-    return kernels.World(tank.outline, tank.corridor, mouths, WALL_ZONE_M)
+    far = np.full((2, 2), 1e6)
+    mouths = tank.mouths if len(tank.mouths) else far
+    return geometry.World(tank.outline, tank.corridor, mouths, WALL_ZONE_M)
 
 
-def no_plan(n_agents: int) -> kernels.Plan:
+def no_plan(n_agents: int) -> states.Plan:
     """Return a plan that hides nothing."""
-    return kernels.Plan(
-        np.zeros((n_agents, kernels.N_EFFECTS)), np.zeros(2), np.zeros(2), 0.0, 0.0,
+    return states.Plan(
+        np.zeros((n_agents, states.N_EFFECTS)), np.zeros(2), np.zeros(2), 0.0, 0.0,
         np.zeros(n_agents), -1,
     )  # fmt: skip
 
 
-def empty_past(n_steps: int, n_agents: int, *, first: int) -> kernels.Past:
+def empty_past(n_steps: int, n_agents: int, *, first: int) -> states.Past:
     """Return the arrays of a run, to be filled; the trial begins at step ``first``."""
     a, b = (n_steps + 1, n_agents), (n_steps, n_agents)
-    return kernels.Past(
+    return states.Past(
         np.zeros((*a, 2)), np.zeros(a), np.zeros(a, np.int64), np.zeros(b), np.zeros(b),
         np.zeros(b), np.zeros(b, np.int64), np.zeros(b, np.int64), np.full(b, np.nan),
         np.full(b, np.nan), np.full((2, n_agents), -(10**6)), first,
@@ -141,8 +142,8 @@ def heading_density(base, tank, *, xy_m, heading_rad, speed_m_s, agent=0):
     """
     world, past = world_of(tank), empty_past(1, len(xy_m), first=0)
     past.xy[0], past.heading[0] = np.asarray(xy_m, float), np.asarray(heading_rad, float)
-    past.zone[0] = [kernels.zone_of(x, y, world) for x, y in past.xy[0]]
-    cells = np.empty(kernels.N_CELLS)
+    past.zone[0] = [geometry.zone_of(x, y, world) for x, y in past.xy[0]]
+    cells = np.empty(states.N_CELLS)
     plan = no_plan(len(xy_m))
     kernels.heading_cells(agent, 0, speed_m_s, world, law_of(base), past, plan, cells)
-    return kernels.ANGLE, cells
+    return states.ANGLE, cells

@@ -13,16 +13,12 @@ import numpy as np
 from numba import njit
 from scipy.special import i0e, i1e
 
-from hidden import kernels
+from hidden import kernels, states
 from hidden.effects import BOTH, EFFECTS, HEADING, SPEED
 from hidden.law import Base, law_of, no_plan
 
 N_ANGLES = 72
 _ENOUGH_NATS = 0.01
-
-# The first bin is narrow: fish that stand still are a lump there.
-SPEED_EDGES = np.array([0.0, 0.0025, *np.arange(1, 40) * 0.02])
-"""Edges of the base law's speed bins, in m/s."""
 
 
 @njit(cache=True)
@@ -115,7 +111,8 @@ def _fit_zone(base: Base, zone: int, table: tuple, *, free: tuple[int, ...]):
     best, slope, information = climb(p)
     ridge = 1e-3
     for _ in range(60):
-        move = np.linalg.solve(information + ridge * (np.diag(np.diag(information)) + np.eye(len(p))), slope)
+        eased = information + ridge * (np.diag(np.diag(information)) + np.eye(len(p)))
+        move = np.linalg.solve(eased, slope)
         q = np.clip(p + np.clip(move, -0.7, 0.7), low, high)
         value, *other = climb(q)
         if not value > best:
@@ -153,7 +150,7 @@ def fit_base(base: Base, world, past, steps) -> Base:
             continue
         a, b = step[rows], agent[rows]
         *where, land, landed = kernels.contexts(a, b, world, law_of(base), past, N_ANGLES)
-        theta = kernels.ANGLE[cells_of(past.heading[a + 1, b])]
+        theta = states.ANGLE[cells_of(past.heading[a + 1, b])]
         # A landing at the cell's middle may lie just outside.
         landed = np.where(landed == 0, past.zone[a + 1, b], landed)
         free = tuple(z for z in np.unique(landed) if z != zone)
@@ -166,24 +163,21 @@ def fit_base(base: Base, world, past, steps) -> Base:
 
 def cells_of(theta):
     """Return the cells of headings."""
-    return np.clip(((theta + math.pi) / kernels.CELL_RAD).astype(int), 0, kernels.N_CELLS - 1)
+    return np.clip(((theta + math.pi) / states.CELL_RAD).astype(int), 0, states.N_CELLS - 1)
 
 
 def log_base_speed(speed, zone):
-    """Return the log density of speeds under each zone's own shares of bins."""
-    value = np.empty(len(speed))
+    """Return the log share of each speed's bin among the speeds in its zone."""
+    bins, value = np.array([kernels.speed_bin(v) for v in speed]), np.empty(len(speed))
     for z in np.unique(zone):
         rows = zone == z
-        count, _ = np.histogram(speed[rows], SPEED_EDGES)
-        density = count / rows.sum() / np.diff(SPEED_EDGES)
-        bin_ = np.clip(np.digitize(speed[rows], SPEED_EDGES) - 1, 0, len(density) - 1)
-        value[rows] = np.log(density[bin_])
+        value[rows] = np.log(np.bincount(bins[rows])[bins[rows]] / rows.sum())
     return value
 
 
 def usable_steps(past, n_fish):
     """Return times and agents of fish's steps with a heading before and after."""
-    long = past.speed * kernels.DT_S >= kernels.SHORT_M
+    long = past.speed * states.DT_S >= states.SHORT_M
     fine = np.isfinite(past.log_heading) & long
     fine[1:] &= long[:-1]
     fine[: past.first] = False

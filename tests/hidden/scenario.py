@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from hidden import kernels
+from hidden import kernels, states
 from hidden.chain import Chain, measure, sampled
 from hidden.effects import BOTH, EFFECTS
 from hidden.law import Base, empty_past, law_of, natural, shifted, world_of
@@ -99,9 +99,9 @@ def knob(name: str, strength: str | float) -> float:
     return getattr(EFFECTS[name], strength) if isinstance(strength, str) else float(strength)
 
 
-def _plan(scenario: Scenario, tank: Tank, rng) -> kernels.Plan:
+def _plan(scenario: Scenario, tank: Tank, rng) -> states.Plan:
     n = scenario.n_fish + scenario.robot
-    strength = np.zeros((n, kernels.N_EFFECTS))
+    strength = np.zeros((n, states.N_EFFECTS))
     for name in scenario.hidden:
         strength[: scenario.n_fish, EFFECTS[name].column] = knob(name, scenario.strength)
     bold = np.zeros(n)
@@ -110,10 +110,10 @@ def _plan(scenario: Scenario, tank: Tank, rng) -> kernels.Plan:
     place = tank.liked[rng.integers(len(tank.liked))]
     compass, phase = rng.uniform(-math.pi, math.pi, 2)
     robot = scenario.n_fish if scenario.robot else -1
-    return kernels.Plan(strength, place, tank.speaker, compass, phase, bold, robot)
+    return states.Plan(strength, place, tank.speaker, compass, phase, bold, robot)
 
 
-def _truth(scenario: Scenario, base: Base, plan: kernels.Plan) -> dict:
+def _truth(scenario: Scenario, base: Base, plan: states.Plan) -> dict:
     return {
         "effects": {name: knob(name, scenario.strength) for name in scenario.hidden},
         "arena": scenario.arena,
@@ -147,11 +147,11 @@ def make_trial(scenario: Scenario, *, oracle: bool = True) -> Trial:
         on = acts_on(scenario.hidden) if scenario.hidden else BOTH
         nats, fitted = oracle_nats(base, world, past, n_fish=scenario.n_fish, on=on)
         truth["base_fitted"] = fitted.plain()
-    states = past.xy[BURN_IN_STEPS:]
-    tracks = measure(states, scenario.n_fish, scenario.chain, fps=scenario.fps, rng=rng_chain)
+    states_m = past.xy[BURN_IN_STEPS:]
+    tracks = measure(states_m, scenario.n_fish, scenario.chain, fps=scenario.fps, rng=rng_chain)
     xy, ids, robot = sampled(tracks, fps=scenario.fps)
     return Trial(
-        tracks=tracks, samples_m=xy, track_ids=ids, robot_tracks=robot, states_m=states,
+        tracks=tracks, samples_m=xy, track_ids=ids, robot_tracks=robot, states_m=states_m,
         heading_rad=past.heading[BURN_IN_STEPS:], oracle_nats=nats, truth=truth,
     )  # fmt: skip
 

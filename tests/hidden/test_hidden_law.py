@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from hidden import kernels
+
+from hidden import geometry
 from hidden.law import heading_density, natural, shifted, world_of
 from hidden.worlds import geojson_of, rectangle, two_rooms
-
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.onestep import heading_density as zfcal_density
 from zfcal.parameters import Parameters, ZoneParameters
@@ -40,7 +40,7 @@ def states(tank, seed, n):
     def inside(around, spread):
         while True:
             point = rng.uniform(low, high) if around is None else rng.normal(around, spread)
-            if kernels.zone_of(*point, world) > 0:
+            if geometry.zone_of(*point, world) > 0:
                 return point
 
     for _ in range(n):

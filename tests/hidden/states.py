@@ -1,0 +1,87 @@
+"""What the loops work on: parameters, what is hidden, and a run; and their constants."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DT_S = 0.2
+N_CELLS = 180
+"""Headings are drawn from cells of two degrees, uniform within a cell."""
+CELL_RAD = 2 * math.pi / N_CELLS
+ANGLE = -math.pi + (np.arange(N_CELLS) + 0.5) * CELL_RAD
+COS, SIN = np.cos(ANGLE), np.sin(ANGLE)
+SHORT_M = 0.002
+"""A displacement that is shorter has no heading on a recording."""
+
+# One column of a plan's strengths per effect.
+(
+    ALIGNMENT, WALL_PERSISTENCE, GROUP_COHESION, INTERACTION_RANGE, REAR_BLIND_ZONE,
+    LEADER_FOLLOWING, REACTION_DELAY, COLLECTIVE_DEPARTURE, PLACE_PREFERENCE, DIRECTIONAL_DRIFT,
+    TURNING_BIAS, TURNING_MEMORY, SPEED_MATCHING, CROWDING, BURST_AND_COAST, SPEED_TURN_COUPLING,
+    FREEZING, FATIGUE, HABITUATION, BOLDNESS, ROBOT_AVOIDANCE,
+    WAXING_WALLS, STARTLE, SOUND, KEPT_DISTANCE, ONE_EYE, LIT_ROOM, N_EFFECTS,
+) = range(28)  # fmt: skip
+
+FREEZE_S = 3.0
+FROZEN_M_S = 0.002
+BLIND_RAD = math.radians(95)
+FELT_M = 0.05
+LATE_STEPS = 3
+STARTLE_STEPS = 3
+STARTLE_REST_STEPS = 15
+DEPARTURE_STEPS = 15
+
+
+class Law(NamedTuple):
+    """Parameters by zone id, row 0 unused; ``speed`` holds shares of bins of 0.02 m/s."""
+
+    kappa_0: Floats
+    kappa_f: Floats
+    alpha: Floats
+    gamma: Floats
+    speed: Floats
+    scale_0: Floats
+    scale_f: Floats
+    fov_rad: float
+
+
+class Plan(NamedTuple):
+    """What is hidden: strengths (agent, effect), and where and who it touches."""
+
+    strength: Floats
+    place: Floats
+    speaker: Floats
+    compass_rad: float
+    phase_rad: float
+    bold: Floats
+    robot: int
+
+
+class Past(NamedTuple):
+    """A run: states at 0 ... T, steps 0 ... T - 1, and the log densities of its steps.
+
+    ``xy`` (T + 1, agent, 2), ``heading`` and ``zone`` (T + 1, agent); ``turn``,
+    ``speed``, ``score`` (speed's normal score), ``frozen`` and ``startled`` (T, agent);
+    ``log_heading`` and ``log_speed`` (T, agent); ``left`` (room, agent), step at which
+    an agent last left a room.
+    """
+
+    xy: Floats
+    heading: Floats
+    zone: Ints
+    turn: Floats
+    speed: Floats
+    score: Floats
+    frozen: Ints
+    startled: Ints
+    log_heading: Floats
+    log_speed: Floats
+    left: Ints
+    first: int
