@@ -215,7 +215,7 @@ class Screen:
         if effect.sight is not None:
             total += self._sight_scores(scene, at(strong)) / strong
         if effect.factor is not None:
-            tilt, tilt_taken = factors_of(scene, at(effect.probe), angle)
+            tilt, tilt_taken = factors_of(scene, at(effect.probe), angle, tables.probability)
             factor_score(tilt, tilt_taken, tables.probability, some)
             total += some * fitted.weight / effect.probe
         return total

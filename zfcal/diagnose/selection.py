@@ -202,7 +202,8 @@ class Selector:
         taken = {step.choice.best.name for step in done}
         open_ = [best for best in ranked if best.score.candidate.name not in taken]
         suspects = [best for best in open_ if best.p < LEVEL][:_SUSPECTS]
-        rivals = self._rivals(screen, taken) if suspects or self.suspicious else []
+        worth = bool(suspects) or (self.suspicious and not done)
+        rivals = self._rivals(screen, taken) if worth else []
         least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
         listed = self._refits(screen, suspects, least)
         generic = self._refits(screen, rivals, least)

@@ -113,15 +113,24 @@ def components_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
     return parts
 
 
-def factors_of(scene: Scene, packed: Packed, angle_sr: Floats) -> tuple[Floats, Floats]:
-    """Return the effects' factors on each cell and at the heading taken; empty without."""
+def factors_of(
+    scene: Scene, packed: Packed, angle_sr: Floats, probability: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Return the effects' factors on each cell and at the heading taken; empty without.
+
+    Parameters
+    ----------
+    probability : ndarray, shape (turn, cell)
+        Where it is given, cells that hardly any heading takes have a factor of one.
+    """
     turns = scene.turns
     if not len(packed.factors):
         return np.zeros((0, ANGLES)), np.zeros(0)
     tilt, taken = np.empty((len(turns), ANGLES)), np.empty(len(turns))
     ask_factors(
         scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
-        turns.landing, turns.share, tilt, taken,
+        turns.landing, turns.share, np.zeros((0, ANGLES)) if probability is None else probability,
+        tilt, taken,
     )  # fmt: skip
     return tilt, taken
 

@@ -37,6 +37,8 @@ from zfcal.model.kernels.world import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_HARDLY = 1e-6
+
 PART = 4
 """Columns of a component: weight, unit vector x and y, kappa."""
 
@@ -206,8 +208,8 @@ def ask_components(
 @kernel
 def ask_factors(
     states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
-    speed_m_s: Floats, landing: Ints, share: NDArray[np.uint8], tilt: Floats,
-    tilt_taken: Floats,
+    speed_m_s: Floats, landing: Ints, share: NDArray[np.uint8], probability: Floats,
+    tilt: Floats, tilt_taken: Floats,
 ) -> None:  # fmt: skip
     """Write the product of the effects' factors on each cell of headings.
 
@@ -217,6 +219,8 @@ def ask_factors(
     speed_m_s, landing : ndarray, shape (step,)
     share : ndarray of uint8, shape (step, cell, zone)
         A cell that several zones share counts as in the one with most of it.
+    probability : ndarray, shape (step, cell), or (0, cell)
+        A cell that hardly any heading takes is passed over, where this is known.
     tilt : ndarray, shape (step, cell)
     tilt_taken : ndarray, shape (step,)
         At the heading taken.
@@ -239,6 +243,8 @@ def ask_factors(
                     if share[s, g, z] > most:
                         most, zone = share[s, g, z], z + 1
             product = 1.0
+            if g >= 0 and probability.shape[0] > 0 and probability[s, g] < _HARDLY:
+                zone = 0
             if zone > 0:
                 for h in range(packed.factors.shape[0]):
                     product *= call_factor(
