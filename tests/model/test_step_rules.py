@@ -22,7 +22,13 @@ from zfcal.model.kernels.run import advance, record_run
 from zfcal.model.kernels.world import make_work, place
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.packing import pack, pack_genes
-from zfcal.model.simulate import burn_in_steps, simulate_counts, simulate_tracks, tank_of
+from zfcal.model.simulate import (
+    burn_in_steps,
+    individuals,
+    simulate_counts,
+    simulate_tracks,
+    tank_of,
+)
 from zfcal.parameters import to_genes
 
 SAMPLERS = pytest.mark.parametrize("sampler", ["exact", "grid"])
@@ -42,7 +48,13 @@ def recorded(model, arena, *, n_agents, n_steps, seed=5, sampler="exact", burn_i
     """Return positions, heading angles and speeds of a recorded run."""
     grid = 720 if sampler == "grid" else 0
     record = record_run(
-        np.uint64(seed), n_agents, burn_in, n_steps, pack([model], arena), tank_of(arena), grid
+        np.uint64(seed),
+        individuals(n_agents, 0),
+        burn_in,
+        n_steps,
+        pack([model], arena),
+        tank_of(arena),
+        grid,
     )
     return record[..., :2], np.arctan2(record[..., 3], record[..., 2]), record[..., 4]
 
