@@ -102,7 +102,7 @@ def _head(found: dict[str, Any]) -> list[str]:
             cost over size on logarithmic scales, over the larger half of the sizes. {again}"""
         ),
         "![Cost over agents, duration, population and trials](pictures/growth.png)\n",
-        "Dotted: in proportion to the size; upright, the group above which neighbours are thinned.\n",
+        "Dotted: in proportion to the size; upright, the group above which draws are thinned.\n",
     ]
 
 

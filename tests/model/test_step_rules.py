@@ -19,7 +19,7 @@ from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.random import next_word, seeded
 from zfcal.model.kernels.run import advance, record_run
-from zfcal.model.kernels.world import make_work, place
+from zfcal.model.kernels.world import STATES, make_work, place
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.packing import pack, pack_genes
 from zfcal.model.simulate import (
@@ -96,8 +96,8 @@ def _words_used(state, packed, tank, random, grid):
 def test_a_speed_is_drawn_once_and_redrawn_fifty_times(make_natural):
     """Where no speed leads anywhere: 51 draws of two words each, and none for a heading."""
     model = dataclasses.replace(changed(make_natural(SQUARE), speed_frequency=FAST), dt_s=10.0)
-    state, tank, random = np.zeros((12, 1)), make_tank(SQUARE), seeded(np.uint64(4))
-    _place(state, tank, random)
+    state, tank, random = np.zeros((STATES, 1)), make_tank(SQUARE), seeded(np.uint64(4))
+    _place(state, tank, individuals(1, 0), random)
 
     used = _words_used(state, pack([model], SQUARE), tank, random, 90)
 
@@ -105,8 +105,8 @@ def test_a_speed_is_drawn_once_and_redrawn_fifty_times(make_natural):
 
 
 @kernel
-def _place(state, tank, random):
-    place(state, tank, random)
+def _place(state, tank, people, random):
+    place(state, tank, people, random)
 
 
 @SAMPLERS
