@@ -29,9 +29,19 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.calibrate import evolve
 from zfcal.calibrate.objective import Group, Objective, as_statistics, pool_runs
 from zfcal.model.kernels.perception import make_sight, see
-from zfcal.model.simulate import burn_in_steps, pack, simulate_counts
+from zfcal.model.kernels.run import count_runs
+from zfcal.model.simulate import (
+    MOST_IN_FULL,
+    burn_in_steps,
+    empty_counts,
+    individuals,
+    pack,
+    simulate_counts,
+    tank_of,
+)
 from zfcal.parameters import Parameters, natural
 
+AGENT_COSTS = ("two_rooms", "roomy", "two_rooms_all_pairs", "roomy_all_pairs")
 ZFCAL = [sys.executable, "-m", "zfcal_cli.main"]
 DT_S = 0.2
 AREA_M2 = 0.278
@@ -59,7 +69,7 @@ class Effort:
     populations: tuple[int, ...] = (12, 32, 60, 120, 240, 480)
     trials: tuple[int, ...] = (1, 2, 4, 8)
     analysed_s: tuple[int, ...] = (600, 1800, 7200)
-    agent_steps: int = 400_000
+    agent_steps: int = 200_000
     repeats: int = 3
 
 
@@ -106,6 +116,30 @@ def simulation_s(
     return processor_s(run, repeats=repeats)
 
 
+def both_ways_ns(arena: Arena, n_agents: int, n_steps: int, *, repeats: int) -> tuple[float, float]:
+    """Return the least time per agent-step as simulated, and looking at all pairs, by turns."""
+    packed, tank, people = pack([model_of(arena)], arena), tank_of(arena), individuals(n_agents, 0)
+    seeds = np.zeros(1, dtype=np.uint64)
+    sizes = (n_agents, n_agents, burn_in_steps(DT_S), n_steps)
+    n_zones = len(arena.zones)
+
+    def run() -> None:
+        simulate_counts(packed, arena, n_agents=n_agents, n_steps=n_steps, seeds=seeds, n_threads=1)
+
+    def run_all_pairs() -> None:
+        counts = empty_counts(1, 1, n_zones)
+        count_runs(0, 1, seeds, sizes, people, packed, tank, counts)
+
+    least = [np.inf, np.inf]
+    for _ in range(1 + repeats):
+        for way, work in enumerate((run, run_all_pairs)):
+            begin = time.process_time()
+            work()
+            least[way] = min(least[way], time.process_time() - begin)
+    per_step = 1e9 / (n_agents * (n_steps + sizes[2]))
+    return least[0] * per_step, least[1] * per_step
+
+
 def sight_ns(n_agents: int, repeats: int) -> float:
     """Return the time of one solid angle, in nanoseconds, among so many agents."""
     # Of small groups several in one call, which itself takes as long as twenty angles.
@@ -131,16 +165,11 @@ def by_agents(effort: Effort) -> list[dict[str, float]]:
     for n in effort.agents:
         burn_in = burn_in_steps(DT_S)
         n_steps = max(20, effort.agent_steps // n - burn_in)
-        per_step = 1e9 / (n * (n_steps + burn_in))
-        arenas = {"two_rooms": two_rooms(), "roomy": roomy(n)}
         row = {"agents": n, "sight_ns_per_pair": sight_ns(n, effort.repeats)}
-        for name, arena in arenas.items():
-            all_s = simulation_s(arena, n, n_steps, repeats=effort.repeats, n_counted=n)
-            row[f"{name}_ns"] = all_s * per_step
-        one_s = simulation_s(arenas["two_rooms"], n, n_steps, repeats=effort.repeats, n_counted=1)
-        # What counting costs falls on the samples alone, not on the burn-in.
-        counting = max(0.0, row["two_rooms_ns"] / per_step - one_s)
-        row["counting_ns"] = counting * 1e9 / (n * n_steps)
+        for name, arena in {"two_rooms": two_rooms(), "roomy": roomy(n)}.items():
+            now, all_pairs = both_ways_ns(arena, n, n_steps, repeats=effort.repeats)
+            row |= {f"{name}_ns": now, f"{name}_all_pairs_ns": all_pairs}
+            row[f"{name}_ratio"] = all_pairs / now
         rows.append(row)
     return rows
 
@@ -255,9 +284,10 @@ def crossing(rows: Sequence[dict[str, float]], key: str) -> dict[str, float]:
     }
 
 
-def measure(effort: Effort) -> dict[str, Any]:
-    """Measure all four ways of growing."""
-    found: dict[str, Any] = {"machine": machine(), "load_before": load()}
+def measure(effort: Effort, *, known: dict[str, Any], only: str | None = None) -> dict[str, Any]:
+    """Measure all four ways of growing, or one of them beside what is known of the others."""
+    found: dict[str, Any] = {**known, "machine": machine(), "load_before": load()}
+    found |= {"most_in_full": MOST_IN_FULL, "only": only}
     for name, part in (
         ("agents", by_agents),
         ("duration", by_duration),
@@ -265,16 +295,19 @@ def measure(effort: Effort) -> dict[str, Any]:
         ("trials", by_trials),
         ("analysed", by_length),
     ):
-        print(f"{name} ...", file=sys.stderr)
-        found[name] = part(effort)
+        if only in {None, name}:
+            print(f"{name} ...", file=sys.stderr)
+            found[name] = part(effort)
     found["load_after"] = load()
-    found["pairs"] = {key: crossing(found["agents"], f"{key}_ns") for key in ("two_rooms", "roomy")}
+    found["pairs"] = {
+        key: crossing(found["agents"], f"{key}_all_pairs_ns") for key in ("two_rooms", "roomy")
+    }
     found["slopes"] = {
         "duration": slope(found["duration"], "duration_s", "simulate_s"),
         "population": slope(found["population"], "population", "generation_s"),
         "trials": slope(found["trials"], "trials", "processor_s"),
         "analysed": slope(found["analysed"], "duration_s", "processor_s"),
-        "agents": 1 + slope(found["agents"], "agents", "two_rooms_ns"),
+        **{key: 1 + slope(found["agents"], "agents", f"{key}_ns") for key in AGENT_COSTS},
     }
     return found
 
@@ -303,16 +336,22 @@ def main() -> None:
     """Measure, or draw again what was measured, write the three files, and compare."""
     options_of = parser(__doc__)
     options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options_of.add_argument(
+        "--only", help="Measure one part anew, the rest is as written: agents, duration, ..."
+    )
     options = options_of.parse_args()
     place = places(options)
-    if options.draw:
-        found = read("growth", place.results)
-        if found is None:
+    known: dict[str, Any] = {}
+    if options.draw or options.only:
+        written = read("growth", place.results)
+        if written is None:
             raise SystemExit(
-                f"{place.results} has no growth.json; --write draws the committed one."
+                f"{place.results} has no growth.json; --write takes the committed one."
             )
-    else:
-        found = measure(TINY if options.tiny else Effort())
+        known = written
+    found = known
+    if not options.draw:
+        found = measure(TINY if options.tiny else Effort(), known=known, only=options.only)
     growth_document.draw(found, place.docs / "pictures" / "growth.png")
     conclude(
         "growth",

@@ -66,21 +66,19 @@ def _plain(axes: Axes, sizes: np.ndarray) -> None:
 
 
 def _agents(axes: Axes, found: dict[str, Any]) -> None:
-    rows, pairs = found["agents"], found["pairs"]["two_rooms"]
+    rows = found["agents"]
     n = np.array([row["agents"] for row in rows])
     marks = {
         "two_rooms_ns": ("two rooms", FISH, "o-"),
         "roomy_ns": ("the same room for each", GROUP, "D-"),
-        "counting_ns": ("counting, of two rooms", ROBOT, "s--"),
+        "two_rooms_all_pairs_ns": ("all pairs, two rooms", ROBOT, "s--"),
+        "roomy_all_pairs_ns": ("all pairs, the same room", MODEL, "^--"),
     }
     for key, (label, colour, line) in marks.items():
         axes.loglog(n, [row[key] for row in rows], line, color=colour, label=label)
-    sight = [row["sight_ns_per_pair"] * row["agents"] for row in rows]
-    axes.loglog(n, sight, "^--", color=MODEL, label="solid angles, of both")
-    axes.axvline(pairs["equal_at_agents"], color=MUTED, linestyle=":")
-    axes.set_ylim(bottom=1)
+    axes.axvline(found["most_in_full"], color=MUTED, linestyle=":")
     axes.set(title="Agents", xlabel="agents", ylabel="ns per agent-step")
-    axes.legend(loc="lower right")
+    axes.legend(loc="upper left")
     _plain(axes, n)
 
 
@@ -93,46 +91,54 @@ def _prose(text: str) -> str:
 
 
 def _head(found: dict[str, Any]) -> list[str]:
+    only = found.get("only")
+    again = f"Of the last run is the part on {only}; the rest is of a former one." if only else ""
     return [
         "# How the cost grows\n",
         _prose(
             f"""Made by `benchmarks/bench_growth.py`; numbers in `benchmarks/results/growth.json`.
             Machine: {found["machine"]}; load {found["load_before"]:.1f} before,
             {found["load_after"]:.1f} after. Processor time, one thread; an exponent is the slope of
-            cost over size on logarithmic scales, over the larger half of the sizes."""
+            cost over size on logarithmic scales, over the larger half of the sizes. {again}"""
         ),
         "![Cost over agents, duration, population and trials](pictures/growth.png)\n",
-        "Dotted: in proportion to the size; upright, where pairs cost as much as all the rest.\n",
+        "Dotted: in proportion to the size; upright, the group above which draws are thinned.\n",
     ]
 
 
 def _by_agents(found: dict[str, Any]) -> list[str]:
-    pairs = found["pairs"]["two_rooms"]
+    pairs, slopes = found["pairs"]["two_rooms"], found["slopes"]
+    keys = ("two_rooms_ns", "two_rooms_all_pairs_ns", "two_rooms_ratio")
+    keys += tuple(key.replace("two_rooms", "roomy") for key in keys)
     return [
         "## Agents\n",
         _prose(
-            f"""An agent-step costs {pairs["fixed_ns"]:.0f} ns, and {pairs["per_other_ns"]:.1f} ns
-            for each other agent, since everybody looks at everybody. The two are equal at
-            {pairs["equal_at_agents"]:.0f} agents; beyond, the cost of a step grows with the square
-            of the group (exponent {found["slopes"]["agents"]:.2f}). A part of it are solid angles;
-            counting, in two rooms, are the histograms of a sample, of which D is over pairs."""
+            f"""Were all to look at all, an agent-step would cost {pairs["fixed_ns"]:.0f} ns, and
+            {pairs["per_other_ns"]:.1f} ns for each other agent: a step's cost grows with the square
+            of the group (exponents over the larger half {slopes["two_rooms_all_pairs"]:.2f} and
+            {slopes["roomy_all_pairs"]:.2f}). So above {found["most_in_full"]} agents, unless a
+            model has effects, neighbours are drawn by bounds of their solid angles and thinned by
+            the true ones, which is the same law exactly; and distances are counted from sorted
+            strips, with the same counts. Then the exponents are {slopes["two_rooms"]:.2f} in two
+            rooms, ever more crowded, and {slopes["roomy"]:.2f} where each has the same room: there
+            it is the number of agents close by that counts, and a group that swims together has
+            more of them the larger it is."""
+        ),
+        _prose(
+            """Both ways by turns in one run, ns per agent-step, least of several; "times" is all
+            pairs over what is done. Up to the limit they are the same program."""
         ),
         table(
             (
                 "agents",
-                "two rooms (ns per agent-step)",
-                "the same room for each (ns)",
-                "a solid angle (ns)",
-                "counting (ns per agent-step)",
+                "two rooms",
+                "all pairs",
+                "times",
+                "the same room for each",
+                "all pairs",
+                "times",
             ),
-            _rows(
-                found["agents"],
-                "agents",
-                "two_rooms_ns",
-                "roomy_ns",
-                "sight_ns_per_pair",
-                "counting_ns",
-            ),
+            _rows(found["agents"], "agents", *keys),
         ),
     ]
 

@@ -7,6 +7,7 @@ events of `zfcal.online.events`.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -89,6 +90,11 @@ class Output:
         self._results: list[Any] = []
 
     def __enter__(self) -> Self:
+        self._handler = logging.Handler()
+        self._handler.emit = self._announce  # type: ignore[method-assign]
+        logger = logging.getLogger("zfcal")
+        logger.setLevel(logging.INFO)
+        logger.addHandler(self._handler)
         return self
 
     def __exit__(
@@ -97,6 +103,7 @@ class Output:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        logging.getLogger("zfcal").removeHandler(self._handler)
         self._bars.close()
         if isinstance(error, BrokenPipeError):
             raise ReaderGoneError from error
@@ -146,6 +153,12 @@ class Output:
     def note(self, text: str) -> None:
         """Tell something worth knowing."""
         self._talk("note", text)
+
+    def _announce(self, record: logging.LogRecord) -> None:
+        """Show what the library logs: of this start, not of the result, hence not in JSON."""
+        if not self.quiet:
+            self._bars.clear()
+            say(record.getMessage())
 
     def _record(self, error: BaseException) -> None:
         """Put into the document what `main` will say to the person."""

@@ -12,9 +12,16 @@ import shapely
 from zfcal.arena import Bins, Zone, make_arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import measure
+from zfcal.model.kernels.crowd_runs import record_crowd_run
 from zfcal.model.kernels.run import record_run
 from zfcal.model.packing import pack
-from zfcal.model.simulate import burn_in_steps, simulate_counts, tank_of
+from zfcal.model.simulate import (
+    burn_in_steps,
+    individuals,
+    is_crowd,
+    simulate_counts,
+    tank_of,
+)
 from zfcal.parameters import natural
 from zfcal.tracks import FISH, Samples
 
@@ -44,9 +51,9 @@ def model_of(arena, dt_s=0.2, **changes):
 
 def recorded(model, arena, *, n_agents, n_steps):
     """Record the run of ``SEED`` and return it as samples."""
-    record = record_run(
-        SEED, n_agents, burn_in_steps(model.dt_s), n_steps, pack([model], arena), tank_of(arena), 0
-    )
+    packed, people, tank = pack([model], arena), individuals(n_agents, 0), tank_of(arena)
+    rest = (SEED, people, burn_in_steps(model.dt_s), n_steps, packed, tank)
+    record = record_crowd_run(*rest) if is_crowd(n_agents, packed) else record_run(*rest, 0)
     return Samples(
         dt_s=model.dt_s,
         k=np.arange(n_steps, dtype=np.int64),

@@ -19,10 +19,16 @@ from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.random import next_word, seeded
 from zfcal.model.kernels.run import advance, record_run
-from zfcal.model.kernels.world import make_work, place
+from zfcal.model.kernels.world import STATES, make_work, place
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.packing import pack, pack_genes
-from zfcal.model.simulate import burn_in_steps, simulate_counts, simulate_tracks, tank_of
+from zfcal.model.simulate import (
+    burn_in_steps,
+    individuals,
+    simulate_counts,
+    simulate_tracks,
+    tank_of,
+)
 from zfcal.parameters import to_genes
 
 SAMPLERS = pytest.mark.parametrize("sampler", ["exact", "grid"])
@@ -42,7 +48,13 @@ def recorded(model, arena, *, n_agents, n_steps, seed=5, sampler="exact", burn_i
     """Return positions, heading angles and speeds of a recorded run."""
     grid = 720 if sampler == "grid" else 0
     record = record_run(
-        np.uint64(seed), n_agents, burn_in, n_steps, pack([model], arena), tank_of(arena), grid
+        np.uint64(seed),
+        individuals(n_agents, 0),
+        burn_in,
+        n_steps,
+        pack([model], arena),
+        tank_of(arena),
+        grid,
     )
     return record[..., :2], np.arctan2(record[..., 3], record[..., 2]), record[..., 4]
 
@@ -84,8 +96,8 @@ def _words_used(state, packed, tank, random, grid):
 def test_a_speed_is_drawn_once_and_redrawn_fifty_times(make_natural):
     """Where no speed leads anywhere: 51 draws of two words each, and none for a heading."""
     model = dataclasses.replace(changed(make_natural(SQUARE), speed_frequency=FAST), dt_s=10.0)
-    state, tank, random = np.zeros((12, 1)), make_tank(SQUARE), seeded(np.uint64(4))
-    _place(state, tank, random)
+    state, tank, random = np.zeros((STATES, 1)), make_tank(SQUARE), seeded(np.uint64(4))
+    _place(state, tank, individuals(1, 0), random)
 
     used = _words_used(state, pack([model], SQUARE), tank, random, 90)
 
@@ -93,8 +105,8 @@ def test_a_speed_is_drawn_once_and_redrawn_fifty_times(make_natural):
 
 
 @kernel
-def _place(state, tank, random):
-    place(state, tank, random)
+def _place(state, tank, people, random):
+    place(state, tank, people, random)
 
 
 @SAMPLERS

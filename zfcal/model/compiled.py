@@ -6,22 +6,30 @@ itself is named after all sources of the model. It is in the user's cache
 folder, since an installed package may not be writable, or in the folder that
 ``NUMBA_CACHE_DIR`` names. Where neither can be written nothing is kept, and
 every start compiles anew.
+
+Compiling takes long, so the first time that it happens in a process it is
+logged to `LOGGER`, which the command line shows.
 """
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, final
 
 import numba
 from numba import cfunc, njit
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+LOGGER = logging.getLogger(__name__)
+
 _config: Any = numba.config
+_Listener: Any = event.Listener
 
 
 def cache_folder() -> Path | None:
@@ -61,6 +69,36 @@ if KEPT:
     _config.CACHE_DIR = str(_folder)
 
 
+@final
+class Announcer(_Listener):  # type: ignore[misc]
+    """Logs once that kernels are compiled; those that were kept are only loaded."""
+
+    def __init__(self) -> None:
+        self.told = False
+
+    def on_start(self, event: Any) -> None:
+        """Take the start of a compilation."""
+        if event.data["dispatcher"].py_func.__module__.startswith("zfcal."):
+            self.tell()
+
+    def on_end(self, event: Any) -> None:
+        """Take the end of a compilation."""
+
+    def tell(self) -> None:
+        """Log it, the first time."""
+        if not self.told:
+            self.told = True
+            LOGGER.info(
+                "Compiling the simulator takes about half a minute, longer on a busy machine. %s",
+                "The next start finds it ready." if KEPT else "Every start will: nothing is kept.",
+            )
+
+
+_announcer = Announcer()
+_register: Any = event.register
+_register("numba:compile", _announcer)
+
+
 def kernel(function: F) -> F:
     """Compile a function by itself."""
     compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy")(function)
@@ -92,5 +130,7 @@ def hook(signature: Any) -> Callable[[F], Any]:
     signature
         One of `zfcal.model.kernels.hooks`.
     """
+    if not is_warm():
+        _announcer.tell()
     made: Any = cfunc(signature, cache=KEPT, error_model="numpy")
     return made

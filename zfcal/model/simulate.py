@@ -13,6 +13,7 @@ from scipy.special import ndtri
 from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.geometry import Tank, make_tank
+from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
 from zfcal.model.kernels.run import Counts, count_runs, record_run
 from zfcal.model.kernels.world import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
@@ -33,6 +34,9 @@ __all__ = [
 ]
 
 _LEAST_GRID = 36
+
+MOST_IN_FULL = 32
+"""Larger groups draw by thinning, where that costs less than to look at all pairs (measured)."""
 
 _JOB_STEPS = 20_000
 """Agent-steps in a piece of work: some milliseconds, much more than a call costs."""
@@ -96,7 +100,7 @@ def simulate_counts(
             f"{counted} count, {n_steps} steps, {len(seeds)} seeds."
         )
     tank = tank_of(arena)
-    counts = _zeros(len(packed.zones), len(seeds), len(arena.zones))
+    counts = empty_counts(len(packed.zones), len(seeds), len(arena.zones))
     sizes = (n_agents, counted, burn_in_steps(packed.dt_s), n_steps)
     jobs = len(packed.zones) * len(seeds)
     # Pieces of some milliseconds, so that the last one is short on every core.
@@ -104,12 +108,19 @@ def simulate_counts(
     words = np.array(seeds, dtype=np.uint64)
     people = individuals(n_agents, n_robots)
 
+    run = count_crowd_runs if is_crowd(n_agents, packed) else count_runs
+
     def work(first: int) -> None:
-        count_runs(first, min(first + per_piece, jobs), words, sizes, people, packed, tank, counts)
+        run(first, min(first + per_piece, jobs), words, sizes, people, packed, tank, counts)
 
     with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
         list(pool.map(work, range(0, jobs, per_piece)))
     return counts
+
+
+def is_crowd(n_agents: int, packed: Packed) -> bool:
+    """Tell whether a group is large and without effects, which may ask what each agent sees."""
+    return n_agents > MOST_IN_FULL and packed.effects.shape[1] == 0
 
 
 def individuals(n_agents: int, n_robots: int) -> NDArray[np.float64]:
@@ -138,7 +149,8 @@ def check_sampler(sampler: str, grid: int) -> None:
         raise InputError(f"The sampler's grid needs {_LEAST_GRID} angles or more, got {grid}.")
 
 
-def _zeros(n_models: int, n_runs: int, n_zones: int) -> Counts:
+def empty_counts(n_models: int, n_runs: int, n_zones: int) -> Counts:
+    """Return histograms of zeros."""
     lead = (n_models, n_runs, n_zones)
     shapes = ((*lead, 10), (*lead, 10), lead, (*lead, n_zones), (*lead, 10))
     return Counts(*(np.zeros(shape, dtype=np.int64) for shape in shapes))
@@ -188,9 +200,12 @@ def simulate_tracks(
         )
     packed = pack([parameters], arena)._replace(clock_s=np.array(clock_s, dtype=np.float64))
     word = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
-    record = record_run(
-        word, individuals(n_agents, n_robots), burn_in_steps(packed.dt_s), n_steps, packed,
-        tank_of(arena),
-        grid if sampler == "grid" else 0,
+    people, tank, burn_in = (
+        individuals(n_agents, n_robots), tank_of(arena), burn_in_steps(packed.dt_s)
     )  # fmt: skip
+    if sampler == "exact" and is_crowd(n_agents, packed):
+        record = record_crowd_run(word, people, burn_in, n_steps, packed, tank)
+    else:
+        angles = grid if sampler == "grid" else 0
+        record = record_run(word, people, burn_in, n_steps, packed, tank, angles)
     return record[:, :, :2], np.arctan2(record[:, :, 3], record[:, :, 2])

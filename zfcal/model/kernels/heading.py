@@ -32,11 +32,14 @@ from zfcal.model.kernels.world import (
     Work,
     X,
     Y,
+    sight_row,
 )
 
-_REJECTIONS = 200
-_REDRAWS = 50
+REJECTIONS = 200
+REDRAWS = 50
+
 _TABLE = 0.0
+"""In place of a sampler's constant: the zone's own table serves."""
 
 Floats = NDArray[np.float64]
 Random = NDArray[np.uint64]
@@ -79,14 +82,19 @@ def gather(
     alpha = packed.zones[model, zone, ALPHA]
     kappa = packed.zones[model, zone, KAPPA_F]
     n = state.shape[1]
+    # Sight of all by all, or of this agent alone.
+    row = sight_row(n, packed)
+    first = i * row
+    if sight.angle_sr.size < n * row:
+        first, row = 0, n
     count, total = 0, 1.0
-    for j in range(n):
-        angle = sight.angle_sr[i * n + j]
+    for k in range(first, first + row):
+        angle = sight.angle_sr[k]
         if angle > 0.0:
             weight = alpha * angle
             parts[count, 0] = weight
-            parts[count, 1] = sight.dx_m[i * n + j] * sight.toward_per_m[i * n + j]
-            parts[count, 2] = sight.dy_m[i * n + j] * sight.toward_per_m[i * n + j]
+            parts[count, 1] = sight.dx_m[k] * sight.toward_per_m[k]
+            parts[count, 2] = sight.dy_m[k] * sight.toward_per_m[k]
             parts[count, 3] = kappa
             parts[count, 4] = _TABLE
             total += weight
@@ -198,7 +206,7 @@ def draw_on_grid(
     reach = speed * packed.dt_s
     zone = int(state[ZONE, i])
     # Beside an admissible angle of the grid the drawn heading can still end where none may.
-    for _ in range(_REJECTIONS):
+    for _ in range(REJECTIONS):
         level = uniform(random) * total
         k = 0
         width = 0.5 * (work.density[0] + work.density[1])
@@ -267,7 +275,7 @@ def draw_exact(
     sure = reach < state[CLEAR, i]
     if sure and packed.gamma[model, zone, zone] == 0.0:
         return False
-    for _ in range(_REJECTIONS):
+    for _ in range(REJECTIONS):
         ux, uy = _draw_mixture(i, state, model, packed, tank, random, work, count, total)
         landing, accept = zone, 1.0
         if not sure:
@@ -299,7 +307,7 @@ def draw_move(
             i, packed.effects[model, packed.speeds[k, 1]].ctypes.data, uniform(random),
         )  # fmt: skip
     # An agent that an effect stops keeps its heading.
-    for _ in range(1 + _REDRAWS if factor > 0.0 else 0):
+    for _ in range(1 + REDRAWS if factor > 0.0 else 0):
         speed = factor * draw_speed(i, state, model, packed, tank, random)
         work.moves[i, 3] = speed
         if grid:
@@ -310,12 +318,14 @@ def draw_move(
             )
         if drawn:
             return
-    work.moves[i, 0], work.moves[i, 1], work.moves[i, 2], work.moves[i, 3] = (
-        state[HX, i],
-        state[HY, i],
-        state[ZONE, i],
-        0.0,
-    )
+    stay(i, state, work)
+
+
+@inlined
+def stay(i: int, state: Floats, work: Work) -> None:
+    """Write no move: speed zero, the heading and the zone that the agent has."""
+    work.moves[i, 0], work.moves[i, 1] = state[HX, i], state[HY, i]
+    work.moves[i, 2], work.moves[i, 3] = state[ZONE, i], 0.0
 
 
 @inlined

@@ -23,8 +23,11 @@ REPULSION_M = 0.02
 _BACK_M = LENGTH_M / 3.0
 _OUT_M = WIDTH_M / 2.0
 _UP_M = HEIGHT_M / 2.0
+_MOST_M2 = _UP_M * max(LENGTH_M, WIDTH_M) * (1.0 + 1e-9)
 _SERIES_LIMIT = 0.1
 _NOWHERE_M = 1e-100
+_INSIDE = 1e100
+"""In place of a tangent: the observer's head is in, or right at, the other's body."""
 
 Floats = NDArray[np.float64]
 
@@ -66,12 +69,48 @@ def make_sight(n_pairs: int) -> Sight:
     )  # fmt: skip
 
 
+@inlined
+def in_vectors(n_pairs: int) -> int:
+    """Return the next multiple of eight: what is left beside whole vectors costs far more."""
+    return (n_pairs + 7) // 8 * 8
+
+
+@inlined
+def most_sr(away_m: float) -> float:
+    """Return what a body covers at most whose head is farther away than a body length.
+
+    Notes
+    -----
+    Let m be the point under the top, at distance D, and e the elevation of the
+    top: ``tan e = (H / 2) / D``. From outside the pair with the largest
+    difference of azimuth spans the whole body, so m lies between the two, at
+    turns p and q from them, and ``A = 4 atan(tan(p / 2) tan(e / 2)) + 4
+    atan(tan(q / 2) tan(e / 2))`` (areas of right spherical triangles). As
+    ``atan x <= x`` and ``tan(x / 2) <= tan(x) / 2`` below a right angle,
+
+        A <= (H / 2) / D * (tan p + tan q).
+
+    Each tangent is an offset across the line of sight over a length along it.
+    The offsets add up to no more than the longest diagonal, and the lengths
+    are no less than ``d - L``, just as ``D >= d - L / 3``.
+    """
+    return _MOST_M2 / ((away_m - _BACK_M) * (away_m - LENGTH_M))
+
+
 @lean
 def see(sight: Sight, cos_fov: float) -> None:
-    """Write direction and solid angle of each neighbour.
+    """Write direction and solid angle of every neighbour, as `see_first` does."""
+    see_first(sight.dx_m.size, sight, cos_fov)
+
+
+@lean
+def see_first(n_pairs: int, sight: Sight, cos_fov: float) -> None:
+    """Write direction and solid angle of the first neighbours.
 
     Parameters
     ----------
+    n_pairs
+        So many of them.
     sight
         With the first five arrays filled.
     cos_fov
@@ -88,17 +127,18 @@ def see(sight: Sight, cos_fov: float) -> None:
     """
     dx_m, dy_m, hx, hy, out_sr = sight.dx_m, sight.dy_m, sight.hx, sight.hy, sight.angle_sr
     # One array is written in each loop: with more the compiler gives up on vectors.
-    for k in range(dx_m.size):
-        away = math.sqrt(dx_m[k] * dx_m[k] + dy_m[k] * dy_m[k])
-        toward = 1.0 / max(away, _NOWHERE_M)
-        sight.toward_per_m[k] = toward if away >= REPULSION_M else -toward
-    for k in range(dx_m.size):
+    for k in range(n_pairs):
+        out_sr[k] = math.sqrt(dx_m[k] * dx_m[k] + dy_m[k] * dy_m[k])
+    for k in range(n_pairs):
+        toward = 1.0 / max(out_sr[k], _NOWHERE_M)
+        sight.toward_per_m[k] = toward if out_sr[k] >= REPULSION_M else -toward
+    for k in range(n_pairs):
         x1, y1 = dx_m[k], dy_m[k]
         x2, y2 = x1 - LENGTH_M * hx[k], y1 - LENGTH_M * hy[k]
         mx, my = x1 - _BACK_M * hx[k], y1 - _BACK_M * hy[k]
         x3, y3 = mx - _OUT_M * hy[k], my + _OUT_M * hx[k]
         x4, y4 = mx + _OUT_M * hy[k], my - _OUT_M * hx[k]
-        n1 = math.sqrt(x1 * x1 + y1 * y1)
+        n1 = out_sr[k]
         n2 = math.sqrt(x2 * x2 + y2 * y2)
         n3 = math.sqrt(x3 * x3 + y3 * y3)
         n4 = math.sqrt(x4 * x4 + y4 * y4)
@@ -135,19 +175,20 @@ def see(sight: Sight, cos_fov: float) -> None:
             + (ax * bx + ay * by) * nt
             + (mx * bx + my * by) * na
         )
-        q = above / below if below > 0.0 else 1.0
+        q = above / below if below > 0.0 else _INSIDE
         s = q * q
         series = q * (
             1.0
             - s * (1 / 3 - s * (1 / 5 - s * (1 / 7 - s * (1 / 9 - s * (1 / 11 - s * (1 / 13))))))
         )
-        # A negative value asks for the exact function below.
-        small = q < _SERIES_LIMIT
-        angle = 4.0 * series if small else -1.0
+        # A negative value asks for the arc tangent below.
+        angle = 4.0 * series if q < _SERIES_LIMIT else -q
         out_sr[k] = angle if (sight.ahead_m[k] >= n1 * cos_fov) & (n1 > 0.0) else 0.0
-    for k in range(dx_m.size):
-        if out_sr[k] < 0.0:
+    for k in range(n_pairs):
+        if out_sr[k] == -_INSIDE:
             out_sr[k] = _solid_angle_exact(dx_m[k], dy_m[k], hx[k], hy[k])
+        elif out_sr[k] < 0.0:
+            out_sr[k] = 4.0 * math.atan(-out_sr[k])
 
 
 @inlined

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from zfcal.model.compiled import inlined, kernel, lean
 from zfcal.model.geometry import Tank
 from zfcal.model.kernels.heading import apply_move, draw_move
-from zfcal.model.kernels.perception import Sight, make_sight
+from zfcal.model.kernels.pairs import bin_of
+from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.world import (
     DT_S,
@@ -92,38 +93,34 @@ def see_late(state: Floats, model: int, packed: Packed, sight: Sight, work: Work
 
 
 @inlined
-def _bin(value: float, low: float, per: float) -> int:
-    return min(9, max(0, int((value - low) * per)))
-
-
-@inlined
 def _count_state(
     state: Floats, n_counted: int, tank: Tank, model: int, run: int, counts: Counts
 ) -> None:
     for i in range(n_counted):
         zone = int(state[ZONE, i])
         counts.occupation[model, run, zone - 1] += 1
-        column = _bin(state[WALL, i], tank.wall_low_m, tank.wall_per_m)
+        column = bin_of(state[WALL, i], tank.wall_low_m, tank.wall_per_m)
         counts.wall[model, run, zone - 1, column] += 1
         for j in range(i):
             if state[ZONE, j] == state[ZONE, i]:
                 away = math.sqrt(
                     (state[X, i] - state[X, j]) ** 2 + (state[Y, i] - state[Y, j]) ** 2
                 )
-                column = _bin(away, tank.distance_low_m, tank.distance_per_m)
+                column = bin_of(away, tank.distance_low_m, tank.distance_per_m)
                 counts.distance[model, run, zone - 1, column] += 1
 
 
 @inlined
-def _count_step(
+def count_step(
     zones_before: Floats, state: Floats, n_counted: int, tank: Tank, model: int, run: int,
     counts: Counts,
 ) -> None:  # fmt: skip
+    """Count the first agents' transitions and speeds."""
     per = 10.0 / (tank.speed_high - tank.speed_low)
     for i in range(n_counted):
         before = int(zones_before[i]) - 1
         counts.transition[model, run, before, int(state[ZONE, i]) - 1] += 1
-        counts.speed[model, run, before, _bin(state[SPEED, i], tank.speed_low, per)] += 1
+        counts.speed[model, run, before, bin_of(state[SPEED, i], tank.speed_low, per)] += 1
 
 
 @kernel
@@ -147,7 +144,7 @@ def count_runs(
     n, n_counted, burn_in, samples = sizes
     state = np.zeros((STATES, n))
     work = make_work(n, packed.components.shape[0], GRID)
-    sight = make_sight(n * n)
+    sight = make_sight(in_vectors(n * n))
     for job in range(first, last):
         model, run = job // seeds.size, job % seeds.size
         random = seeded(seeds[run])
@@ -161,7 +158,7 @@ def count_runs(
             for i in range(n_counted):
                 work.zones[i] = state[ZONE, i]
             advance(state, model, packed, tank, sight, random, work, False)
-            _count_step(work.zones, state, n_counted, tank, model, run, counts)
+            count_step(work.zones, state, n_counted, tank, model, run, counts)
             _count_state(state, n_counted, tank, model, run, counts)
 
 
@@ -200,7 +197,7 @@ def record_run(
     n = individuals.shape[1]
     state = np.zeros((STATES, n))
     work = make_work(n, packed.components.shape[0], grid if grid > 0 else GRID)
-    sight = make_sight(n * n)
+    sight = make_sight(in_vectors(n * n))
     random = seeded(seed)
     start(state, burn_in, packed, tank, individuals, work, random)
     for _ in range(burn_in):

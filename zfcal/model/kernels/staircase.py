@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel
-from zfcal.model.kernels.random import next_word, uniform
+from zfcal.model.kernels.random import next_word, sine, uniform
 
 STEPS = 64
 _REACH = 4.0
@@ -80,21 +80,6 @@ def _alias(
 
 
 @inlined
-def _sine(t: float) -> float:
-    """Return the sine for t in [0, pi / 2] by its Taylor series, error below 1e-12."""
-    s = t * t
-    p = 1.0 - s / 272.0
-    p = 1.0 - s / 210.0 * p
-    p = 1.0 - s / 156.0 * p
-    p = 1.0 - s / 110.0 * p
-    p = 1.0 - s / 72.0 * p
-    p = 1.0 - s / 42.0 * p
-    p = 1.0 - s / 20.0 * p
-    p = 1.0 - s / 6.0 * p
-    return t * p
-
-
-@inlined
 def staircase_turn(
     kappa: float, tables: Floats, at: tuple[int, int, int], random: NDArray[np.uint64]
 ) -> tuple[float, float]:
@@ -121,12 +106,12 @@ def staircase_turn(
         if step == STEPS:
             wide, below = math.pi - STEPS * width, 0.0
         word = next_word(random)
-        half = _sine(0.5 * (step * width + wide * ((word >> np.uint64(11)) * _TO_UNIT)))
+        half = sine(0.5 * (step * width + wide * ((word >> np.uint64(11)) * _TO_UNIT)))
         cosine = 1.0 - 2.0 * half * half
         level = uniform(random) * tables[m, z, law, HEIGHT, step]
         # The next step is a lower bound of the density: most draws need no exponential.
         if level < below or level < math.exp(kappa * (cosine - 1.0)):
             break
-    sine = 2.0 * half * math.sqrt(max(0.0, 1.0 - half * half))
+    side = 2.0 * half * math.sqrt(max(0.0, 1.0 - half * half))
     # The lowest bits took no part in the place.
-    return cosine, -sine if word & np.uint64(1) else sine
+    return cosine, -side if word & np.uint64(1) else side

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from zfcal.model.compiled import inlined, kernel
 from zfcal.model.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.hooks import call_sight
-from zfcal.model.kernels.perception import Sight, see
+from zfcal.model.kernels.perception import Sight, in_vectors, see, see_first
 from zfcal.model.kernels.random import uniform
 
 Floats = NDArray[np.float64]
@@ -92,6 +92,12 @@ class Packed(NamedTuple):
     speeds: Ints
     sights: Ints
     effects: Floats
+
+
+@inlined
+def has_effects(packed: Packed) -> bool:
+    """Tell whether the models have effects, which may ask what each agent sees."""
+    return packed.effects.shape[1] > 0
 
 
 class Work(NamedTuple):
@@ -245,18 +251,26 @@ def look_back(
 
 
 @inlined
+def sight_row(n: int, packed: Packed) -> int:
+    """Return how many pairs an agent's row of `Sight` has; effects find the agent itself there."""
+    return n if has_effects(packed) else n - 1
+
+
+@inlined
 def look(state: Floats, model: int, packed: Packed, sight: Sight) -> None:
-    """Write what each agent sees of each other one."""
+    """Write what each agent sees of each other one, in rows of `sight_row` pairs."""
     n = state.shape[1]
+    row = sight_row(n, packed)
     for i in range(n):
-        for j in range(n):
-            k = i * n + j
+        for place in range(row):
+            k = i * row + place
             # An agent stands on itself, at distance zero, and does not see itself.
+            j = place + 1 if row < n and place >= i else place
             sight.dx_m[k] = state[X, j] - state[X, i]
             sight.dy_m[k] = state[Y, j] - state[Y, i]
             sight.hx[k], sight.hy[k] = state[HX, j], state[HY, j]
             sight.ahead_m[k] = sight.dx_m[k] * state[HX, i] + sight.dy_m[k] * state[HY, i]
-    see(sight, packed.cos_fov[model])
+    see_first(min(in_vectors(n * row), sight.dx_m.size), sight, packed.cos_fov[model])
     if packed.sights.shape[0] > 0:
         _attend(state, model, packed, sight)
 

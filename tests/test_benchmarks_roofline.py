@@ -1,0 +1,51 @@
+"""What the roofline makes of its numbers, and that the plain program is the model."""
+
+import importlib
+import math
+import sys
+
+import numpy as np
+import pytest
+
+SCRIPTS = ("bench_roofline", "naive", "measuring")
+
+
+@pytest.fixture(scope="module")
+def roofline(repository):
+    """Return the script, which imports its neighbours by name."""
+    sys.path.insert(0, str(repository / "benchmarks"))
+    yield importlib.import_module("bench_roofline")
+    sys.path.remove(str(repository / "benchmarks"))
+    for name in SCRIPTS:
+        sys.modules.pop(name, None)
+
+
+def test_the_bound_adds_up_what_a_step_needs(roofline):
+    """20 + 3 * 1 + 4 * 5 + 4 + 8 = 55 ns of 220 are a quarter."""
+    found = {
+        "machine": "a machine", "load_before": 0.1, "load_after": 0.2, "words": 7.3,
+        "ns": {"turn": 20.0, "word": 1.0, "angle": 5.0, "zone": 4.0, "wall": 8.0,
+               "kernel": 220.0, "naive": 1100.0, "grid": 11_000.0},
+        "scaling": {"one_s": 1.0, "two_s": 0.5, "ratio": 2.0},
+    }  # fmt: skip
+
+    text = " ".join(roofline.markdown(found).split())
+
+    assert "Together 55 ns" in text
+    assert "the bound is 25 %" in text
+    assert "| 1,100 | 5 |" in text
+    assert "2.00 times as fast" in text
+
+
+def test_the_plain_programs_solid_angles_are_the_published_ones(roofline):
+    """At 0.05 m ahead, headings 0, 45, 90 and 180 degrees."""
+    found = [roofline.naive.solid_angle(0.05, 0.0, math.radians(a)) for a in (0, 45, 90, 180)]
+
+    assert found == pytest.approx([0.052389, 0.048100, 0.037770, 0.030843], abs=6e-7)
+
+
+def test_the_plain_programs_von_mises_angles_have_the_laws_mean(roofline):
+    """Mean cosine at kappa 4 is I1 / I0 = 0.8635; 4,000 draws notice 1 %."""
+    cosines = np.cos([roofline.naive.von_mises(4.0) for _ in range(4000)])
+
+    assert cosines.mean() == pytest.approx(0.8635, abs=0.01)
