@@ -19,13 +19,16 @@ from numpy.typing import NDArray
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.screening import Score, Screen
 from zfcal.diagnose.speeds import fit_speed
-from zfcal.model.extended import Fitted, Free, bounds_of, maximise, with_effect
+from zfcal.model.extended import Fitted, Free, bounds_of, maximise, nats_at, with_effect
 from zfcal.model.kernels.world import TRAIT
 from zfcal.model.scene import Scene
 
 Floats = NDArray[np.float64]
 
 _ROUNDS = 10
+_SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Of a strength worth noticing: where the search for the maximum begins."""
+
 _SURE = 2.0
 """Standard errors by which one suspect must beat another."""
 
@@ -98,9 +101,7 @@ def refit(screen: Screen, score: Score) -> Refit:
     if candidate.effect.individual:
         scene = with_traits(scene, score)
     free = free_of(candidate)
-    start = candidate.values(_start(score))
-    if candidate.effect.lag is not None:
-        start = dict(candidate.shape)
+    start = _start(scene, screen.fitted, score)
     fitted = maximise(
         scene,
         with_effect(screen.fitted.parameters, candidate.name, start),
@@ -125,12 +126,24 @@ def by_sample(scene: Scene, at: NDArray[np.int64], values: Floats) -> Floats:
     return np.bincount(at, weights=values, minlength=len(scene.k)).astype(np.float64)
 
 
-def _start(score: Score) -> float:
-    """Return a strength to start from: a part of the way, on the right side."""
+def _start(scene: Scene, fitted: Fitted, score: Score) -> dict[str, float]:
+    """Return where a fit starts: the best of a few strengths on the side that is asked for.
+
+    Near its null the likelihood of a mixture is so steep for a few headings that no
+    slope there says where the maximum is.
+    """
     candidate = score.candidate
+    if candidate.effect.lag is not None:
+        return dict(candidate.shape)
     low, high = bounds_of(candidate.name, candidate.effect.strength)
-    size = min(max(abs(score.strength), 0.05 * candidate.notable), candidate.notable)
-    return float(np.clip(np.copysign(size, score.z), low + 1e-6 * (high - low), high))
+    best, most = candidate.values(0.0), -np.inf
+    for share in _SHARES:
+        strength = float(np.clip(np.copysign(share * candidate.notable, score.z), low, high))
+        values = candidate.values(strength)
+        nats = nats_at(scene, with_effect(fitted.parameters, candidate.name, values), fitted.x)
+        if nats > most:
+            best, most = values, nats
+    return best
 
 
 def _intervals(

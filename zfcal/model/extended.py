@@ -53,6 +53,7 @@ _LAPSE = (1e-6, 0.2)
 _UNIFORM = 1 / (2 * math.pi)
 MIN_STEPS = 30
 _DIFFERENCE = 1e-4
+_SHRINK = 0.2
 _MOST_ROUNDS = 25
 _ENOUGH_NATS = 0.02
 _RIDGE = 1e-9
@@ -371,6 +372,20 @@ def maximise(
     return climb.finish(here)
 
 
+def nats_at(scene: Scene, parameters: Parameters, start: Sequence[Floats]) -> float:
+    """Return the log likelihood of all turns at a point.
+
+    Parameters
+    ----------
+    parameters
+        The model, with its effects.
+    start
+        Per zone, as `zone_scores` takes it.
+    """
+    climb = _Climb(scene=scene, free=(), seen=view_of(scene, without_effects(parameters)))
+    return climb.at(parameters, start).nats
+
+
 def without_effects(parameters: Parameters) -> Parameters:
     """Return the model's base."""
     return dataclasses.replace(parameters, effects={})
@@ -453,7 +468,11 @@ class _Climb:
     def _moved(self, parameters: Parameters, by: Floats) -> Parameters:
         for (name, key), change in zip(self.free, by, strict=True):
             low, high = bounds_of(name, key)
-            value = parameters.effects[name][key] + change * (high - low)
+            here = parameters.effects[name][key]
+            value = here + change * (high - low)
+            if low == 0.0:
+                # At zero a mixture's slope says nothing: it is approached step by step.
+                value = max(value, _SHRINK * here)
             parameters = with_effect(parameters, name, {key: float(np.clip(value, low, high))})
         return parameters
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
+from zfcal.model.compiled import hook, inlined
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.kernels.hooks import COMPONENT
+from zfcal.model.effects.forms import Hooked, needs_neighbour, tilt
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
 from zfcal.model.kernels.world import ZONE, X, Y
 
 
-@hook(COMPONENT)
-def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Add a component about the bearing of the centroid of all others, seen or not."""
+@inlined
+def centroid(state: Hooked, n: int, i: int) -> tuple[float, float, float]:
+    """Return unit vector toward the centroid of all others, and metres to it; -1 without."""
     x, y, count = 0.0, 0.0, 0
     for j in range(n):
         if j != i and state[ZONE * n + j] > 0.0:
@@ -22,10 +22,35 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
             count += 1
     length = math.sqrt(x * x + y * y)
     if not length > 0.0:
+        return 0.0, 0.0, -1.0
+    return x / length, y / length, length / count
+
+
+@inlined
+def grown(away_m: float, full_m: float) -> float:
+    """Return the share of the full pull at a distance."""
+    return min(1.0, away_m / full_m) if full_m > 0.0 else 1.0
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the bearing of the centroid of all others, seen or not."""
+    if parameters[3] > 0.0:
         return 0.0
-    out[0], out[1], out[2] = x / length, y / length, parameters[1]
-    away_m, full_m = length / count, parameters[2]
-    return parameters[0] * (min(1.0, away_m / full_m) if full_m > 0.0 else 1.0)
+    out[0], out[1], away_m = centroid(state, n, i)
+    out[2] = parameters[1]
+    return parameters[0] * grown(away_m, parameters[2]) if away_m > 0.0 else 0.0
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the bearing of the centroid of all others, seen or not."""
+    if not parameters[3] > 0.0:
+        return 1.0
+    x, y, away_m = centroid(state, n, i)
+    if not away_m > 0.0:
+        return 1.0
+    return tilt(parameters[0] * parameters[3] * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
 
 
 EFFECT = Effect(
@@ -54,16 +79,27 @@ EFFECT = Effect(
             default=0.0,
             says="Distance of the centroid from which the weight is whole, in metres.",
         ),
+        EffectParameter(
+            name="leaning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: some headings are drawn about that bearing; 1: all headings lean toward it, "
+            "by one nat per weight.",
+        ),
     ),
     strength="weight",
     probe=0.005,
     component=component,
+    factor=factor,
     shapes=lambda _arena: (
         {"kappa": 2.0, "full_m": 0.0},
         {"kappa": 8.0, "full_m": 0.0},
         {"kappa": 2.0, "full_m": 0.3},
         {"kappa": 8.0, "full_m": 0.3},
+        {"leaning": 1.0, "full_m": 0.0},
+        {"leaning": 1.0, "full_m": 0.3},
     ),
     lacks=needs_neighbour,
-    fixed=("full_m",),
+    fixed=("full_m", "leaning"),
 )
