@@ -19,6 +19,7 @@ from zfcal.diagnose.document import SCHEMA, findings_document
 from zfcal.diagnose.findings import Diagnosis
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.question import Tell as Heard
+from zfcal.errors import InputError
 from zfcal.online.events import Made, Planned, Progress, Result, Tell, UpToDate
 from zfcal.online.findings import FOLDER, Book, Draw
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, tell_version
@@ -173,7 +174,7 @@ def diagnose(
             tell_version([book.path], expected, tell)
             tell(UpToDate(path=book.path))
         else:
-            diagnosis = _engine(_question(case, stretch), _follow(tell))
+            diagnosis = _answer(case, stretch, tell)
             book.write(_document(case, stretch, diagnosis), expected)
             tell(Made(path=book.path, reason=reason))
         book.show(tell, task)
@@ -270,6 +271,15 @@ def _document(case: Case, stretch: Stretch, diagnosis: Diagnosis) -> dict[str, A
         values = {"left_out": float(stretch.n_left_out), "segments": float(n)}
         document["notes"].append({"name": "left-out", "says": says, "values": values})
     return document
+
+
+def _answer(case: Case, stretch: Stretch, tell: Tell) -> Diagnosis:
+    try:
+        return _engine(_question(case, stretch), _follow(tell))
+    except InputError as error:
+        # Whoever answers knows samples, not whose they are.
+        hint = error.hint or "Look at its tracks with: zfcal inspect FILE"
+        raise InputError(f"{case.root}: {error}", hint=hint) from error
 
 
 def _follow(tell: Tell) -> Heard:
