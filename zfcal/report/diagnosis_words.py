@@ -219,7 +219,9 @@ def _gap_table(gap: Sequence[Gap]) -> Table:
         heads=("measure", "before", "after", "floor", "closed", "95 %", "placebo"),
         rows=rows,
         numbers=(1, 2, 3, 4, 5, 6),
-        note="Held-out minutes. The floor is the model with the effects against itself.",
+        note="Held-out minutes. The floor is the model with the effects against itself: for the "
+        "likelihood what it would score if the fish drew from it, under the same luck; for the "
+        "others its ceiling. Where there may be no gap to close, there is no share.",
     )
 
 
