@@ -32,6 +32,7 @@ COMMANDS = {
     "analyse": "analyse",
     "calibrate": "calibrate",
     "diagnose": "diagnose",
+    "extend": "extend",
     "report": "report",
     "inspect": "inspect",
     "check": "check",

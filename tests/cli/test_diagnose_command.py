@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from zfcal.artifacts.validation import check
+from zfcal.online.diagnose import KnownNoise
 
 
 @pytest.fixture
@@ -18,7 +19,10 @@ def answered(monkeypatch, make_diagnosis):
         return make_diagnosis(question.arena, question.model)
 
     monkeypatch.setattr("zfcal.online.diagnose._engine", engine)
-    monkeypatch.setattr("zfcal.online.diagnose._estimate_noise", lambda *_: (None, "unknown"))
+    monkeypatch.setattr(
+        "zfcal.online.diagnose._estimate",
+        lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
+    )
     monkeypatch.setattr(
         "zfcal.report.diagnosis_page.write_picture",
         lambda picture, path: path.write_text(picture.title, encoding="utf-8"),

@@ -13,7 +13,7 @@ from zfcal.artifacts.models import read_model, write_model
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError, LockedError
-from zfcal.online.diagnose import DiagnoseOptions, diagnose
+from zfcal.online.diagnose import DiagnoseOptions, KnownNoise, diagnose
 from zfcal.online.events import LeftOut, Made, Planned, Progress, Result, UpToDate
 from zfcal.online.opening import Task, open_trial
 from zfcal.tracks import FISH, ROBOT
@@ -58,7 +58,10 @@ def asked(monkeypatch, make_diagnosis):
 
     monkeypatch.setattr("zfcal.online.diagnose._engine", engine)
     monkeypatch.setattr(
-        "zfcal.online.diagnose._estimate_noise", lambda *_: (0.0007, "estimated from the tracks")
+        "zfcal.online.diagnose._estimate",
+        lambda _case, _stretch, stated_m, source: KnownNoise(
+            sd_m=stated_m or 0.0007, source=source
+        ),
     )
     return questions
 

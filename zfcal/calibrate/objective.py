@@ -17,6 +17,7 @@ from zfcal.arena import Arena
 from zfcal.behaviour.scores import FeatureScores, population_scores
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import InputError
+from zfcal.model.effects import find_effect
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
 from zfcal.parameters import Parameters, from_genes, n_genes
 
@@ -220,6 +221,10 @@ def express(genes: ArrayLike, template: Parameters) -> Parameters:
 def with_measured_speeds(template: Parameters, control: Statistics) -> Parameters:
     """Return a model that draws its speeds from what was measured.
 
+    Rule: the speeds of a model are those of its draws, before an effect multiplies them.
+    Measured speeds hold that effect already, so a model with an effect on speed keeps its
+    own, from which the effect was divided out when it was added.
+
     Parameters
     ----------
     template
@@ -239,6 +244,8 @@ def with_measured_speeds(template: Parameters, control: Statistics) -> Parameter
             f"the window's {', '.join(control.zone_names)}.",
             hint="Model and trial must name the same arena.",
         )
+    if any(find_effect(name).on_speed for name in template.effects):
+        return template
     everywhere = control.speed.sum(axis=0)
     zones = []
     for zone, own in zip(template.zones, control.speed, strict=True):

@@ -33,6 +33,8 @@ class Question:
         where it is not known.
     noise_source
         Where that number comes from, in words, such as ``--noise-mm``.
+    grain_m
+        Positions are multiples of it; 0 where they are not.
     n_null
         Replicates of the null through the measurement chain.
     quick
@@ -52,6 +54,7 @@ class Question:
     quick: bool
     seed: int
     n_workers: int
+    grain_m: float = 0.0
 
     def __post_init__(self) -> None:
         if self.model.zone_names != self.arena.zone_names:

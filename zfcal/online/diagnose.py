@@ -6,6 +6,7 @@ a `Draw`.
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from zfcal.diagnose.document import SCHEMA, findings_document
 from zfcal.diagnose.findings import Diagnosis
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.question import Tell as Heard
+from zfcal.errors import InputError
 from zfcal.online.events import Made, Planned, Progress, Result, Tell, UpToDate
 from zfcal.online.findings import FOLDER, Book, Draw
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, tell_version
@@ -172,7 +174,7 @@ def diagnose(
             tell_version([book.path], expected, tell)
             tell(UpToDate(path=book.path))
         else:
-            diagnosis = _engine(_question(case, stretch), _follow(tell))
+            diagnosis = _answer(case, stretch, tell)
             book.write(_document(case, stretch, diagnosis), expected)
             tell(Made(path=book.path, reason=reason))
         book.show(tell, task)
@@ -204,37 +206,61 @@ def lineage_of(case: Case, stretch: Stretch) -> Lineage:
 
 def _question(case: Case, stretch: Stretch) -> Question:
     options = case.options
-    noise_m, source = _noise(case, stretch)
+    noise = noise_of(case, stretch)
     return Question(
         samples=stretch.samples,
         arena=case.opened.arena,
         model=case.parameters,
-        noise_m=noise_m,
-        noise_source=source,
+        noise_m=noise.sd_m,
+        noise_source=noise.source,
         n_null=options.n_null,
         quick=options.quick,
         seed=case.seed,
         n_workers=options.workers,
+        grain_m=noise.grain_m,
     )
 
 
-def _noise(case: Case, stretch: Stretch) -> tuple[float | None, str]:
-    """Return the position noise, and where it is known from."""
-    if case.options.noise_m is not None:
-        return case.options.noise_m, "--noise-mm"
-    if stretch.noise_m is not None:
-        return stretch.noise_m, "the tracks' own metadata"
-    return _estimate_noise(case, stretch)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownNoise:
+    """How exact the positions of a recording are.
+
+    Parameters
+    ----------
+    sd_m
+        Standard deviation per coordinate, in metres; None where it is not known.
+    source
+        Where that is known from, in words.
+    grain_m
+        Positions are multiples of it; 0 where they are not.
+    """
+
+    sd_m: float | None
+    source: str
+    grain_m: float = 0.0
 
 
-def _estimate_noise(case: Case, stretch: Stretch) -> tuple[float | None, str]:
+def noise_of(case: Case, stretch: Stretch) -> KnownNoise:
+    """Return the position noise as it was asked for, stated by the tracks, or estimated."""
+    stated_m, source = case.options.noise_m, "--noise-mm"
+    if stated_m is None:
+        stated_m, source = stretch.noise_m, "the tracks' own metadata"
+    return _estimate(case, stretch, stated_m, source)
+
+
+def _estimate(case: Case, stretch: Stretch, stated_m: float | None, source: str) -> KnownNoise:
     from zfcal.diagnose.noise import estimate_noise
 
-    trial = case.opened.trial
-    found = estimate_noise(stretch.tracks, fps=trial.fps, dt_s=trial.dt_s)
+    trial, arena = case.opened.trial, case.opened.arena
+    found = estimate_noise(
+        stretch.tracks, fps=trial.fps, dt_s=trial.dt_s, arena=arena, stated_m=stated_m
+    )
     if found is None:
-        return None, "unknown"
-    return found.sd_m, "estimated from the tracks"
+        return KnownNoise(sd_m=stated_m, source="unknown" if stated_m is None else source)
+    if stated_m is None:
+        source = f"the tracks: {found.how}"
+    sd_m = None if math.isnan(found.sd_m) else found.sd_m
+    return KnownNoise(sd_m=sd_m, source=source, grain_m=found.quantum_m)
 
 
 def _document(case: Case, stretch: Stretch, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -245,6 +271,15 @@ def _document(case: Case, stretch: Stretch, diagnosis: Diagnosis) -> dict[str, A
         values = {"left_out": float(stretch.n_left_out), "segments": float(n)}
         document["notes"].append({"name": "left-out", "says": says, "values": values})
     return document
+
+
+def _answer(case: Case, stretch: Stretch, tell: Tell) -> Diagnosis:
+    try:
+        return _engine(_question(case, stretch), _follow(tell))
+    except InputError as error:
+        # Whoever answers knows samples, not whose they are.
+        hint = error.hint or "Look at its tracks with: zfcal inspect FILE"
+        raise InputError(f"{case.root}: {error}", hint=hint) from error
 
 
 def _follow(tell: Tell) -> Heard:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable
 from functools import partial
 
@@ -190,5 +191,10 @@ def _draw_curve(axes: Axes, *, curve: Curve) -> None:
     axes.plot(curve.cue, curve.before, color=WITHOUT, ls="--", marker="^")
     axes.plot(curve.cue, curve.after, color=WITH, marker="D")
     axes.plot(curve.cue, curve.observed, color=MEASURED, ls="none", marker="o", ms=6, zorder=4)
-    axes.set(xlabel=curve.cue_name, ylabel=curve.response_name)
+    axes.set(xlabel=_lines(curve.cue_name, 42), ylabel=_lines(curve.response_name, 28))
     axes.xaxis.set_major_locator(MaxNLocator(6))
+
+
+def _lines(text: str, width: int) -> str:
+    """Return a label on lines that a panel has room for."""
+    return "\n".join(textwrap.wrap(text, width, break_long_words=False))

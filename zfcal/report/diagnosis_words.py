@@ -78,25 +78,16 @@ def _with_ties(effect: EffectFound) -> str:
 
 
 def _of_effect(effect: EffectFound, number: int) -> Statement:
-    sizes = ", ".join(
-        f"{name} = {value:.3g}" + _interval(effect.interval.get(name, (math.nan, math.nan)))
-        for name, value in effect.strength.items()
-    )
-    parts = [effect.says, f"Size, with 95 % interval: {sizes}." if sizes else ""]
+    parts = [effect.says]
     if effect.ties:
         parts.append(f"On this recording it cannot be told from {_listed(effect.ties)}.")
     parts.append(f"By chance alone in {_percent(effect.p)} of recordings.")
     gain = f"{effect.gain_nats_per_step:+.4f} nats"
     return Statement(
         question=f"{number}. {_with_ties(effect)}",
-        answer=" ".join(part for part in parts if part),
+        answer=" ".join(parts),
         figure=(gain, "log likelihood per step that it adds, held out"),
     )
-
-
-def _interval(ends: tuple[float, float]) -> str:
-    low, high = ends
-    return "" if math.isnan(low) or math.isnan(high) else f" ({low:.3g} to {high:.3g})"
 
 
 def _percent(p: float) -> str:
@@ -228,7 +219,9 @@ def _gap_table(gap: Sequence[Gap]) -> Table:
         heads=("measure", "before", "after", "floor", "closed", "95 %", "placebo"),
         rows=rows,
         numbers=(1, 2, 3, 4, 5, 6),
-        note="Held-out minutes. The floor is the model with the effects against itself.",
+        note="Held-out minutes. The floor is the model with the effects against itself: for the "
+        "likelihood what it would score if the fish drew from it, under the same luck; for the "
+        "others its ceiling. Where there may be no gap to close, there is no share.",
     )
 
 

@@ -1,0 +1,312 @@
+"""The page of a diagnosis: what it says, when it is drawn, how a browser shows it."""
+
+import html
+import json
+import math
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.document import Sheet, findings_document, gap_document, read_document
+from zfcal.diagnose.findings import Gap, Screened, Verdict
+from zfcal.parameters import natural
+from zfcal.report import diagnosis_page, theme
+from zfcal.report.diagnosis_figures import finding_picture, shown_places, slug
+from zfcal.report.diagnosis_overview import gap_picture, screened_picture
+from zfcal.report.diagnosis_words import statements, tables, verdict_sentence
+from zfcal.report.panels import compose
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+OPTIONS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--virtual-time-budget=5000",
+)
+# Chromium's words for the two colour schemes.
+SCHEMES = {"dark": 0, "light": 1}
+
+MEASURE = """
+const frame = document.querySelector('iframe');
+frame.onload = () => {
+  const page = frame.contentDocument, seen = {};
+  const style = (e, p) => frame.contentWindow.getComputedStyle(e)[p];
+  seen.width = page.documentElement.scrollWidth;
+  seen.ground = style(page.body, 'backgroundColor');
+  const panels = [...page.querySelectorAll('figure > svg')];
+  seen.panels = panels.length;
+  seen.widest = Math.max(...panels.map(p => p.getBoundingClientRect().right));
+  const texts = panels.flatMap(p => [...p.querySelectorAll('text')]);
+  const scale = m => Math.hypot(m.a, m.b);
+  seen.letters = Math.min(...texts.map(
+    t => parseFloat(style(t, 'fontSize')) * scale(t.getScreenCTM())));
+  // A letter's box is larger than its ink by some pixels.
+  const leaves = (a, b) => a.left < b.left - 4 || a.right > b.right + 4 || a.top < b.top - 4;
+  seen.outside = panels.flatMap(p => [...p.querySelectorAll('text')].filter(
+    t => leaves(t.getBoundingClientRect(), p.getBoundingClientRect())).map(t => t.textContent));
+  seen.verdict = page.querySelector('h1').textContent;
+  document.title = JSON.stringify(seen);
+};
+frame.srcdoc = document.getElementById('page').content.textContent;
+"""
+
+
+def gap_of(**closed):
+    """Return a gap with these shares closed."""
+    return [
+        Gap(
+            measure=measure,
+            before=0.3,
+            after=0.1,
+            floor=0.05,
+            closed=share,
+            interval=(share - 0.1, share + 0.1),
+            placebo=0.02,
+        )
+        for measure, share in closed.items()
+    ]
+
+
+@pytest.fixture(scope="module")
+def make_sheet(two_rooms, make_diagnosis):
+    """Return what makes all that a page shows; keywords replace parts of the diagnosis."""
+    model = natural(tuple((z.name, z.follows_walls) for z in two_rooms.zones), dt_s=0.2)
+
+    def make(*, gap=(), arena=two_rooms, **changes):
+        document = findings_document(make_diagnosis(arena, model, **changes), arena)
+        document["gap"] = gap_document(gap)
+        return Sheet(
+            trial="trial <1>",
+            model="models/000000.toml",
+            arena=arena,
+            findings=read_document(json.loads(json.dumps(document))),
+            provenance={"findings": "f" * 64, "lineage": {"inputs": {"trial.toml": "a" * 64}}},
+        )
+
+    return make
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Draw nothing: for tests of what is written when, and of words."""
+    monkeypatch.setattr(
+        "zfcal.report.diagnosis_page.write_picture",
+        lambda picture, path: path.write_text(picture.title, encoding="utf-8"),
+    )
+    monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "names", "says"),
+    [
+        (Verdict.NAMED, ("alignment",), "The model lacks alignment"),
+        (Verdict.NAMED, ("a", "b", "c"), "The model lacks a, b and c"),
+        (Verdict.UNEXPLAINED, (), "Model and fish disagree, and no known effect explains it"),
+        (Verdict.NO_EFFECT, (), "The model lacks nothing that 10 min of tracks could show"),
+        (Verdict.UNTESTABLE, (), "10 min of tracks are too little to say what the model lacks"),
+    ],
+)
+def test_the_verdict_in_a_sentence(make_sheet, verdict, names, says):
+    """It is the heading of the page."""
+    assert verdict_sentence(make_sheet(verdict=verdict, names=names).findings) == says
+
+
+def test_a_tie_names_all_that_it_may_be(make_sheet):
+    """In the heading and on the card."""
+    sheet = make_sheet()
+    effect = replace(sheet.findings.effects[0], ties=("group-cohesion",))
+    findings = replace(sheet.findings, verdict=Verdict.TIE, effects=(effect,))
+    assert verdict_sentence(findings) == (
+        "The model lacks alignment or group-cohesion: this recording cannot tell them apart"
+    )
+    assert "cannot be told from group-cohesion" in statements(findings)[0].answer
+
+
+def test_cards_say_what_is_missing_how_much_and_what_else_was_asked(make_sheet):
+    """The gap's card names the placebo."""
+    cards = statements(make_sheet(gap=gap_of(nats_per_step=0.8)).findings)
+    assert cards[0].figure[0] == "+0.0123 nats"
+    assert "less than 0.01 %" in cards[0].answer
+    assert "80 % (70 to 90)" in cards[1].answer
+    assert "a wrong effect with as many parameters, 2 %" in cards[1].answer
+    assert "at least 45 min for boldness" in cards[2].answer
+    assert "robot-avoidance (a robot)" in cards[2].answer
+
+
+def test_tables_hold_every_number(make_sheet):
+    """The loudest candidate first, tracks by their ids, no empty table."""
+    sheet = make_sheet(gap=gap_of(nats_per_step=0.8, T=math.nan))
+    by_name = {table.name: table for table in tables(sheet)}
+    assert by_name["candidates"].rows[0][:2] == ["alignment", "14"]
+    assert by_name["where"].rows[0][1:4] == ["corridor", "0 to 300", "1, 3"]
+    assert by_name["gap-numbers"].rows[1][4:6] == ["–", "–"]
+    assert by_name["notes"].rows[0][2] == "sd_mm = 0.5"
+    assert "gap-numbers" not in {table.name for table in tables(make_sheet())}
+
+
+def test_page_and_pictures_are_written_and_found_again(make_sheet, tmp_path, undrawn):
+    """The page says which findings it shows, and holds nothing from elsewhere."""
+    sheet = make_sheet(gap=gap_of(nats_per_step=0.8), names=("alignment", "generic:heading:wall"))
+    written = diagnosis_page.write(tmp_path, sheet)
+    assert [path.name for path in written] == [
+        "report.html",
+        "1-alignment.png",
+        "2-generic-heading-wall.png",
+        "gap.png",
+        "screened.png",
+    ]
+    assert diagnosis_page.reason(tmp_path, "f" * 64) is None
+    assert diagnosis_page.files(tmp_path) == written
+    text = written[0].read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!#|data:|[\w-]+\.png")', text)
+    assert "trial &lt;1&gt;" in text
+
+
+def test_why_a_page_is_drawn_again(make_sheet, tmp_path, undrawn):
+    """Missing, other findings, a picture gone or changed, or a page of something else."""
+    assert diagnosis_page.reason(tmp_path, "f" * 64) == "missing"
+    diagnosis_page.write(tmp_path, make_sheet())
+    assert diagnosis_page.reason(tmp_path, "0" * 64) == "the findings changed"
+    (tmp_path / "screened.png").write_text("other")
+    assert diagnosis_page.reason(tmp_path, "f" * 64) == "screened.png was changed"
+    (tmp_path / "screened.png").unlink()
+    assert diagnosis_page.reason(tmp_path, "f" * 64) == "screened.png is missing"
+    (tmp_path / "report.html").write_text("<p>hello")
+    assert "does not say what it shows" in diagnosis_page.reason(tmp_path, "f" * 64)
+
+
+def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
+    """They would pass for current; other files stay."""
+    diagnosis_page.write(tmp_path, make_sheet())
+    (tmp_path / "mine.png").write_text("mine")
+    diagnosis_page.write(tmp_path, make_sheet(names=()))
+    assert not (tmp_path / "1-alignment.png").exists()
+    assert (tmp_path / "mine.png").exists()
+
+
+def test_the_same_findings_give_the_same_bytes(make_sheet, tmp_path):
+    """Pictures and page hold nothing of the day."""
+    sheet = make_sheet(gap=gap_of(nats_per_step=0.8))
+    first, second = (
+        {path.name: path.read_bytes() for path in diagnosis_page.write(tmp_path / name, sheet)}
+        for name in ("a", "b")
+    )
+    assert first == second
+
+
+def test_a_square_with_few_steps_stays_empty(make_sheet):
+    """Its mean is chance."""
+    pictured = make_sheet().findings.pictured[0]
+    shown = shown_places(pictured)
+    assert np.isnan(shown[pictured.place_n < 10]).all()
+    assert not np.isnan(shown[pictured.place_n >= 10]).any()
+
+
+@pytest.mark.parametrize("name", ["two-rooms", "open-square", "ring", "own", "narrow"])
+def test_texts_of_a_finding_do_not_cover_each_other(make_sheet, arenas, covered_texts, name):
+    """Whatever the tank, also with long words for what the fish respond to."""
+    arena = arenas[name]
+    sheet = make_sheet(arena=arena)
+    pictured = sheet.findings.pictured[0]
+    curve = replace(
+        pictured.curve, response_name="score of the effect (standard deviations a step)"
+    )
+    picture = finding_picture("alignment", 1, replace(pictured, curve=curve), arena)
+    assert not covered_texts(picture)
+
+
+def test_the_map_says_where_in_words(make_sheet, two_rooms):
+    """For those who cannot see it: place and size of the largest score."""
+    pictured = make_sheet().findings.pictured[0]
+    place = np.full(pictured.place.shape, 0.1)
+    place[3, 4] = -0.7
+    marked = replace(pictured, place=place, place_n=np.full(place.shape, 50))
+    panel = finding_picture("alignment", 1, marked, two_rooms).panels[0]
+    x_m = pictured.origin_m[0] + 4.5 * pictured.cell_m
+    assert f"-0.70, at x = {x_m:.2f} m" in panel.alt
+
+
+def test_positive_and_negative_scores_have_opposite_colours_of_one_depth(make_sheet, two_rooms):
+    """Zero is in the middle of the scale."""
+    pictured = make_sheet().findings.pictured[0]
+    picture = finding_picture("alignment", 1, pictured, two_rooms)
+    with theme.style():
+        (image,) = compose(picture).axes[0].images
+    assert image.norm.vmin == -image.norm.vmax
+    assert image.norm(0.0) == 0.5
+
+
+def test_overviews_do_not_cover_their_texts(make_sheet, covered_texts):
+    """With one candidate, with thirty, and with gaps beyond the scale."""
+    many = [Screened(name=f"effect-number-{i}", z=3.0 * i - 20, p=0.1) for i in range(30)]
+    assert not covered_texts(screened_picture(many, ["effect-number-3"]))
+    assert not covered_texts(screened_picture(many[:1], []))
+    gap = gap_of(nats_per_step=0.9, S_over_ceiling=-3.0, D=7.0, W=0.5, O=0.1, T=0.2, effect=1.0)
+    assert not covered_texts(gap_picture(gap))
+
+
+def test_without_candidates_and_gap_there_are_no_overviews():
+    """Nothing to show is no picture."""
+    assert screened_picture([Screened(name="x", z=math.nan, p=math.nan)], []) is None
+    assert gap_picture(gap_of(D=math.nan)) is None
+
+
+def test_names_become_file_names():
+    """Colons and capitals are not for every file system."""
+    assert slug("generic:heading:wall") == "generic-heading-wall"
+
+
+@pytest.fixture(scope="module")
+def drawn_page(tmp_path_factory, make_sheet):
+    """A page with two findings and a gap."""
+    sheet = make_sheet(
+        gap=gap_of(nats_per_step=0.8, D=0.5, effect=0.9), names=("alignment", "turning-bias")
+    )
+    return diagnosis_page.write(tmp_path_factory.mktemp("diagnosis"), sheet)[0]
+
+
+@pytest.mark.apt
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed (apt-get install it)")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_fits_and_can_be_read(drawn_page, tmp_path, width, scheme):
+    """Nothing sticks out or is cut, letters are 8 pixels or more, colours follow the scheme."""
+    wrapper = tmp_path / "wrapper.html"
+    # A document in a frame can be narrower than a window may be.
+    wrapper.write_text(
+        "<!DOCTYPE html><title></title>"
+        f'<iframe style="width:{width}px;height:9000px;border:0"></iframe>'
+        f'<template id="page">{html.escape(drawn_page.read_text(encoding="utf-8"))}</template>'
+        f"<script>{MEASURE}</script>",
+        encoding="utf-8",
+    )
+    words = [
+        CHROMIUM,
+        *OPTIONS,
+        f"--user-data-dir={tmp_path / 'profile'}",
+        f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}",
+        "--window-size=1400,1000",
+        "--dump-dom",
+        wrapper.as_uri(),
+    ]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
+    title = re.search(r"<title>(\{.*?\})</title>", done.stdout)
+    assert title, done.stderr[-2000:]
+    seen = json.loads(html.unescape(title.group(1)))
+    ground = theme.THEME[theme.GROUND][1 if scheme == "light" else 2]
+    assert seen["width"] <= width
+    assert seen["widest"] <= width
+    assert seen["panels"] == 10
+    assert seen["outside"] == []
+    assert seen["letters"] >= 8
+    assert seen["verdict"] == "The model lacks alignment and turning-bias"
+    assert seen["ground"] == "rgb({}, {}, {})".format(*bytes.fromhex(ground[1:]))
