@@ -351,6 +351,7 @@ def test_a_zone_with_few_turns_is_left_alone(two_rooms, model):
         assert np.isnan(fitted.log_p[rows]).all() == (is_few or not len(rows))
         if is_few:
             assert fitted.x[zone] == pytest.approx(start_of(model)[zone])
+            assert fitted.parameters.zones[zone] == model.zones[zone]
     assert math.isfinite(fitted.nats)
 
 
