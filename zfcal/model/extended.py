@@ -156,6 +156,11 @@ class ZoneTurns:
     share: NDArray[np.uint8]
     landing: NDArray[np.int64]
 
+    @property
+    def enough(self) -> bool:
+        """Whether there are enough of them to fit anything to."""
+        return len(self.rows) >= MIN_STEPS
+
     @cached_property
     def reachable(self) -> NDArray[np.bool_]:
         """Zones in which a heading lands, shape (zone,)."""
@@ -416,7 +421,7 @@ class _Climb:
         log_p, weight = np.full(n, np.nan), np.ones(n)
         scores = []
         for own, turns in zip(x, self.turns, strict=True):
-            if len(turns.rows) < MIN_STEPS:
+            if not turns.enough:
                 scores.append(np.zeros((len(turns.rows), own.size)))
                 continue
             some, slope, sure = zone_scores(own, turns, view)
@@ -454,11 +459,9 @@ class _Climb:
         length = 1.0
         for _ in range(8):
             x = [
-                np.clip(own + length * by, *_limits(own, turns))
+                _shifted(own, length * by, turns) if turns.enough else own
                 for own, by, turns in zip(here.x, blocks, self.turns, strict=True)
             ]
-            for own in x:
-                own[3:-1] -= own[3:-1].max()
             there = self.at(self._moved(here.parameters, length * by_psi), x)
             if there.nats > here.nats:
                 return there
@@ -484,8 +487,8 @@ class _Climb:
         ranges = np.array([np.ptp(bounds_of(*pair)) for pair in self.free])
         covariance = whole[-k:, -k:] * np.outer(ranges, ranges) if k else whole
         zones = [
-            _zone_of(own, zone, here.parameters.zone_names)
-            for own, zone in zip(here.x, here.parameters.zones, strict=True)
+            _zone_of(own, zone, here.parameters.zone_names) if turns.enough else zone
+            for own, zone, turns in zip(here.x, here.parameters.zones, self.turns, strict=True)
         ]
         return dataclasses.replace(
             here,
@@ -506,6 +509,13 @@ def _limits(x: Floats, turns: ZoneTurns) -> tuple[Floats, Floats]:
     high = np.concatenate([_HIGH, np.full(x.size - 4, np.inf), [_LAPSE[1]]])
     high[3:-1][~turns.reachable] = 0.0
     return low, high
+
+
+def _shifted(x: Floats, by: Floats, turns: ZoneTurns) -> Floats:
+    """Return a zone's parameters moved within their limits, the largest log gamma zero."""
+    moved = np.clip(x + by, *_limits(x, turns))
+    moved[3:-1] -= moved[3:-1].max()
+    return np.asarray(moved)
 
 
 def _information(here: Fitted, psi: Floats) -> Floats:

@@ -1,0 +1,308 @@
+"""Measured tracks as states and steps: headings, gaps, ids, rooms, robots."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.model.kernels.scene import perceive
+from zfcal.model.kernels.world import (
+    HX,
+    HY,
+    KIND,
+    LEFT_S,
+    NEVER_S,
+    PAST_HX,
+    PAST_HY,
+    ROOM,
+    SPEED,
+    TIME,
+    WALL,
+    ZONE,
+    X,
+    Y,
+)
+from zfcal.model.scene import cos_of, make_scene, thin
+from zfcal.model.simulate import simulate_tracks
+from zfcal.model.steps import steps_of
+from zfcal.tracks import FISH, ROBOT, Samples
+
+DT_S = 0.2
+ROOM_A, ROOM_B, CORRIDOR, VOID = (0.22, 0.77), (0.75, 0.25), (0.50, 0.50), (0.75, 0.75)
+AWAY = (math.nan, math.nan)
+
+
+def samples_of(*paths, kind=None, ids=None, confidence=None, first=0):
+    """Return samples of paths, each a list of (x, y) in metres."""
+    xy_m = np.array(paths, dtype=np.float64).swapaxes(0, 1)
+    n, agents = xy_m.shape[:2]
+    sure = np.ones((n, agents)) if confidence is None else np.array(confidence).T
+    return Samples(
+        dt_s=DT_S,
+        k=np.arange(first, first + n, dtype=np.int64),
+        agent=np.array(range(1, agents + 1) if ids is None else ids, dtype=np.int32),
+        kind=np.array([FISH] * agents if kind is None else kind, dtype=np.int8),
+        xy_m=xy_m,
+        confidence=np.where(np.isnan(xy_m[..., 0]), np.nan, sure).astype(np.float32),
+    )
+
+
+def line(start, n, *, step_m=0.01):
+    """Return n places, each a step further along x."""
+    return [(start[0] + step_m * k, start[1]) for k in range(n)]
+
+
+@pytest.fixture(scope="module")
+def walk(two_rooms, model):
+    """Return four minutes of five fish of the base model, as samples."""
+    xy_m, _ = simulate_tracks(model, two_rooms, n_agents=5, n_steps=1200, seed=3)
+    return samples_of(*xy_m.swapaxes(0, 1))
+
+
+def test_headings_and_speeds_by_hand(two_rooms):
+    """10 mm along x, then 20 mm along y, then 10 mm back: 0.05, 0.10 and 0.05 m/s."""
+    path = [(0.20, 0.75), (0.21, 0.75), (0.21, 0.77), (0.20, 0.77)]
+    scene = make_scene(samples_of(path, first=50), two_rooms)
+
+    assert scene.states[:, [HX, HY], 0] == pytest.approx(
+        np.array([(0, 0), (1, 0), (0, 1), (-1, 0)])
+    )
+    assert scene.states[3, [PAST_HX, PAST_HY], 0] == pytest.approx([0, 1])
+    assert scene.states[1:, SPEED, 0] == pytest.approx([0.05, 0.10, 0.05])
+    assert scene.states[:, TIME, 0] == pytest.approx([10.0, 10.2, 10.4, 10.6])
+    assert scene.turns.at.tolist() == [1, 2]
+    assert scene.turns.heading == pytest.approx(np.array([(1, 0), (0, 1)]))
+    assert scene.turns.taken == pytest.approx(np.array([(0, 1), (-1, 0)]))
+    assert scene.turns.speed_m_s == pytest.approx([0.10, 0.05])
+    assert scene.time_s(scene.turns) == pytest.approx([10.2, 10.4])
+    assert (scene.n_fish, scene.n_robots) == (1, 0)
+
+
+def test_a_displacement_below_two_millimetres_has_no_heading(two_rooms):
+    """The fish keeps its last heading; the step counts among moves, and not among turns."""
+    path = [(0.20, 0.75), (0.21, 0.75), (0.21, 0.7519), (0.21, 0.7619), (0.21, 0.7719)]
+    scene = make_scene(samples_of(path), two_rooms)
+
+    assert scene.states[2, [HX, HY], 0] == pytest.approx([1, 0])
+    assert scene.moves.at.tolist() == [1, 2, 3]
+    assert scene.moves.speed_m_s[0] == pytest.approx(0.0019 / DT_S)
+    assert scene.turns.at.tolist() == [3]
+
+
+def test_exactly_two_millimetres_have_a_heading(two_rooms):
+    """The limit itself counts, whatever the rounding."""
+    scene = make_scene(samples_of(line((0.2, 0.75), 6, step_m=0.002)), two_rooms)
+    assert scene.turns.at.tolist() == [1, 2, 3, 4]
+
+
+def test_nothing_moves_across_a_missing_sample(two_rooms):
+    """Sample 3 is missing: no speed at 3 and 4, and steps from 1 and from 5 alone."""
+    path = line((0.2, 0.75), 8)
+    path[3] = AWAY
+    scene = make_scene(samples_of(path), two_rooms)
+
+    assert scene.moves.at.tolist() == [1, 5, 6]
+    assert scene.turns.at.tolist() == [1, 5, 6]
+    assert scene.states[3, ZONE, 0] == 0
+    assert scene.states[4, [HX, HY], 0] == pytest.approx([0, 0])
+    assert scene.tracks[:, 0].tolist() == [1, 1, 1, -1, 1, 1, 1, 1]
+
+
+def test_an_unknown_speed_is_a_middling_one(two_rooms):
+    """So that nobody attends to a fish more or less for having been lost."""
+    scene = make_scene(samples_of(line((0.2, 0.75), 5), line((0.2, 0.7), 5, step_m=0.02)), two_rooms)
+    assert scene.states[0, SPEED] == pytest.approx([0.075, 0.075])
+
+
+def test_fragments_that_do_not_overlap_share_a_column(two_rooms):
+    """Ids 1 and 2 are one fish that was lost at sample 4; no step leads across."""
+    path = line((0.2, 0.75), 9)
+    one, two = path[:4] + [AWAY] * 5, [AWAY] * 5 + path[5:]
+    scene = make_scene(samples_of(one, two), two_rooms)
+
+    assert scene.tracks[:, 0].tolist() == [1, 1, 1, 1, -1, 2, 2, 2, 2]
+    assert scene.states.shape[2] == 1
+    assert scene.turns.at.tolist() == [1, 2, 6, 7]
+    assert scene.turns.track.tolist() == [1, 1, 2, 2]
+    assert scene.n_fish == 1
+
+
+def test_a_change_of_id_without_a_gap_is_no_displacement(two_rooms):
+    """Id 2 begins in the sample after id 1 has ended: it may be another fish."""
+    path = line((0.2, 0.75), 8)
+    one, two = path[:4] + [AWAY] * 4, [AWAY] * 4 + path[4:]
+    scene = make_scene(samples_of(one, two), two_rooms)
+
+    assert scene.states.shape[2] == 2
+    assert scene.turns.at.tolist() == [1, 2, 5, 6]
+    assert scene.states[4, [HX, HY], 1] == pytest.approx([0, 0])
+
+
+def test_many_short_tracks_need_few_columns_and_lose_no_step(two_rooms, walk):
+    """Cut into pieces of 10 s with gaps, five fish fill six columns at most, each step kept."""
+    xy = walk.xy_m.copy()
+    pieces, ids = [], []
+    for fish in range(5):
+        for number, first in enumerate(range(0, 1200, 50)):
+            piece = np.full((1200, 2), np.nan)
+            piece[first : first + 49] = xy[first : first + 49, fish]
+            pieces.append(piece)
+            ids.append(1000 * fish + number)
+    order = np.argsort(ids)
+    cut = samples_of(*np.array(pieces)[order], ids=np.array(ids)[order])
+    scene, whole = make_scene(cut, two_rooms), make_scene(walk, two_rooms)
+
+    assert scene.states.shape[2] <= 6
+    assert scene.n_fish == 5
+    # Of each piece the 49 samples have 47 steps with a speed before.
+    assert len(scene.moves) == 5 * 24 * 47
+    own = {(k, t // 1000) for k, t in zip(scene.turns.at, scene.turns.track, strict=True)}
+    all_ = {(k, t - 1) for k, t in zip(whole.turns.at, whole.turns.track, strict=True)}
+    assert own <= all_
+    assert len(own) == len(scene.turns)
+
+
+def test_a_guessed_position_counts_as_missing(two_rooms):
+    """Confidence 0.49 is a guess; 0.5 is not."""
+    path = line((0.2, 0.75), 8)
+    low, enough = [1, 1, 1, 0.49, 1, 1, 1, 1], [1, 1, 1, 0.5, 1, 1, 1, 1]
+    assert make_scene(samples_of(path, confidence=[low]), two_rooms).turns.at.tolist() == [1, 5, 6]
+    assert len(make_scene(samples_of(path, confidence=[enough]), two_rooms).turns) == 6
+
+
+def test_a_position_outside_is_not_there_and_one_at_the_wall_is(two_rooms):
+    """Far outside is void; 6 mm beyond the wall counts as at the wall."""
+    far, near = line((0.2, 0.75), 8), line((0.2, 0.75), 8)
+    far[3], near[3] = VOID, (0.045, 0.75)
+    scene = make_scene(samples_of(far), two_rooms)
+    assert scene.states[3, ZONE, 0] == 0
+    assert scene.moves.at.tolist() == [1, 5, 6]
+
+    scene = make_scene(samples_of(near), two_rooms)
+    assert scene.states[3, ZONE, 0] > 0
+    assert scene.states[3, [X, Y], 0] == pytest.approx([0.051, 0.75], abs=1e-6)
+    assert scene.states[3, WALL, 0] == pytest.approx(0.0, abs=1e-5)
+    assert len(scene.moves) == 6
+
+
+def test_a_departure_is_known_to_those_left_behind(two_rooms):
+    """Who leaves the room at sample 2 left 0, 0.2, 0.4 s ago, until it is back at sample 5."""
+    stays = [ROOM_A] * 7
+    goes = [ROOM_A, ROOM_A, CORRIDOR, CORRIDOR, CORRIDOR, ROOM_A, ROOM_A]
+    elsewhere = [ROOM_B] * 7
+    scene = make_scene(samples_of(stays, goes, elsewhere), two_rooms)
+
+    rooms = scene.states[:, ROOM]
+    assert rooms[0, 0] == rooms[0, 1] != rooms[0, 2]
+    assert rooms[2, 1] == 0
+    assert scene.states[2:5, LEFT_S, 0] == pytest.approx([0.0, 0.2, 0.4])
+    assert (scene.states[[0, 1, 5, 6], LEFT_S, 0] == NEVER_S).all()
+    assert (scene.states[:, LEFT_S, 2] == NEVER_S).all()
+    assert (scene.states[:, LEFT_S, 1] == NEVER_S).all()
+
+
+def test_who_is_lost_has_not_left(two_rooms):
+    """A fish that vanishes in a room and is found in the other one leaves no trace."""
+    stays, lost = [ROOM_A] * 5, [ROOM_A, ROOM_A, AWAY, ROOM_B, ROOM_B]
+    scene = make_scene(samples_of(stays, lost), two_rooms)
+    assert (scene.states[:, LEFT_S, 0] == NEVER_S).all()
+
+
+def test_robots_are_seen_and_make_no_steps(two_rooms):
+    """A robot in front of a fish takes up room in its sight; it has a state and no step."""
+    fish, robot = line((0.2, 0.75), 6), line((0.3, 0.75), 6)
+    scene = make_scene(samples_of(fish, robot, kind=[FISH, ROBOT]), two_rooms)
+
+    assert set(scene.turns.track) == set(scene.moves.track) == {1}
+    assert (scene.n_fish, scene.n_robots) == (1, 1)
+    (column,) = np.flatnonzero(scene.states[0, KIND] == ROBOT)
+    toward, angle = perceive(scene.states, scene.turns.at, scene.turns.who, 0, cos_of(4.0))
+    assert (angle[:, column] > 0).all()
+    assert toward[:, column] == pytest.approx(np.array([[1.0, 0.0]] * 4))
+
+
+def test_a_robots_column_is_no_fishs(two_rooms):
+    """A fish that appears after a robot has gone has a column of its own."""
+    gone = line((0.3, 0.75), 3) + [AWAY] * 5
+    late = [AWAY] * 4 + line((0.2, 0.75), 4)
+    scene = make_scene(samples_of(gone, late, kind=[ROBOT, FISH]), two_rooms)
+    assert scene.states.shape[2] == 2
+    assert set(scene.moves.track) == {2}
+
+
+def test_the_turns_are_those_of_the_likelihood(two_rooms, model, walk):
+    """Which steps, from where to where, and what was seen: as `steps_of` has them."""
+    scene, steps = make_scene(walk, two_rooms), steps_of(walk, two_rooms, fov_rad=model.fov_rad)
+    turns = scene.turns
+
+    assert turns.at.tolist() == (steps.k - walk.k[0]).tolist()
+    assert turns.track.tolist() == steps.agent.tolist()
+    assert np.array_equal(turns.zone, steps.zone)
+    assert np.array_equal(turns.landing, steps.landing)
+    assert np.array_equal(turns.share, steps.share)
+    for name in ("heading", "taken", "along_wall", "speed_m_s"):
+        assert getattr(turns, name) == pytest.approx(getattr(steps, name), abs=1e-9)
+    _, angle = perceive(scene.states, turns.at, turns.who, 0, cos_of(model.fov_rad))
+    known = turns.at > 20
+    assert np.sort(angle[known], axis=1)[:, 1:] == pytest.approx(
+        np.sort(steps.angle_sr[known], axis=1)[:, -4:], abs=1e-9
+    )
+
+
+def test_who_responds_late_sees_where_others_were(two_rooms):
+    """With a lag of two steps the neighbour is 2 cm behind where it is now."""
+    still, moves = [(0.2, 0.75)] * 6, line((0.25, 0.80), 6)
+    scene = make_scene(samples_of(still, moves), two_rooms)
+    at, who = np.array([4]), np.array([0])
+    now, _ = perceive(scene.states, at, who, 0, -2.0)
+    late, _ = perceive(scene.states, at, who, 2, -2.0)
+    # What is seen is the neighbour's head, as far ahead of its centre in both.
+    ahead = [0.05 * toward[0, 1, 0] / toward[0, 1, 1] for toward in (now, late)]
+    assert ahead[0] - ahead[1] == pytest.approx(0.02)
+
+
+def test_the_order_of_tracks_does_not_matter(two_rooms, walk):
+    """With ids dealt anew the same steps come out."""
+    other = walk.take_agents(np.array([3, 1, 4, 0, 2]))
+    one, two = make_scene(walk, two_rooms).turns, make_scene(other, two_rooms).turns
+    order = [np.lexsort((turns.track, turns.at)) for turns in (one, two)]
+    assert np.array_equal(one.track[order[0]], two.track[order[1]])
+    assert np.array_equal(one.taken[order[0]], two.taken[order[1]])
+    assert np.array_equal(one.share[order[0]], two.share[order[1]])
+
+
+def test_thinning_leaves_states_alone(two_rooms, walk):
+    """Half of the steps, all of the states."""
+    scene = make_scene(walk, two_rooms)
+    less = thin(scene, scene.turns.at % 2 == 0, scene.moves.at < 100)
+    assert len(less.turns) == (scene.turns.at % 2 == 0).sum()
+    assert less.moves.at.max() == 99
+    assert np.array_equal(less.states, scene.states)
+    assert less.duration_s == scene.duration_s == pytest.approx(240.0)
+
+
+def test_all_is_seen_with_a_field_of_view_of_half_a_turn():
+    """To each side, in radians; a right angle has the cosine zero."""
+    assert cos_of(math.pi) < -1
+    assert cos_of(math.pi / 2) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "samples",
+    [
+        samples_of(line((0.2, 0.75), 9), kind=[ROBOT]),
+        samples_of(line((0.2, 0.75), 2)),
+    ],
+    ids=["robots alone", "two samples"],
+)
+def test_without_fish_at_three_samples_there_is_no_scene(two_rooms, samples):
+    """The message says how many there are."""
+    with pytest.raises(InputError, match=f"got {len(samples.k)} samples of"):
+        make_scene(samples, two_rooms)
+
+
+def test_a_recording_in_which_all_are_lost_has_no_steps(two_rooms):
+    """Fish that were never seen make a scene without columns."""
+    scene = make_scene(samples_of([AWAY] * 9, [AWAY] * 9), two_rooms)
+    assert len(scene.turns) == len(scene.moves) == scene.n_fish == 0
