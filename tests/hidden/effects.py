@@ -65,7 +65,7 @@ EFFECTS = {
         "1 + w (1 - exp(-d / 0.2 m)) times more",
     ),
     "interaction-range": _effect(
-        K.INTERACTION_RANGE, HEADING, (0.4, 0.25, 0.14),
+        K.INTERACTION_RANGE, HEADING, (0.35, 0.22, 0.14),
         "neighbours farther than R metres do not exist",
     ),
     "rear-blind-zone": _effect(
@@ -77,7 +77,7 @@ EFFECTS = {
         "a neighbour's solid angle times twice a logistic of its last speed, about 8 cm/s",
     ),
     "reaction-delay": _effect(
-        K.REACTION_DELAY, HEADING, (0.05, 0.15, 0.4),
+        K.REACTION_DELAY, HEADING, (0.03, 0.11, 0.28),
         "a share of the attraction of neighbours beyond 5 cm is toward where they were 0.6 s ago",
     ),
     "collective-departure": _effect(
@@ -118,8 +118,8 @@ EFFECTS = {
         "the speed times 1 - c |turn| / pi",
     ),
     "freezing": _effect(
-        K.FREEZING, SPEED, (0.00015, 0.0006, 0.003),
-        "at so many times a second a fish stops, for 3 s in the mean",
+        K.FREEZING, SPEED, (0.0003, 0.0006, 0.002),
+        "at so many times a second a fish stops, for 2 s in the mean",
     ),
     "fatigue": _effect(
         K.FATIGUE, SPEED, (0.075, 0.14, 0.28),
@@ -130,7 +130,7 @@ EFFECTS = {
         "the weight of neighbours falls linearly with time, to 1 - h after 30 min",
     ),
     "boldness": _effect(
-        K.BOLDNESS, HEADING, (0.5, 1.0, 2.5),
+        K.BOLDNESS, HEADING, (0.38, 0.75, 2.1),
         "each fish's attraction to the corridor, and its leaning to a door within 15 cm, are "
         "multiplied by exp(s z), z its own",
     ),
@@ -155,7 +155,7 @@ EFFECTS = {
         listed=False,
     ),
     "kept-distance": _effect(
-        K.KEPT_DISTANCE, HEADING, (0.15, 0.35, 0.75),
+        K.KEPT_DISTANCE, HEADING, (0.24, 0.4, 0.65),
         "neighbours at 2 to 8 cm attract less by a share; beyond 1 they repel",
         listed=False,
     ),

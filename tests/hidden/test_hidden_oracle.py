@@ -1,5 +1,8 @@
 """The oracle sees nothing where nothing is hidden, and more where more is."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -120,3 +123,12 @@ def test_fish_never_leave_the_tank():
             Scenario(effect=name, strength="strong", minutes=2, seed=9206), oracle=False
         )
         assert all(geometry.zone_of(x, y, world) > 0 for x, y in trial.states_m.reshape(-1, 2)[::7])
+
+
+def test_the_simulator_shares_no_code_with_zfcal():
+    """No module of it imports zfcal; its tests do, to compare."""
+    folder = Path(kernels.__file__).parent
+    modules = [path for path in folder.glob("*.py") if not path.name.startswith("test_")]
+    assert len(modules) > 8
+    for path in modules:
+        assert not re.search(r"^\s*(import|from) zfcal", path.read_text(), re.MULTILINE), path
