@@ -212,10 +212,15 @@ def centre_and_spread(table: Residuals, nulls: Sequence[Residuals]) -> tuple[Flo
 
 
 def _moments(z: Floats) -> tuple[float, float]:
-    """Return the mean, and the standard deviation drawn toward the 1 of the model's own law."""
+    """Return the mean of replicates, and the standard deviation of one more about it.
+
+    It is drawn toward the 1 of the model's own law, and not less than that: what a fit has
+    taken off a statistic's spread it takes off otherwise where noise has shifted the fit.
+    """
     centre = float(z.mean())
     squares = float(((z - centre) ** 2).sum())
-    return centre, math.sqrt((squares + _PRIOR_WEIGHT) / (z.size - 1 + _PRIOR_WEIGHT))
+    variance = (squares + _PRIOR_WEIGHT) / (z.size - 1 + _PRIOR_WEIGHT)
+    return centre, math.sqrt(max(variance, 1.0) * (1 + 1 / z.size))
 
 
 def located(
