@@ -1,0 +1,102 @@
+"""Which effects are asked for, and why others are not."""
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.candidates import askable, candidates_of, company_of
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.scene import make_scene
+
+
+@pytest.fixture(scope="module")
+def scene_of(record, tank):
+    """Return what makes the scene of a recording, changed as asked."""
+
+    def of(change=lambda samples: samples, **company):
+        return make_scene(change(record(1, **{"minutes": 6.0, **company})), tank)
+
+    return of
+
+
+def test_a_candidate_has_its_shape_and_a_strength(candidate):
+    """All parameters of the effect, the strength among them."""
+    own = candidate("alignment", kappa=3.0)
+    assert own.values(7.0) == {"weight": 7.0, "kappa": 3.0, "grading": 1.0, "leaning": 0.0}
+    assert own.name == "alignment"
+    assert own.notable == 20.0
+
+
+def test_only_some_strengths_have_a_sign(candidate):
+    """A bias is left or right; an alignment is there or not."""
+    assert candidate("turning-bias").signed
+    assert not candidate("alignment").signed
+
+
+def test_every_shape_is_asked_for(tank):
+    """One candidate for each, with defaults for what the shape does not name."""
+    effect = find_effect("alignment")
+    made = candidates_of((effect,), tank)
+    assert len(made) == len(effect.shapes(tank))
+    names = set(effect.names) - {"weight"}
+    assert all(set(each.shape) == names for each in made)
+    assert len({tuple(each.shape.values()) for each in made}) == len(made)
+
+
+def test_what_the_model_has_is_not_asked_for(tank, fish, scene_of):
+    """Neither by name nor by way of the model."""
+    effects = all_effects()
+    asked = candidates_of(effects, tank, without=("alignment", "freezing"))
+    assert {each.name for each in asked} == {e.name for e in effects} - {"alignment", "freezing"}
+    having = type(fish)(
+        **{f: getattr(fish, f) for f in fish.__dataclass_fields__ if f != "effects"},
+        effects={"freezing": {"rate_per_s": 0.1}},
+    )
+    found, lacks = askable(scene_of(), having)
+    assert "freezing" not in {effect.name for effect in found} | set(lacks)
+
+
+def test_five_fish_in_two_rooms_lack_a_robot(fish, scene_of):
+    """All else is asked for, and every effect is either asked for or lacking something."""
+    found, lacks = askable(scene_of(), fish)
+    assert lacks == {"robot-avoidance": "a robot"}
+    assert {effect.name for effect in found} | set(lacks) == {e.name for e in all_effects()}
+
+
+def test_with_a_robot_nothing_is_lacking(fish, scene_of):
+    """Four fish and a robot."""
+    scene = scene_of(n_fish=4, n_robots=1)
+    assert askable(scene, fish)[1] == {}
+    assert (company_of(scene).n_fish, company_of(scene).n_robots) == (4, 1)
+
+
+def test_one_fish_alone_lacks_neighbours(fish, scene_of):
+    """Effects between fish are not asked for; those of walls and places are."""
+    found, lacks = askable(scene_of(n_fish=1), fish)
+    asked = {effect.name for effect in found}
+    assert {"alignment", "group-cohesion", "rear-blind-zone", "boldness"} <= set(lacks)
+    assert {"wall-persistence", "place-preference", "turning-bias", "freezing"} <= asked
+
+
+def test_boldness_needs_long_tracks(fish, scene_of):
+    """A new id every minute: 300 s under one id are never reached."""
+
+    def cut(samples):
+        xy, ids = [], []
+        for minute in range(6):
+            piece = np.full_like(samples.xy_m, np.nan)
+            rows = slice(300 * minute, 300 * minute + 299)
+            piece[rows] = samples.xy_m[rows]
+            xy.append(piece)
+            ids.append(samples.agent + 100 * minute)
+        xy_m = np.concatenate(xy, axis=1)
+        return type(samples)(
+            dt_s=samples.dt_s,
+            k=samples.k,
+            agent=np.concatenate(ids),
+            kind=np.zeros(xy_m.shape[1], dtype=np.int8),
+            xy_m=xy_m,
+            confidence=np.ones(xy_m.shape[:2], dtype=np.float32),
+        )
+
+    _, lacks = askable(scene_of(cut), fish)
+    assert lacks["boldness"] == "tracks of 300 s under one id"

@@ -1,0 +1,89 @@
+"""Whether an effect holds on steps that it was not fitted to."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.confirming import confirm, half_of, halves, halves_note
+from zfcal.diagnose.naming import choose, refit
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import Best, Step
+from zfcal.model.extended import maximise
+from zfcal.model.scene import make_scene
+
+
+def added(screen, candidate):
+    """Return the step of selection in which a candidate, alone, is added."""
+    score = screen.ask(candidate)
+    choice = choose([refit(screen, score)], lambda _candidate, _beside: True)
+    return Step(choice=choice, best=Best(score=score, z=score.z, p=1.0), before=screen)
+
+
+def test_halves_are_alternating_minutes(screen):
+    """A step at 59.8 s is in the first half, one at 60 s in the second; none is lost."""
+    scene = screen(11).scene
+    first, second = halves(scene)
+    assert len(first.turns) + len(second.turns) == len(scene.turns)
+    assert len(first.moves) + len(second.moves) == len(scene.moves)
+    minute = np.floor(scene.time_s(scene.turns) / 60 + 1e-9)
+    assert np.array_equal(half_of(scene, scene.turns, 1), minute % 2 == 1)
+    assert np.array_equal(first.states, scene.states)
+
+
+def test_a_short_recording_has_four_blocks(screen):
+    """Of two minutes: 30 s each, two in each half."""
+    scene = screen(11, minutes=2.0).scene
+    block = np.floor(scene.time_s(scene.turns) / 30 + 1e-9)
+    assert np.array_equal(half_of(scene, scene.turns, 1), block % 2 == 1)
+
+
+@pytest.mark.parametrize(
+    "name", ["turning-bias", "alignment", "directional-drift", "burst-and-coast", "boldness"]
+)
+def test_an_effect_that_is_not_there_is_not_confirmed(screen, candidate, name):
+    """Two kinds of strength, and one on speed: what chance gave is not given again."""
+    told = confirm(added(screen(11), candidate(name)))
+    assert not told.holds
+    assert told.gain_nats_per_step < 3 * told.gain_se
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("turning-bias", {"strength": 0.4}),
+        ("alignment", {"weight": 20.0}),
+        ("burst-and-coast", {"exponent": 0.4}),
+    ],
+)
+def test_an_effect_that_is_there_is_confirmed(screen, candidate, name, values):
+    """With about what it gained where it was fitted."""
+    step = added(screen(23, {name: values}), candidate(name))
+    told = confirm(step)
+    assert told.holds
+    assert told.gain_nats_per_step > 4 * told.gain_se
+    gained = step.choice.best.gain.sum()
+    n = len(step.before.scene.turns)
+    assert told.gain_nats_per_step == pytest.approx(gained / n, rel=0.25)
+
+
+def test_the_halves_of_a_right_model_agree(screen):
+    """Of nine differences the largest lies within four standard errors."""
+    assert 0 < halves_note(screen(11)).values["largest"] < 4
+
+
+def test_halves_that_differ_are_told(record, worlds, tank, fish):
+    """Every other minute fish keep their heading half as well."""
+    xy = record(11).xy_m.copy()
+    loose = dataclasses.replace(
+        fish,
+        zones=tuple(dataclasses.replace(zone, kappa_0=zone.kappa_0 / 3) for zone in fish.zones),
+    )
+    from zfcal.model.simulate import simulate_tracks
+
+    other, _ = simulate_tracks(loose, tank, n_agents=5, n_steps=3000, seed=12)
+    odd = (np.arange(3000) // 300) % 2 == 1
+    xy[odd] = other[odd]
+    scene = make_scene(worlds.samples_of(xy), tank)
+    note = halves_note(Screen(scene=scene, fitted=maximise(scene, fish)))
+    assert note.values["largest"] > 6

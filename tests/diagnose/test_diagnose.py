@@ -1,0 +1,185 @@
+"""From tracks to a verdict."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.diagnose import diagnose
+from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.question import Question
+from zfcal.errors import InputError
+from zfcal.model.effects import all_effects
+from zfcal.tracks import ROBOT
+
+
+@pytest.fixture(scope="module")
+def ask(tank, fish):
+    """Return what diagnoses samples; keywords change the question."""
+
+    def of(samples, *, tell=lambda _stage, _done, _all: None, **changes):
+        known = {
+            "noise_m": 0.0,
+            "noise_source": "known",
+            "n_null": 5,
+            "quick": True,
+            "seed": 1,
+            "n_workers": 2,
+        }
+        return diagnose(
+            Question(samples=samples, arena=tank, model=fish, **{**known, **changes}), tell
+        )
+
+    return of
+
+
+BIAS = {"turning-bias": {"strength": 0.4}}
+
+
+@pytest.fixture(scope="module")
+def named(ask, record):
+    """Return a quick diagnosis of fish that tend to the left."""
+    return ask(record(23, BIAS))
+
+
+def test_an_effect_is_named_and_measured(named):
+    """First of all, with 0.4 in its interval, and in the extended model."""
+    assert named.verdict is Verdict.NAMED
+    effect = named.effects[0]
+    assert effect.name == "turning-bias"
+    low, high = effect.interval["strength"]
+    assert low < 0.4 < high
+    assert effect.ties == ()
+    assert effect.p < 1e-6
+    assert effect.gain_nats_per_step > 4 * effect.gain_se > 0
+    assert named.extended.effects["turning-bias"] == effect.strength
+    assert named.base.effects == {}
+    assert effect.trace is not None
+
+
+def test_all_effects_are_accounted_for(named):
+    """Screened, or lacking something; the clearest first."""
+    names = [each.name for each in named.screened]
+    assert sorted(names) == sorted(effect.name for effect in all_effects())
+    assert names[0] == "turning-bias"
+    lacking = {each.name: each.lacks for each in named.screened if each.lacks}
+    assert lacking == {"robot-avoidance": "a robot"}
+    sizes = [abs(each.z) for each in named.screened if not each.lacks]
+    assert sizes == sorted(sizes, reverse=True)
+    assert named.minutes == pytest.approx(10.0)
+    assert {note.name for note in named.notes} == {"noise", "halves", "controls", "omnibus", "null"}
+
+
+def test_what_disagrees_is_located(named):
+    """Turning is found among the places, by false-discovery control."""
+    assert named.where
+    assert all(0 <= place.q <= 0.1 for place in named.where)
+    assert any("turn" in place.statistic for place in named.where)
+
+
+def test_a_right_model_has_nothing_missing(ask, record):
+    """No effect, and the model that was fitted as it is; every z is told."""
+    found = ask(record(11))
+    assert found.verdict is Verdict.NO_EFFECT
+    assert found.effects == ()
+    assert found.extended == found.base
+    assert all(abs(each.z) < 4.5 for each in found.screened if not each.lacks)
+
+
+def test_the_null_through_the_measurement_does_not_depend_on_workers(ask, record):
+    """Five replicates of four minutes; stages are told in order, and none is left out."""
+    told = []
+    samples = record(23, BIAS, minutes=4.0)
+    one, two = (
+        ask(samples, quick=False, n_workers=n, tell=lambda *a: told.append(a)) for n in (1, 2)
+    )
+    assert [(e.name, e.strength, e.p) for e in one.effects] == [
+        (e.name, e.strength, e.p) for e in two.effects
+    ]
+    assert [(s.name, s.z, s.p) for s in one.screened if not s.lacks] == [
+        (s.name, s.z, s.p) for s in two.screened if not s.lacks
+    ]
+    assert one.effects[0].name == "turning-bias"
+    assert one.where == two.where
+    replicates = [(done, all_) for stage, done, all_ in told if stage == "null replicates"]
+    assert replicates == [(n, 5) for n in (1, 2, 3, 4, 5)] * 2
+    (null,) = (note for note in one.notes if note.name == "null")
+    assert null.values["replicates"] == 5
+
+
+def test_a_short_recording_is_untestable(ask, record):
+    """A minute of two fish: most effects could not show, and minutes are asked for."""
+    found = ask(record(3, minutes=1.0, n_fish=2))
+    assert found.verdict is Verdict.UNTESTABLE
+    needed = [each.minutes_needed for each in found.screened if each.minutes_needed]
+    assert needed
+    assert min(needed) > 1.0
+
+
+def test_one_fish_alone_can_be_asked(ask, record):
+    """Of walls, places, turns and speeds; neighbours are lacking."""
+    found = ask(record(5, {"turning-bias": {"strength": 0.6}}, n_fish=1))
+    assert found.effects[0].name == "turning-bias"
+    assert {each.name: each.lacks for each in found.screened}["alignment"] == "a neighbour"
+
+
+def test_the_model_keeps_the_effects_that_it_has(record, tank, fish):
+    """A bias in the model is fitted along and not asked for again."""
+    having = dataclasses.replace(fish, effects={"turning-bias": {"strength": 0.1}})
+    question = Question(
+        samples=record(23, BIAS), arena=tank, model=having, noise_m=0.0, noise_source="known",
+        n_null=5, quick=True, seed=1, n_workers=2,
+    )  # fmt: skip
+    found = diagnose(question, lambda _stage, _done, _all: None)
+    assert found.verdict is Verdict.NO_EFFECT
+    assert found.base.effects["turning-bias"]["strength"] == pytest.approx(0.4, abs=0.1)
+    assert "turning-bias" not in {each.name for each in found.screened}
+
+
+def test_robots_alone_are_refused(ask, record):
+    """There is nobody to diagnose."""
+    samples = record(1, minutes=2.0, n_fish=3)
+    robots = dataclasses.replace(samples, kind=np.full(3, ROBOT, dtype=np.int8))
+    with pytest.raises(InputError, match="needs fish at three samples in a row"):
+        ask(robots)
+
+
+def test_too_short_a_recording_is_refused(ask, record):
+    """Twelve seconds of one fish have not 200 steps."""
+    with pytest.raises(InputError, match="needs 200 steps of fish with a heading, got"):
+        ask(record(1, minutes=0.2, n_fish=1))
+
+
+def test_fish_that_were_never_seen_are_refused(ask, record):
+    """All positions are missing."""
+    samples = record(1, minutes=2.0, n_fish=3)
+    lost = dataclasses.replace(samples, xy_m=np.full_like(samples.xy_m, np.nan))
+    with pytest.raises(InputError, match="got 0 in 600 samples"):
+        ask(lost)
+
+
+def test_fish_that_never_move_are_refused(ask, record):
+    """Nobody has a heading."""
+    samples = record(1, minutes=2.0, n_fish=3)
+    still = np.broadcast_to(samples.xy_m[:1], samples.xy_m.shape).copy()
+    with pytest.raises(InputError, match="got 0 in 600 samples"):
+        ask(dataclasses.replace(samples, xy_m=still))
+
+
+def test_a_constant_speed_is_no_trouble(ask, worlds):
+    """Two fish on circles, each step 1 cm: every number that is told is one, or is missing."""
+    angle = np.arange(1500) * 0.2
+    xy_m = np.stack(
+        [
+            np.stack([x + 0.05 * np.cos(angle), y + 0.05 * np.sin(angle)], axis=1)
+            for x, y in ((0.22, 0.77), (0.77, 0.22))
+        ],
+        axis=1,
+    )
+    found = ask(worlds.samples_of(xy_m))
+    assert found.verdict in set(Verdict)
+    asked = [each for each in found.screened if not each.lacks]
+    assert all(math.isfinite(each.z) and 0 <= each.p <= 1 for each in asked)
+    for effect in found.effects:
+        assert all(math.isfinite(value) for value in effect.strength.values())

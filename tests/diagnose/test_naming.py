@@ -1,0 +1,164 @@
+"""Which of several suspects it is."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.naming import Refit, by_sample, choose, free_of, refit, with_traits
+from zfcal.model.kernels.world import TRAIT
+from zfcal.model.simulate import individuals
+
+N = 400
+
+
+@pytest.fixture
+def suspect(candidate):
+    """Return what makes a suspect up: a mean gain per sample, and its own scatter."""
+
+    def of(name, mean, *, scatter=0.0, seed=1):
+        own = np.random.default_rng(seed).normal(0, scatter, N) if scatter else np.zeros(N)
+        return Refit(
+            candidate=candidate(name),
+            screen=None,
+            values={},
+            interval={},
+            gain=mean + own - own.mean(),
+            n_free=1,
+        )
+
+    return of
+
+
+def stands(*names):
+    """Return what says that these suspects stand beside any other, and no others do."""
+    return lambda candidate, _beside: candidate.name in names
+
+
+def test_nats_are_less_what_idle_parameters_gain(suspect):
+    """400 samples of 0.1 nats, less one for the one parameter."""
+    assert suspect("alignment", 0.1).nats == pytest.approx(39.0)
+
+
+def test_how_far_one_is_ahead_by_hand(suspect, candidate):
+    """Gains 2, 0, 2, 0 against 0: ahead by 4 with a spread of 1 * sqrt 4."""
+    one, other = (
+        Refit(
+            candidate=candidate("alignment"), screen=None, values={}, interval={}, gain=gain,
+            n_free=1,
+        )
+        for gain in (np.array([2.0, 0.0, 2.0, 0.0]), np.zeros(4))
+    )  # fmt: skip
+    assert one.over(other) == pytest.approx(2.0)
+    assert other.over(one) == pytest.approx(-2.0)
+    assert one.over(one) == 0.0
+
+
+def test_a_clear_winner_is_named(suspect):
+    """100 nats ahead at a standard error of 10: what stands beside it does not matter."""
+    best = suspect("alignment", 0.5, scatter=0.5)
+    other = suspect("group-cohesion", 0.25)
+    choice = choose([other, best], stands("group-cohesion", "alignment"))
+    assert choice.best is best
+    assert choice.ties == ()
+    assert [each.name for each in choice.considered] == ["alignment", "group-cohesion"]
+
+
+def test_a_shadow_is_no_tie(suspect):
+    """It gains nearly as much, but falls beside the best one, which stands beside it."""
+    best = suspect("alignment", 0.26, scatter=0.5)
+    shadow = suspect("group-cohesion", 0.25)
+    assert choose([best, shadow], stands("alignment")).ties == ()
+
+
+@pytest.mark.parametrize(
+    "standing", [(), ("alignment", "group-cohesion"), ("group-cohesion",)],
+    ids=["both fall", "both stand", "the best one falls"],
+)  # fmt: skip
+def test_what_cannot_be_told_apart_is_a_tie(suspect, standing):
+    """With like gains, unless the best one alone stands."""
+    best = suspect("alignment", 0.26, scatter=0.5)
+    other = suspect("group-cohesion", 0.25)
+    choice = choose([other, best], stands(*standing))
+    assert choice.best is best
+    assert choice.ties == (other,)
+
+
+def test_one_suspect_is_itself(suspect):
+    """There is nothing to tell it from."""
+    only = suspect("freezing", 0.1)
+    choice = choose([only], stands())
+    assert (choice.best, choice.ties, choice.considered) == (only, (), (only,))
+
+
+def test_what_is_no_smooth_matter_is_not_fitted(candidate):
+    """Of alignment the weight and the concentration; of a delay nothing."""
+    assert free_of(candidate("alignment")) == (("alignment", "weight"), ("alignment", "kappa"))
+    assert free_of(candidate("reaction-delay")) == ()
+
+
+def test_a_gain_belongs_to_its_sample(screen):
+    """Ones for all turns: as many as there are turns in each sample."""
+    scene = screen(11, minutes=4.0).scene
+    sums = by_sample(scene, scene.turns.at, np.ones(len(scene.turns)))
+    assert sums.shape == scene.k.shape
+    assert sums.sum() == len(scene.turns)
+    assert sums[7] == (scene.turns.at == 7).sum()
+
+
+def test_a_refit_finds_the_strength_again(screen, candidate):
+    """A bias of 0.4 in ten minutes: in its interval, of a width below a third of it."""
+    own = screen(23, {"turning-bias": {"strength": 0.4}})
+    made = refit(own, own.ask(candidate("turning-bias")))
+    low, high = made.interval["strength"]
+    assert low < 0.4 < high
+    assert high - low < 0.14
+    assert made.gain.sum() == pytest.approx(made.screen.fitted.nats - own.fitted.nats, abs=1e-6)
+    assert made.nats > 50
+    assert abs(made.screen.ask(candidate("turning-bias")).z) < 0.5
+
+
+def test_a_refit_without_an_effect_gains_little(screen, candidate):
+    """Twice the gain is chi-square with one degree: below 8 but once in 200."""
+    own = screen(11)
+    made = refit(own, own.ask(candidate("turning-bias")))
+    assert -0.1 < made.gain.sum() < 8
+    assert made.interval["strength"][0] < 0.0 < made.interval["strength"][1]
+
+
+def test_a_refit_of_a_speed_leaves_headings_alone(screen, candidate):
+    """The fit of headings stands; the strength is found."""
+    own = screen(29, {"burst-and-coast": {"exponent": 0.4}}, minutes=6.0)
+    made = refit(own, own.ask(candidate("burst-and-coast")))
+    assert made.screen.fitted.nats == own.fitted.nats
+    assert made.values["exponent"] == pytest.approx(0.4, abs=0.1)
+    assert made.gain.sum() > 20
+
+
+def test_a_delay_is_added_as_it_was_asked_for(screen, candidate):
+    """0.6 s gains much; its parameter is no smooth matter and has no interval."""
+    own = screen(37, {"reaction-delay": {"delay_s": 0.6}}, minutes=6.0)
+    made = refit(own, own.ask(candidate("reaction-delay", delay_s=0.6)))
+    assert made.values == {"delay_s": 0.6}
+    assert made.interval == {}
+    assert made.nats > 30
+
+
+def test_traits_are_those_of_the_individuals(screen, candidate):
+    """Mean 0, standard deviation 1, and in the order in which the simulation has them."""
+    own = screen(31, {"boldness": {"spread": 0.7}})
+    states = with_traits(own.scene, own.ask(candidate("boldness"))).states
+    traits = states[-1, TRAIT]
+    true = individuals(5, 0)[1]
+    assert np.average(traits) == pytest.approx(0.0, abs=0.3)
+    assert traits.std() == pytest.approx(1.0, abs=0.1)
+    assert np.corrcoef(traits, true)[0, 1] > 0.9
+    assert (own.scene.states[:, TRAIT] == 0).all()
+
+
+def test_boldness_in_the_model_has_its_spread(screen, candidate):
+    """About 0.7, with five fish of which each is known but roughly."""
+    own = screen(31, {"boldness": {"spread": 0.7}})
+    made = refit(own, own.ask(candidate("boldness")))
+    assert made.values["spread"] == pytest.approx(0.7, rel=0.3)
+    assert math.isfinite(made.nats)

@@ -1,0 +1,197 @@
+"""Efficient scores: standard normal without an effect, large with it, blind to the base."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from zfcal.diagnose.candidates import askable, candidates_of
+from zfcal.diagnose.screening import (
+    ask_all,
+    by_track,
+    centred,
+    normal_deviate,
+    summed,
+    tame,
+)
+from zfcal.model.effects import find_effect
+
+
+def family(screen, arena):
+    """Return all candidates that a recording can be asked for."""
+    return candidates_of(askable(screen.scene, screen.fitted.parameters)[0], arena)
+
+
+def test_scores_of_a_right_model_are_standard_normal(screen, tank):
+    """All shapes of all effects, on six recordings of six minutes: some 450 z.
+
+    With about 40 shapes that are not alike, the mean has a standard error of 0.07 and the
+    spread one of 0.05: a centre of 0.3 or a spread wrong by a fifth is noticed.
+    """
+    z = []
+    for seed in range(6):
+        own = screen(300 + seed, minutes=6.0)
+        z += [score.z for score in ask_all(own, family(own, tank), 1)]
+    assert abs(np.mean(z)) < 0.25
+    assert 0.8 < np.std(z) < 1.2
+    assert np.abs(z).max() < 4.5
+
+
+EFFECTS = {
+    "alignment": ({"weight": 8.0, "kappa": 10.0}, 1),
+    "group-cohesion": ({"weight": 0.5}, 1),
+    "turning-bias": ({"strength": -0.25}, -1),
+    "turning-memory": ({"strength": 0.5}, 1),
+    "wall-persistence": ({"strength": 0.3}, 1),
+    "directional-drift": ({"strength": 0.2, "direction_rad": 0.0}, 1),
+    "place-preference": ({"strength": -0.6, "x_m": 0.22, "y_m": 0.77}, -1),
+    "collective-departure": ({"strength": 1.0}, 1),
+    "speed-turn-coupling": ({"strength": 0.3}, 1),
+    "rear-blind-zone": ({"ignored": 0.5}, 1),
+    "interaction-range": ({"ignored": 0.6, "range_m": 0.12}, 1),
+    "leader-following": ({"strength": -0.5}, -1),
+    "reaction-delay": ({"delay_s": 0.4}, 1),
+    "burst-and-coast": ({"exponent": 0.2}, 1),
+    "speed-matching": ({"exponent": 0.25}, 1),
+    "crowding": ({"per_neighbour": -0.12}, -1),
+    "fatigue": ({"per_hour": 3.0}, 1),
+    "freezing": ({"rate_per_s": 0.02, "duration_s": 2.0}, 1),
+    "boldness": ({"spread": 0.5}, 1),
+    "robot-avoidance": ({"strength": 0.7}, 1),
+}
+
+
+@pytest.mark.parametrize(("name", "values", "sign"), [(n, *e) for n, e in EFFECTS.items()])
+def test_a_moderate_effect_is_found_with_its_sign(screen, tank, name, values, sign):
+    """Ten minutes of five fish: its best shape lies beyond five standard errors."""
+    own = screen(17, {name: values}, n_robots=int(name == "robot-avoidance"))
+    scores = ask_all(own, candidates_of((find_effect(name),), tank), 1)
+    best = max(scores, key=lambda score: abs(score.z))
+    assert sign * best.z > 5.0
+    assert sign * best.strength > 0
+
+
+@pytest.fixture(scope="module")
+def base(screen):
+    """Return a screen of ten minutes of the base model."""
+    return screen(11)
+
+
+def test_what_the_model_can_explain_is_projected_off(base):
+    """The model's own scores, in any combination, leave nothing; twice is once."""
+    own = np.zeros(len(base.scene.turns))
+    rng = np.random.default_rng(1)
+    for scores, turns in zip(base.fitted.scores, base.fitted.turns, strict=True):
+        own[turns.rows] = scores @ rng.normal(size=scores.shape[1])
+    assert np.abs(base.project(own)).max() < 1e-8 * np.abs(own).max()
+
+    other = rng.normal(size=own.size)
+    once = base.project(other)
+    assert base.project(once) == pytest.approx(once, abs=1e-10)
+    for scores, turns in zip(base.fitted.scores, base.fitted.turns, strict=True):
+        sizes = np.linalg.norm(scores, axis=0) * np.linalg.norm(once)
+        assert np.abs(once[turns.rows] @ scores).max() < 1e-8 * sizes.max()
+
+
+def test_an_effect_in_the_model_is_silent(screen, tank, candidate):
+    """Asked for in the model that made the recording, it has nothing left to say."""
+    from zfcal.diagnose.screening import Screen
+    from zfcal.model.extended import maximise, with_effect
+
+    own = screen(17, {"turning-bias": {"strength": -0.25}})
+    model = with_effect(own.fitted.parameters, "turning-bias", {"strength": -0.1})
+    fitted = maximise(own.scene, model, free=(("turning-bias", "strength"),))
+    left = Screen(scene=own.scene, fitted=fitted).ask(candidate("turning-bias"))
+    assert abs(left.z) < 0.5
+
+
+def test_a_mirrored_bias_has_the_other_sign(screen, candidate):
+    """Left and right differ by nothing else: like sizes of z, other signs."""
+    left = screen(23, {"turning-bias": {"strength": 0.4}}).ask(candidate("turning-bias"))
+    right = screen(23, {"turning-bias": {"strength": -0.4}}).ask(candidate("turning-bias"))
+    assert left.z > 10 > -10 > right.z
+    assert left.strength == pytest.approx(0.4, rel=0.3)
+    assert right.strength == pytest.approx(-0.4, rel=0.3)
+
+
+def test_boldness_is_how_individuals_scatter(screen, candidate):
+    """Fish of one kind do not scatter; those with a spread of 0.7 do, by about as much."""
+    alike, unlike = (
+        screen(31, effects).ask(candidate("boldness"))
+        for effects in (None, {"boldness": {"spread": 0.7}})
+    )
+    assert abs(alike.z) < 3.5
+    assert unlike.z > 8
+    assert unlike.strength == pytest.approx(0.7, rel=0.35)
+
+
+def test_a_lone_fish_does_not_scatter(screen, candidate):
+    """One individual differs from nobody."""
+    assert screen(3, n_fish=1, minutes=5.0).ask(candidate("boldness")).z == 0.0
+
+
+def test_fish_that_stop_are_told_from_slow_ones(screen, candidate):
+    """Rests go on: staying after staying is more frequent than staying after moving."""
+    own = screen(41, {"freezing": {"rate_per_s": 0.02, "duration_s": 2.0}}, minutes=6.0)
+    now, before = own.still
+    assert now[before].mean() > 3 * now[~before].mean()
+    assert own.ask(candidate("freezing")).z > 8
+
+
+def test_the_model_divides_its_effects_out_of_speeds(screen, candidate, base):
+    """Without an effect on speed they are the measured ones."""
+    assert np.array_equal(base.own_speeds, base.scene.moves.speed_m_s)
+
+
+def test_workers_do_not_change_numbers(base, tank):
+    """One thread or three: the same z, in the order of the candidates."""
+    asked = family(base, tank)[:12]
+    one, three = (ask_all(base, asked, n) for n in (1, 3))
+    assert [s.z for s in one] == [s.z for s in three]
+    assert [s.candidate for s in one] == list(asked)
+
+
+def test_a_score_by_hand(candidate):
+    """Scores 1, 2, -1: sum 2, squares 6; z is 2 / sqrt 6 and a Newton step 1/3."""
+    score = summed(candidate("turning-bias"), np.array([1.0, 2.0, -1.0]))
+    assert score.z == pytest.approx(2 / math.sqrt(6))
+    assert score.strength == pytest.approx(1 / 3)
+    assert score.information == pytest.approx(6.0)
+
+
+def test_nothing_asked_is_nothing_answered(candidate):
+    """Scores that are all zero, as without a robot, have z zero and no information."""
+    score = summed(candidate("turning-bias"), np.zeros(5))
+    assert (score.z, score.strength, score.information) == (0.0, 0.0, 0.0)
+
+
+def test_sums_by_track():
+    """In ascending order of the ids."""
+    sums, squares = by_track(np.array([7, 3, 7], dtype=np.int32), np.array([1.0, 2.0, 3.0]))
+    assert sums.tolist() == [2.0, 4.0]
+    assert squares.tolist() == [4.0, 10.0]
+
+
+def test_a_chi_square_as_a_normal_deviate():
+    """The median is about zero, the upper 2.5 % at 1.96, and far out it stays finite."""
+    assert normal_deviate(float(stats.chi2.isf(0.025, 4)), 4) == pytest.approx(1.95996, abs=1e-4)
+    assert normal_deviate(float(stats.chi2.median(4)), 4) == pytest.approx(0.0, abs=1e-6)
+    assert 30 < normal_deviate(2000.0, 4) < 60
+    assert normal_deviate(2100.0, 4) > normal_deviate(2000.0, 4)
+
+
+def test_one_wild_value_is_tamed():
+    """Set to eight standard deviations; nothing at all stays nothing."""
+    values = np.zeros(1000)
+    values[0] = 100.0
+    assert tame(values)[0] == pytest.approx(8 * values.std())
+    assert tame(np.zeros(0)).size == 0
+
+
+def test_each_zone_has_its_own_mean():
+    """What is not kept counts for no mean and is zero."""
+    zone = np.array([1, 1, 2, 2, 2])
+    kept = np.array([True, True, True, True, False])
+    rest = centred(np.array([1.0, 3.0, 10.0, 20.0, 99.0]), zone, kept)
+    assert rest.tolist() == [-1.0, 1.0, -5.0, 5.0, 0.0]

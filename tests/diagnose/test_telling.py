@@ -1,0 +1,47 @@
+"""Findings in plain words."""
+
+import pytest
+
+from zfcal.diagnose.telling import says
+from zfcal.model.effects import all_effects
+
+
+def test_a_sentence_with_size_and_interval(candidate):
+    """What fish do, how strongly, and what the number is."""
+    text = says(candidate("alignment"), {"weight": 12.345}, {"weight": (9.87, 14.321)})
+    assert text.startswith("Fish turn toward the direction in which their neighbours swim. ")
+    assert "Fitted weight: 12.3 (95 % interval 9.87 to 14.3)." in text
+    assert text.endswith("per steradian of solid angle.")
+
+
+def test_a_negative_strength_has_the_opposite_sentence(candidate):
+    """A fish that has just been fast slows down."""
+    own = candidate("burst-and-coast")
+    assert says(own, {"exponent": 0.4}, {}).startswith(own.effect.says)
+    assert says(own, {"exponent": -0.4}, {}).startswith(own.effect.opposite)
+    assert "Fitted exponent: -0.4." in says(own, {"exponent": -0.4}, {})
+
+
+def test_without_an_interval_none_is_told(candidate):
+    """As for a delay, which is asked for at a few values."""
+    text = says(candidate("reaction-delay"), {"delay_s": 0.6}, {})
+    assert "interval" not in text
+    assert "Fitted delay s: 0.6." in text
+
+
+def test_an_interval_of_a_shape_is_not_that_of_the_strength(candidate):
+    """Only the strength is told."""
+    text = says(candidate("alignment"), {"weight": 5.0, "kappa": 3.0}, {"kappa": (1.0, 5.0)})
+    assert "interval" not in text
+
+
+@pytest.mark.parametrize("effect", all_effects(), ids=lambda effect: effect.name)
+def test_every_effect_can_be_told(candidate, effect):
+    """One sentence at least for either sign that it can have, and the sentences differ."""
+    own = candidate(effect.name)
+    positive = says(own, {effect.strength: 0.5}, {})
+    assert positive.startswith(effect.says)
+    assert effect.says.endswith(".")
+    if own.signed:
+        assert says(own, {effect.strength: -0.5}, {}).split("Fitted")[0].strip() == effect.opposite
+        assert effect.opposite != effect.says
