@@ -56,6 +56,11 @@ class Desk:
         """Return the rows of a section that the present code has made, by key."""
         return ledger.current(ledger.read(self.folder / f"{section}.jsonl"), self.marks)
 
+    def n_stale(self, section: str) -> int:
+        """Return how many rows of a section other code has made."""
+        rows = ledger.read(self.folder / f"{section}.jsonl")
+        return sum(row["code"] != self.marks[section] for row in rows)
+
     def keep(self, section: str, row: ledger.Row) -> None:
         """Keep a row."""
         stamped = {"section": section, **row, "code": self.marks[section]}
@@ -201,6 +206,8 @@ def main() -> None:
             work(part, desk, workers=workers, deadline_s=deadline_s)
     full = plan(Scale(), LISTED, UNLISTED, quick=options.quick)
     publish(summary(desk, full), places(options))
+    if stale := sum(map(desk.n_stale, SECTIONS)):
+        print(f"{stale} trials were made by other code and do not count.", file=sys.stderr)
 
 
 if __name__ == "__main__":

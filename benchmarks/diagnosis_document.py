@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis_plan import EXTEND, SECTIONS, VIDEO
-from diagnosis_summary import DESCRIBES
+from diagnosis_summary import DESCRIBES, NOTHING
 from measuring import table
 
 MODES = {"full": "39 replicates", "quick": "`--quick`"}
@@ -48,13 +48,16 @@ def markdown(found: Mapping[str, Any]) -> str:
     """Return the document: what was run, what was aimed at, and what came out."""
     parts = [*_head(found), *_targets(found)]
     for mode, told in _modes(found):
-        name = MODES[mode]
-        parts += [
-            f"## One effect at a time: {name}\n", *_effects(mode, told), *_confusion(told),
-            f"## Power: {name}\n", *_power(mode, told),
-            f"## Nothing hidden: {name}\n", *_nulls(told),
-            f"## Pairs and effects outside the list: {name}\n", *_others(told),
-        ]  # fmt: skip
+        sections = {
+            "One effect at a time": _effects(told),
+            "Hidden and said": _confusion(mode, told),
+            "Power": _power(mode, told),
+            "Nothing hidden": _nulls(told),
+            "Two effects at once": _pairs(told),
+            "Effects outside the list": _outside(told),
+        }
+        for title, blocks in sections.items():
+            parts += [f"## {title}: {MODES[mode]}\n", *blocks] if blocks else []
     return "\n".join([*parts, *_gap(found), *_time(found)])
 
 
@@ -125,42 +128,43 @@ def _targets(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _effects(mode: str, told: Mapping[str, Any]) -> list[str]:
+def _effects(told: Mapping[str, Any]) -> list[str]:
     rows = [
         [name, _number(each["median_nats"]), *(share(each[k]) for k in ("right", "tie", "wrong"))]
         for name, each in told["effects"].items()
     ]
     head = ("hidden", "oracle nats (median)", "named rightly", "tie with it", "a wrong name")
-    return [
-        "30 minutes, four fish and a robot, clear strength.\n",
-        table(head, rows),
-        f"![What was said by what was hidden](pictures/diagnosis-confusion-{mode}.png)\n",
-    ]
+    about = "30 minutes, four fish and a robot, clear strength.\n"
+    return [about, table(head, rows)] if rows else []
 
 
-def _confusion(told: Mapping[str, Any]) -> list[str]:
-    confused = [
-        [true, _counted(answers, but=true)]
+def _confusion(mode: str, told: Mapping[str, Any]) -> list[str]:
+    if not told["confusion"]:
+        return []
+    rows = [
+        [true, sum(answers.values()), answers.get(true, 0), _counted(answers, but=true)]
         for true, answers in told["confusion"].items()
-        if set(answers) - {true}
     ]
     turned = [
-        [
-            answer,
-            share(each["rate"]) if each["rate"]["hits"] or answer in told["confusion"] else _DASH,
-            _counted(each["hidden"], but=answer),
-        ]
+        [answer, _of_what(answer, each, told["confusion"]), _counted(each["hidden"], but=answer)]
         for answer, each in told["inversion"].items()
     ]
     return [
-        "All lengths and strengths, and nulls: what was said, other than what was hidden.\n",
-        table(("hidden", "said instead"), confused),
+        f"![What was said by what was hidden](pictures/diagnosis-confusion-{mode}.png)\n",
+        "All lengths and strengths, and nulls, for which silence is right.\n",
+        table(("hidden", "trials", "so named", "said instead"), rows),
         _prose(
             """The other way round: of what was said, how often it was so. This depends on the
             mixture of trials, which hides each effect equally often."""
         ),
         table(("said", "was hidden", "hidden instead"), turned),
     ]
+
+
+def _of_what(answer: str, each: Mapping[str, Any], matrix: Mapping[str, Any]) -> str:
+    """Return how often a name was right; a verdict that names nothing has no such share."""
+    names = set(matrix) - {NOTHING}
+    return share(each["rate"]) if answer in names or each["rate"]["hits"] else _DASH
 
 
 def _counted(counts: Mapping[str, int], *, but: str) -> str:
@@ -183,10 +187,8 @@ def _power(mode: str, told: Mapping[str, Any]) -> list[str]:
         if each["right"]["n"]
     ]
     head = ("minutes", "oracle nats", "named rightly", "tie with it", "a wrong name")
-    return [
-        f"![Power by nats and by minutes](pictures/diagnosis-power-{mode}.png)\n",
-        table(head, rows),
-    ]
+    picture = f"![Power by nats and by minutes](pictures/diagnosis-power-{mode}.png)\n"
+    return [picture, table(head, rows)] if rows else []
 
 
 def _bin(edges: Sequence[float | None]) -> str:
@@ -200,28 +202,26 @@ def _nulls(told: Mapping[str, Any]) -> list[str]:
         [f"{each['noise_mm']:g}", _estimated(each["estimated_mm"]), share(each["alarm"])]
         for each in told["noise"]
     ]
-    return [
-        table(("decoy", "says anything at all"), kinds),
-        table(
-            ("noise added (mm)", "estimated (mm, median)", "says anything at all"), noise
-        ),
-    ]  # fmt: skip
+    head = ("noise added (mm)", "estimated (mm, median)", "says anything at all")
+    return [table(("decoy", head[-1]), kinds), table(head, noise)] if kinds else []
 
 
 def _estimated(value: float | None) -> str:
     return _DASH if value is None else f"{value:.2f}"
 
 
-def _others(told: Mapping[str, Any]) -> list[str]:
-    outside = [
+def _pairs(told: Mapping[str, Any]) -> list[str]:
+    rows = [[kind, share(each)] for kind, each in told["pairs"].items()]
+    return [table(("pair", "both named"), rows)] if rows else []
+
+
+def _outside(told: Mapping[str, Any]) -> list[str]:
+    rows = [
         [true, ", ".join(DESCRIBES.get(true, ())) or _DASH, _counted(answers, but="")]
         for true, answers in told["outside"].items()
     ]
-    pairs = [[kind, share(each)] for kind, each in told["pairs"].items()]
-    return [
-        table(("pair", "both named"), pairs),
-        table(("outside the list", "listed names that describe it in part", "said"), outside),
-    ]
+    head = ("hidden", "listed names that describe it in part", "said first")
+    return [table(head, rows)] if rows else []
 
 
 def _gap(found: Mapping[str, Any]) -> list[str]:

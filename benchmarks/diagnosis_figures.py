@@ -20,12 +20,13 @@ _MARKS = ("o", "^", "s", "D")
 
 
 def draw(found: Mapping[str, Any], folder: Path) -> None:
-    """Draw both figures of each mode that has trials."""
+    """Draw the figures of each mode that has trials for them."""
     folder.mkdir(parents=True, exist_ok=True)
     for mode, told in found["modes"].items():
         if told["confusion"]:
             _confusion(told["confusion"], folder / f"diagnosis-confusion-{mode}.png", mode)
-        _power(told["power"], folder / f"diagnosis-power-{mode}.png", mode)
+        if any(each["right"]["n"] for each in told["power"]):
+            _power(told["power"], folder / f"diagnosis-power-{mode}.png", mode)
 
 
 def _columns(matrix: Mapping[str, Mapping[str, int]]) -> tuple[list[str], list[str]]:

@@ -232,6 +232,7 @@ def test_a_second_run_does_what_is_missing_or_has_failed(bench, planned, tmp_pat
     old.keep("listed", {"key": keys[2], "verdict": "named"})
 
     assert bench.missing(jobs, desk, ["listed"]) == jobs[1:]
+    assert desk.n_stale("listed") == 1
 
 
 def test_a_section_that_cannot_be_run_says_what_it_needs(bench, planned, monkeypatch, tmp_path):
