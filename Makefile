@@ -6,11 +6,11 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-plain lint format bench bench-real real-data effects-page lock lock-upgrade clean
+.PHONY: help install demo check test test-plain lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
-		printf '  make %-14s %s\n' "$$name" "$$what"; done
+		printf '  make %-16s %s\n' "$$name" "$$what"; done
 
 install: .venv/.installed  ## Build .venv from the lock and put zfcal into it
 
@@ -55,7 +55,11 @@ format: install  ## Format the code
 
 # BENCH_OPTIONS=--write renews benchmarks/results and the documentation.
 bench: .venv/.benched  ## Measure what the documentation states; report what became worse
-	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
+	@for script in $(filter-out %/bench_diagnosis.py,$(wildcard benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
+
+# Takes a day; what is done stays in build/bench-diagnosis. BENCH_OPTIONS="--quick --minutes 60", for example.
+bench-diagnosis: install  ## Hide effects in trials and count how often the diagnosis is right
+	$(BIN)/python benchmarks/bench_diagnosis.py --workers $(WORKERS) $(BENCH_OPTIONS)
 
 bench-real: install  ## Run the main job on the real recordings in ../shared/data (ZFCAL_SHARED_DATA)
 	$(BIN)/python benchmarks/real_recordings.py

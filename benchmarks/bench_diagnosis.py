@@ -1,0 +1,214 @@
+"""Hide effects in trials, diagnose them, and count how often the diagnosis is right.
+
+Trials that are done stay in ``build/bench-diagnosis``, a line each; a second run does what is
+missing, or what was done by other code. The summary goes to ``build/benchmarks``, with
+``--write`` to ``benchmarks/results`` and ``docs``.
+
+    .venv/bin/python benchmarks/bench_diagnosis.py --workers 2
+    .venv/bin/python benchmarks/bench_diagnosis.py --quick --seeds 3 --nulls 40 --minutes 30
+    .venv/bin/python benchmarks/bench_diagnosis.py --report
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import diagnosis_document
+import diagnosis_figures
+import diagnosis_ledger as ledger
+import diagnosis_summary
+import diagnosis_trial
+from diagnosis_plan import EXTEND, SECTIONS, TIME, Job, Scale, plan
+from measuring import ROOT, machine
+from regressions import Places, parser, places
+
+BUILD = ROOT / "build" / "bench-diagnosis"
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Desk:
+    """Where trials are kept, and by which code.
+
+    Parameters
+    ----------
+    folder
+        One ledger for each section.
+    marks
+        Fingerprint of the code of each section.
+    """
+
+    folder: Path
+    marks: dict[str, str]
+
+    def rows(self, section: str) -> dict[str, ledger.Row]:
+        """Return the rows of a section that the present code has made, by key."""
+        return ledger.current(ledger.read(self.folder / f"{section}.jsonl"), self.marks)
+
+    def n_stale(self, section: str) -> int:
+        """Return how many rows of a section other code has made."""
+        rows = ledger.read(self.folder / f"{section}.jsonl")
+        return sum(row["code"] != self.marks[section] for row in rows)
+
+    def keep(self, section: str, row: ledger.Row) -> None:
+        """Keep a row."""
+        stamped = {"section": section, **row, "code": self.marks[section]}
+        ledger.append(self.folder / f"{section}.jsonl", stamped)
+
+
+def missing(jobs: Sequence[Job], desk: Desk, sections: Sequence[str]) -> list[Job]:
+    """Return the trials that are still to be made; those that failed are tried again."""
+    done = {
+        key
+        for section in sections
+        for key, row in desk.rows(section).items()
+        if row["verdict"] != "error"
+    }
+    return [
+        job
+        for job in jobs
+        if job.section in sections
+        and diagnosis_trial.lacks(job.section) is None
+        and ledger.key_of(job.said()) not in done
+    ]
+
+
+def work(jobs: Sequence[Job], desk: Desk, *, workers: int, deadline_s: float) -> None:
+    """Make trials side by side, and keep each when it is done.
+
+    Parameters
+    ----------
+    jobs
+        In the order in which they begin.
+    desk
+        Where they are kept.
+    workers
+        Processes.
+    deadline_s
+        On the monotonic clock: none begins later.
+    """
+    known = {row["key"]: row["nats"] for row in desk.rows(diagnosis_trial.ORACLE).values()}
+    todo, running = iter(jobs), dict[Future[ledger.Row], Job]()
+    count = itertools.count(1)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(
+        workers, mp_context=context, initializer=diagnosis_trial.warm_up
+    ) as pool:
+        while True:
+            for job in _next(todo, workers - len(running), deadline_s):
+                nats = known.get(_oracle_key(job))
+                running[pool.submit(diagnosis_trial.run, job, nats)] = job
+            if not running:
+                return
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                job, row = running.pop(future), future.result()
+                _keep(desk, job, row, known)
+                print(f"{next(count)}/{len(jobs)} {_line(job, row)}", file=sys.stderr, flush=True)
+
+
+def _next(todo: Iterator[Job], n: int, deadline_s: float) -> list[Job]:
+    return list(itertools.islice(todo, n)) if time.monotonic() < deadline_s else []
+
+
+def _oracle_key(job: Job) -> str:
+    return ledger.key_of(diagnosis_trial.oracle_said(job.scenario))
+
+
+def _keep(desk: Desk, job: Job, row: ledger.Row, known: dict[str, Any]) -> None:
+    key = _oracle_key(job)
+    if row.get("nats") and key not in known:
+        known[key] = row["nats"]
+        said = diagnosis_trial.oracle_said(job.scenario)
+        desk.keep(diagnosis_trial.ORACLE, {"key": key, "scenario": said, "nats": row["nats"]})
+    desk.keep(job.section, row)
+
+
+def _line(job: Job, row: ledger.Row) -> str:
+    nats = f", {row['nats']['total']:.0f} nats" if row.get("nats") else ""
+    names = " + ".join("/".join([e["name"], *e["ties"]]) for e in row["effects"])
+    mode = "quick" if job.quick else "full"
+    said = row.get("error") or f"{row['verdict']} {names}".strip()
+    return (
+        f"{job.section}, {job.kind}, seed {job.scenario['seed']}{nats}, {mode}: {said} "
+        f"({row.get('cpu_s', 0):.0f} s, in all {row['all_s']:.0f} s)"
+    )
+
+
+def summary(desk: Desk, jobs: Sequence[Job]) -> dict[str, Any]:
+    """Return all numbers that the trials of the present code give."""
+    rows = [row for section in SECTIONS for row in desk.rows(section).values()]
+    planned = {section: sum(job.section == section for job in jobs) for section in SECTIONS}
+    lacking = {section: what for section in SECTIONS if (what := diagnosis_trial.lacks(section))}
+    made = diagnosis_summary.summarise(rows, planned=planned, lacking=lacking)
+    return {
+        "machine": machine(),
+        "code": {"diagnosis": desk.marks[TIME], "extension": desk.marks[EXTEND]},
+        **made,
+    }
+
+
+def publish(found: dict[str, Any], place: Places) -> None:
+    """Write the JSON, the document and its figures, and say where they are."""
+    for folder in (place.results, place.docs):
+        folder.mkdir(parents=True, exist_ok=True)
+    numbers = place.results / "diagnosis.json"
+    numbers.write_text(diagnosis_document.as_json(found), encoding="utf-8")
+    diagnosis_figures.draw(found, place.docs / "pictures")
+    document = place.docs / "benchmarks-diagnosis.md"
+    document.write_text(diagnosis_document.markdown(found), encoding="utf-8")
+    print(f"{numbers}\n{document}")
+
+
+def options_of(words: Sequence[str] | None = None) -> argparse.Namespace:
+    """Return what the command line asks for."""
+    made = parser(__doc__, tiny=False)
+    add = made.add_argument
+    add("--workers", type=int, default=2, help="trials at the same time")
+    add("--quick", action="store_true", help="take the null of theory, not of 39 replicates")
+    add("--sections", nargs="+", choices=SECTIONS, default=SECTIONS, help="these alone")
+    add("--minutes", type=float, default=float("inf"), help="begin no trial after so long")
+    add("--report", action="store_true", help="make no trial; summarise those that are there")
+    add("--build", type=Path, default=BUILD, help="where finished trials are kept")
+    for each in fields(Scale):
+        add(f"--{each.name}", type=int, default=each.default, help="trials, see diagnosis_plan.py")
+    return made.parse_args(words)
+
+
+def main() -> None:
+    """Make the trials that are missing, then write what all of them say."""
+    options = options_of()
+    # Trials run side by side in processes of their own, whose libraries get by with a thread.
+    for name in _THREADS:
+        os.environ.setdefault(name, "1")
+    from hidden.effects import LISTED, UNLISTED
+
+    scale = Scale(**{each.name: getattr(options, each.name) for each in fields(Scale)})
+    jobs = plan(scale, LISTED, UNLISTED, quick=options.quick)
+    desk = Desk(folder=options.build, marks=diagnosis_trial.marks(SECTIONS))
+    deadline_s = time.monotonic() + 60 * options.minutes
+    todo = [] if options.report else missing(jobs, desk, options.sections)
+    alone = [job for job in todo if job.section == TIME]
+    together = [job for job in todo if job.section != TIME]
+    for part, workers in ((together, options.workers), (alone, 1)):
+        if part:
+            work(part, desk, workers=workers, deadline_s=deadline_s)
+    full = plan(Scale(), LISTED, UNLISTED, quick=options.quick)
+    publish(summary(desk, full), places(options))
+    if stale := sum(map(desk.n_stale, SECTIONS)):
+        print(f"{stale} trials were made by other code and do not count.", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()
