@@ -59,7 +59,7 @@ def test_theory_is_the_standard_normal():
 
 
 def test_centre_and_spread_by_hand():
-    """z of 0 and 4: centre 2, squares 8; with twenty of theory sqrt(28 / 21)."""
+    """With z of 0 and 4: centre 2, squares 8; with twenty of theory sqrt(28 / 21)."""
     null = from_replicates(np.array([[0.0, 1.0], [4.0, 1.0]]))
     assert null.centre == pytest.approx([2.0, 1.0])
     assert null.spread == pytest.approx([math.sqrt(28 / 21), math.sqrt(20 / 21)])

@@ -210,7 +210,7 @@ def test_an_empty_room_by_hand(two_rooms, make_natural):
 
 
 def test_a_lapse_is_a_share_of_uniform_headings(scene, model):
-    """p = 0.9 f + 0.1 / 2 pi, and the probability of no lapse is 0.9 f / p."""
+    """By hand, p = 0.9 f + 0.1 / 2 pi, and the probability of no lapse is 0.9 f / p."""
     view, turns = view_of(scene, model), zone_turns(scene)[2]
     x = start_of(model)[2].copy()
     x[-1] = 0.0
@@ -320,7 +320,9 @@ def test_a_simulated_effect_is_found_again(two_rooms, model, name, values, key):
     assert abs(fitted.parameters.effects[name][key] - values[key]) < 4 * error
     assert 0 < error < values[key] / 12
     assert fitted.nats > maximise(scene, model).nats + 20
-    assert fitted.effect_scores.sum() == pytest.approx(0.0, abs=0.1 * abs(fitted.effect_scores).sum())
+    assert fitted.effect_scores.sum() == pytest.approx(
+        0.0, abs=0.1 * abs(fitted.effect_scores).sum()
+    )
 
 
 def test_what_is_not_free_stays(scene, model):

@@ -111,7 +111,9 @@ def test_nothing_moves_across_a_missing_sample(two_rooms):
 
 def test_an_unknown_speed_is_a_middling_one(two_rooms):
     """So that nobody attends to a fish more or less for having been lost."""
-    scene = make_scene(samples_of(line((0.2, 0.75), 5), line((0.2, 0.7), 5, step_m=0.02)), two_rooms)
+    scene = make_scene(
+        samples_of(line((0.2, 0.75), 5), line((0.2, 0.7), 5, step_m=0.02)), two_rooms
+    )
     assert scene.states[0, SPEED] == pytest.approx([0.075, 0.075])
 
 

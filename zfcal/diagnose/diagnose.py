@@ -68,6 +68,8 @@ _NOTICED = 5.0
 _UNEXPLAINED = 1e-3
 _CONTROL = 4.5
 _ASSUMED_NOISE_M = 0.0
+_SHARP_M = 1e-4
+"""Positions so sharp are those of the theory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +104,7 @@ class _Case:
             samples=self.question.samples,
             arena=self.question.arena,
             fitted=self.screen.fitted,
-            measurement=Measurement(noise_m=_noise(self.question)),
+            measurement=Measurement(noise_m=_noise(self.question), grain_m=self.question.grain_m),
             seed=self.question.seed,
         )
 
@@ -136,7 +138,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
             candidates=case.listed, names=names, null=_null([row.listed for row in rows], names)
         ),
         rivals=lambda screen: _rivals(case, screen),
-        suspicious=omnibus.p < _UNEXPLAINED,
+        suspicious=_is_suspicious(question, omnibus),
         n_workers=question.n_workers,
         told=tell,
     )
@@ -148,6 +150,13 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         omnibus = judge(final[1], [row.at_large[1] for row in rows if row.at_large])
     where = _where(own[0], rows)
     return _diagnosis(case, rows, selection, (kept, confirmed[: len(kept)]), (where, omnibus))
+
+
+def _is_suspicious(question: Question, omnibus: Omnibus) -> bool:
+    """Tell whether model and data disagree at all; noise does, for the theory alone."""
+    noise_m = math.inf if question.noise_m is None else question.noise_m
+    sees = not question.quick or noise_m <= _SHARP_M
+    return sees and omnibus.p < _UNEXPLAINED
 
 
 def _best_shapes(scores: Sequence[Score]) -> tuple[Candidate, ...]:
@@ -269,7 +278,7 @@ def _diagnosis(
     final = steps[-1].choice.best.screen if steps else case.screen
     screened = _screened(case, selection.screened)
     return Diagnosis(
-        verdict=_verdict(effects, screened, omnibus),
+        verdict=_verdict(effects, screened, suspicious=_is_suspicious(case.question, omnibus)),
         where=where,
         effects=effects,
         screened=screened,
@@ -297,11 +306,11 @@ def _effect(step: Step, held: Confirmed) -> EffectFound:
 
 
 def _verdict(
-    effects: tuple[EffectFound, ...], screened: tuple[Screened, ...], omnibus: Omnibus
+    effects: tuple[EffectFound, ...], screened: tuple[Screened, ...], *, suspicious: bool
 ) -> Verdict:
     if effects:
         return Verdict.TIE if effects[0].ties else Verdict.NAMED
-    if omnibus.p < _UNEXPLAINED:
+    if suspicious:
         return Verdict.UNEXPLAINED
     asked = [each for each in screened if each.lacks is None]
     blind = [each for each in asked if each.minutes_needed is not None]

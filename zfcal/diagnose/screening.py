@@ -279,7 +279,12 @@ class Screen:
     @cached_property
     def own_speeds(self) -> Floats:
         """Speeds with the model's effects divided out, in m/s, shape (move,)."""
-        return self.scene.moves.speed_m_s / self.speed_factor(self._moves)
+        return self.scene.moves.speed_m_s / self.model_factor
+
+    @cached_property
+    def model_factor(self) -> Floats:
+        """What the model's own effects make of the speed of each move, shape (move,)."""
+        return self.speed_factor(self._moves)
 
     def speed_factor(self, packed: Packed) -> Floats:
         """Return the factor of a model's effects on the speed of each move."""

@@ -102,7 +102,7 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     if candidate.effect.stops:
         return _fit_stops(screen, candidate)
     moves = screen.scene.moves
-    before = screen.scene.moves.speed_m_s / screen.own_speeds
+    before = screen.model_factor
     without = log_density(moves.speed_m_s, before, moves.zone)
     low, high = bounds_of(candidate.name, candidate.effect.strength)
 
