@@ -367,5 +367,5 @@ def test_effects_come_and_go(model):
 
 
 def test_units_of_a_fit():
-    """kappa of the base and of the neighbours in units of 30, alpha of 50."""
+    """The kappa of the base and of the neighbours in units of 30, alpha of 50."""
     assert SCALES.tolist() == [30.0, 30.0, 50.0]
