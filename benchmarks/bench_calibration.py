@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from measuring import load, machine, table
-from regressions import Ratio, conclude, is_tiny, parser
+from regressions import Ratio, conclude, parser
 from synthetic import two_rooms
 
 from zfcal.calibrate.evolve import Evaluate
@@ -264,7 +264,7 @@ def _prose(text: str) -> str:
 def main() -> None:
     """Measure, write both files, and compare with the committed results."""
     options = parser(__doc__).parse_args()
-    found = measure(Effort(budget_s=6, bred=40) if is_tiny(options) else Effort())
+    found = measure(Effort(budget_s=6, bred=40) if options.tiny else Effort())
     conclude("calibration", found, markdown(found), ratios=ratios, options=options)
 
 

@@ -22,7 +22,7 @@ import growth_document
 import numpy as np
 import shapely
 from measuring import load, machine, processor_s
-from regressions import Ratio, conclude, parser, places, read
+from regressions import Ratio, conclude, parser, places, written
 
 from zfcal.arena import Arena, make_arena
 from zfcal.artifacts.arenas import load_arena
@@ -340,19 +340,11 @@ def main() -> None:
         "--only", help="Measure one part anew, the rest is as written: agents, duration, ..."
     )
     options = options_of.parse_args()
-    place = places(options)
-    known: dict[str, Any] = {}
-    if options.draw or options.only:
-        written = read("growth", place.results)
-        if written is None:
-            raise SystemExit(
-                f"{place.results} has no growth.json; --write takes the committed one."
-            )
-        known = written
+    known = written("growth", options) if options.draw or options.only else {}
     found = known
     if not options.draw:
         found = measure(TINY if options.tiny else Effort(), known=known, only=options.only)
-    growth_document.draw(found, place.docs / "pictures" / "growth.png")
+    growth_document.draw(found, places(options).docs / "pictures" / "growth.png")
     conclude(
         "growth",
         found,

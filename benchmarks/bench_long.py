@@ -1,8 +1,10 @@
 """Measure every command on half an hour and on a day: processor time and largest memory.
 
-Writes ``benchmarks/results/long.json`` and ``docs/benchmarks-long.md``.
+Makes ``long.json`` and ``benchmarks-long.md``: in ``build/benchmarks``, with ``--write``
+in ``benchmarks/results`` and ``docs``. The day is measured with ``--day``, and with ``--write``.
 
     .venv/bin/python benchmarks/bench_long.py
+    .venv/bin/python benchmarks/bench_long.py --day
     .venv/bin/python benchmarks/bench_long.py --before ../older-checkout
 
 With an older checkout every command is run by it as well, in turn, and what both have
@@ -12,7 +14,6 @@ made is compared byte by byte.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import resource
 import shutil
@@ -27,7 +28,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from measuring import DOCS, RESULTS, ROOT, keep, load, machine, table
+from measuring import ROOT, keep, load, machine, table
+from regressions import BUILD, Ratio, conclude, parser, written
 
 from zfcal.artifacts.atomic import sha256_of
 from zfcal.artifacts.tables import read_tracks
@@ -60,10 +62,8 @@ class Length:
     imported: bool = False
 
 
-LENGTHS = (
-    Length(name="half an hour at 15 Hz", duration="30min", fps=15, imported=True),
-    Length(name="a day at 3 Hz", duration="24h", fps=3),
-)
+HALF_AN_HOUR = Length(name="half an hour at 15 Hz", duration="30min", fps=15, imported=True)
+DAY = Length(name="a day at 3 Hz", duration="24h", fps=3)
 TINY = (Length(name="three minutes at 15 Hz", duration="3min", fps=15, imported=True),)
 
 
@@ -251,22 +251,43 @@ def _is_memory(cell: object) -> bool:
     return isinstance(cell, float) and cell >= 100
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return time and memory of every command over those of the first one of the same length.
+
+    That is the import, or the simulation where nothing was imported.
+    """
+    made = {}
+    for each in found["lengths"]:
+        rows = {row["command"]: row["now"] for row in each["rows"]}
+        base = next(name for name in ("import, from CSV", "simulate") if name in rows)
+        for what, key in (("time", "processor_s"), ("memory", "peak_mb")):
+            for command, row in rows.items():
+                if command not in {base, "simulate"}:
+                    name = f"{each['name']}, {what}: {command} over {base}"
+                    made[name] = Ratio(value=row[key] / rows[base][key])
+    return made
+
+
+def lengths_of(options: argparse.Namespace) -> tuple[Length, ...]:
+    """Return what is measured with these options."""
+    if options.tiny:
+        return TINY
+    return (HALF_AN_HOUR, DAY) if options.day or options.write else (HALF_AN_HOUR,)
+
+
 def main() -> None:
-    """Measure, or write again what was measured."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
-    parser.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
-    parser.add_argument("--before", type=Path, help="An older checkout to compare with.")
-    parser.add_argument("--out", type=Path, help="Write both files there.")
-    options = parser.parse_args()
-    results = options.out or RESULTS
+    """Measure, or read again what was measured, write both files, and compare."""
+    options_of = parser(__doc__)
+    options_of.add_argument("--day", action="store_true", help="Measure a day, too.")
+    options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options_of.add_argument("--before", type=Path, help="An older checkout to compare with.")
+    options = options_of.parse_args()
     if options.draw:
-        found = json.loads((results / "long.json").read_text(encoding="utf-8"))
+        found = written("long", options)
     else:
-        found = measure(TINY if options.tiny else LENGTHS, options.before, results)
-    text = markdown(found)
-    ((options.out or DOCS) / "benchmarks-long.md").write_text(text, encoding="utf-8")
-    print(text)
+        # The committed results stay as they are until they have been compared with.
+        found = measure(lengths_of(options), options.before, options.out or BUILD)
+    conclude("long", found, markdown(found), ratios=ratios, options=options)
 
 
 if __name__ == "__main__":

@@ -9,18 +9,19 @@ Makes ``main_job.json`` and ``benchmarks-main-job.md``: in ``build/benchmarks``,
 from __future__ import annotations
 
 import os
-import platform
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from regressions import Ratio, conclude, parser
+from measuring import load, machine
+from regressions import Ratio, conclude, parser, written
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import measure
@@ -33,81 +34,132 @@ from zfcal.model.steps import steps_of
 from zfcal.parameters import Parameters, gene_names, natural, to_genes
 from zfcal.tracks import Samples
 
-ZFCAL = str(Path(sys.executable).parent / "zfcal")
 ARENA = load_arena("two-rooms", Path())
 TRUTH = natural(tuple((zone.name, zone.follows_walls) for zone in ARENA.zones), dt_s=0.2)
 
 
-def _zfcal(*words: str | Path) -> None:
-    subprocess.run(
-        [ZFCAL, *map(str, words)],
-        check=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """What is measured.
+
+    Parameters
+    ----------
+    starts
+        The median of so many counts, of ``--help`` and of ``simulate``.
+    analysed
+        Duration of the trial that is analysed, as `zfcal simulate` takes it.
+    repeats
+        Of analyse and of the kernel.
+    runs
+        Simulated by the kernel at a time.
+    generations
+        Of the default schedule and of the authors'.
+    seeds
+        A recording each, of which parameters are recovered.
+    searched
+        Generations of the search that recovers them.
+    n_windows
+        Simulated for its ceiling.
+    """
+
+    starts: int = 11
+    analysed: str = "30min"
+    repeats: int = 5
+    runs: int = 20
+    generations: tuple[int, int] = (12, 3)
+    seeds: tuple[int, ...] = (11, 12, 13)
+    searched: int = 60
+    n_windows: int = 40
 
 
-def start_up() -> dict[str, float]:
-    """Return the median wall-clock time of ``zfcal --help`` over 11 starts."""
-    times = []
-    for _ in range(11):
-        begin = time.perf_counter()
-        _zfcal("--help")
-        times.append(time.perf_counter() - begin)
-    return {"help_s": statistics.median(times)}
+TINY = Effort(
+    starts=1,
+    analysed="3min",
+    repeats=1,
+    runs=2,
+    generations=(1, 1),
+    seeds=(11,),
+    searched=1,
+    n_windows=2,
+)
 
 
-def analyse() -> dict[str, float]:
+def _zfcal(*words: str | Path | int) -> tuple[float, float, float]:
+    """Run a command as a process; return wall clock and processor in seconds, memory in MB."""
+    begin = time.perf_counter()
+    line = [sys.executable, "-m", "zfcal_cli.main", *map(str, words)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(line, **quiet) as process:
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(line)}: exit code {process.returncode}")
+    took_s = time.perf_counter() - begin
+    return took_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+
+
+def start_up(effort: Effort) -> dict[str, float]:
+    """Return the median time of ``--help`` and of a first simulation, each in a new process.
+
+    Of the simulation, a minute of five agents with kernels that were compiled before, the
+    processor time as well: others at work lengthen the wall clock much and this little.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial"
+        _zfcal("init", trial, "--arena", "two-rooms", "--fish", 4, "--robot")
+        model = trial / "models" / "000000.toml"
+        swim = ("--model", model, "--duration", "60s")
+        _zfcal("simulate", Path(folder) / "warm", *swim)
+        helped = [_zfcal("--help") for _ in range(effort.starts)]
+        swum = [_zfcal("simulate", Path(folder) / f"{n}", *swim) for n in range(effort.starts)]
+    return {
+        "help_s": statistics.median(took[0] for took in helped),
+        "help_processor_s": statistics.median(took[1] for took in helped),
+        "simulate_s": statistics.median(took[0] for took in swum),
+        "simulate_processor_s": statistics.median(took[1] for took in swum),
+        "load": load(),
+    }
+
+
+def analyse(effort: Effort) -> dict[str, float]:
     """Return time and peak memory of analyse on 30 min of 5 agents at 15 Hz."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial"
-        tank = ("--arena", "two-rooms", "--fish", "4", "--robot", "--fps", "15")
+        _zfcal("init", trial, "--arena", "two-rooms", "--fish", 4, "--robot", "--fps", 15)
         model = trial / "models" / "000000.toml"
-        _zfcal("init", trial, *tank)
-        # In a process of its own, or its memory would count for that of analyse.
-        script = "import sys; from zfcal_cli.main import main; sys.argv[0] = 'zfcal'; main()"
-        words = ["simulate", trial, "--model", model, "--duration", "30min", "-q"]
-        pid = os.posix_spawn(
-            sys.executable, [sys.executable, "-c", script, *map(str, words)], os.environ
-        )
-        os.waitpid(pid, 0)
-        times, peaks = [], []
-        for _ in range(3):
-            begin = time.perf_counter()
-            peaks.append(_peak_kb(script, ["analyse", str(trial), "--force", "-q"]))
-            times.append(time.perf_counter() - begin)
-    return {"wall_s": statistics.median(times), "peak_mb": max(peaks) / 1024}
+        _zfcal("simulate", trial, "--model", model, "--duration", effort.analysed)
+        took = [_zfcal("analyse", trial, "--force", "-q") for _ in range(effort.repeats)]
+    return {
+        "wall_s": statistics.median(each[0] for each in took),
+        "peak_mb": max(each[2] for each in took),
+    }
 
 
-def _peak_kb(script: str, words: list[str]) -> int:
-    arguments = [sys.executable, "-c", script, *words]
-    pid = os.posix_spawn(sys.executable, arguments, os.environ)
-    return os.wait4(pid, 0)[2].ru_maxrss
-
-
-def kernel() -> dict[str, float]:
+def kernel(effort: Effort) -> dict[str, float]:
     """Return nanoseconds per agent-step of both samplers, the best of five."""
     packed = pack([TRUTH], ARENA)
     found = {}
     for threads in (1, 2):
-        seeds = np.arange(20, dtype=np.uint64)
+        seeds = np.arange(effort.runs, dtype=np.uint64)
 
         def run(threads: int = threads, seeds: np.ndarray = seeds) -> None:
             simulate_counts(packed, ARENA, n_agents=5, n_steps=9000, seeds=seeds, n_threads=threads)
 
-        found[f"exact_{threads}_core_ns"] = _best(run) / (20 * 9300 * 5) * 1e9
+        found[f"exact_{threads}_core_ns"] = (
+            _best(run, effort.repeats) / (len(seeds) * 9300 * 5) * 1e9
+        )
 
     def grid() -> None:
         simulate_tracks(TRUTH, ARENA, n_agents=5, n_steps=2000, seed=1, sampler="grid")
 
-    found["grid_1_core_ns"] = _best(grid) / (2300 * 5) * 1e9
+    found["grid_1_core_ns"] = _best(grid, effort.repeats) / (2300 * 5) * 1e9
     return found
 
 
-def _best(run: Callable[[], None]) -> float:
+def _best(run: Callable[[], None], repeats: int) -> float:
     run()
     times = []
-    for _ in range(5):
+    for _ in range(repeats):
         begin = time.perf_counter()
         run()
         times.append(time.perf_counter() - begin)
@@ -134,12 +186,13 @@ def _task(xy_m: np.ndarray, template: Parameters, seed: int, workers: int) -> Ta
     )
 
 
-def generations() -> dict[str, float]:
+def generations(effort: Effort) -> dict[str, float]:
     """Return seconds per generation of 60 individuals on all cores, champion included apart."""
     xy, _ = simulate_tracks(TRUTH, ARENA, n_agents=4, n_steps=600, seed=3)
     task = _task(xy, TRUTH, 1, os.cpu_count() or 1)
     found = {}
-    for name, runs, steps, n in (("default", 1, 3000, 12), ("authors", 10, 1800, 3)):
+    sizes = (("default", 1, 3000), ("authors", 10, 1800))
+    for (name, runs, steps), n in zip(sizes, effort.generations, strict=True):
         times = []
         for count in (0, n):
             settings = Settings(generations=count, runs=runs, steps=steps)
@@ -151,10 +204,10 @@ def generations() -> dict[str, float]:
     return found
 
 
-def recovery() -> list[dict[str, object]]:
+def recovery(effort: Effort) -> list[dict[str, object]]:
     """Return true and found parameters of three simulated half hours, both ways."""
     rows = []
-    for seed in (11, 12, 13):
+    for seed in effort.seeds:
         xy, _ = simulate_tracks(TRUTH, ARENA, n_agents=5, n_steps=9000, seed=seed)
         begin = time.perf_counter()
         by_likelihood = fit(steps_of(_samples(xy), ARENA, fov_rad=TRUTH.fov_rad), ARENA, TRUTH)
@@ -162,7 +215,7 @@ def recovery() -> list[dict[str, object]]:
         begin = time.perf_counter()
         by_score = calibrate_window(
             _task(xy, TRUTH, seed, os.cpu_count() or 1),
-            Settings(generations=60, window_s=1800.0, n_windows=40),
+            Settings(generations=effort.searched, window_s=1800.0, n_windows=effort.n_windows),
         )
         score_s = time.perf_counter() - begin
         intervals = {part.name: part for part in by_score.intervals.parameters}
@@ -202,7 +255,9 @@ def _markdown(found: dict[str, object]) -> str:
         "# The main job, measured",
         "",
         "Made by `benchmarks/bench_main_job.py`; numbers in `benchmarks/results/main_job.json`.",
-        f"Machine: {found['machine']}. It is shared: times vary by a third.",
+        f"Machine: {found['machine']}. It is shared: times vary by a third, the wall clock by",
+        "far more where the load is above the number of cores. A start is a new process, whose",
+        "kernels were compiled before; `simulate` is of a minute of five agents.",
         "",
         "| what | value |",
         "|---|---|",
@@ -254,26 +309,31 @@ def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
     return made | {"likelihood over search": Ratio(value=likelihood / score)}
 
 
+PARTS: dict[str, Callable[[Effort], Any]] = {
+    "start_up": start_up,
+    "analyse": analyse,
+    "kernel": kernel,
+    "generations": generations,
+    "recovery": recovery,
+}
+
+
 def main() -> None:
-    """Measure all, write both files, and compare."""
-    options = parser(__doc__, tiny=False).parse_args()
-    found = {
-        "machine": ", ".join(
-            (platform.machine(), f"{os.cpu_count()} cores", f"Python {platform.python_version()}")
-        ),
-        "start_up": start_up(),
-        "analyse": analyse(),
-        "kernel": kernel(),
-        "generations": generations(),
-        "recovery": recovery(),
-    }
-    conclude(
-        "main_job",
-        found,
-        _markdown(found),
-        ratios=ratios,
-        options=options,
+    """Measure all or one part, or read again what was measured, write both files, and compare."""
+    options_of = parser(__doc__)
+    options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options_of.add_argument(
+        "--only", choices=PARTS, help="Measure one part anew, the rest is as written."
     )
+    options = options_of.parse_args()
+    found = written("main_job", options) if options.draw or options.only else {}
+    if not options.draw:
+        effort = TINY if options.tiny else Effort()
+        found["machine"] = machine()
+        for name in [options.only] if options.only else PARTS:
+            print(f"{name} ...", file=sys.stderr)
+            found[name] = PARTS[name](effort)
+    conclude("main_job", found, _markdown(found), ratios=ratios, options=options)
 
 
 if __name__ == "__main__":

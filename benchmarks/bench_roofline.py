@@ -1,14 +1,13 @@
 """Measure what one agent-step needs at least, what the kernel takes, and what others take.
 
-Writes ``benchmarks/results/roofline.json`` and ``docs/roofline.md``.
+Makes ``roofline.json`` and ``benchmarks-roofline.md``: in ``build/benchmarks``, with
+``--write`` in ``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_roofline.py
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import textwrap
 import time
 from collections.abc import Callable
@@ -17,7 +16,8 @@ from typing import Any
 
 import naive
 import numpy as np
-from measuring import DOCS, RESULTS, keep, load, machine, table
+from measuring import load, machine, table
+from regressions import Ratio, conclude, parser, written
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.compiled import kernel, lean
@@ -194,6 +194,11 @@ def needs(found: dict[str, Any]) -> list[tuple[str, float, float]]:
     ]
 
 
+def bound_ns(found: dict[str, Any]) -> float:
+    """Return the least that an agent-step takes, in nanoseconds."""
+    return sum(times * cost for _, times, cost in needs(found))
+
+
 def prose(text: str) -> str:
     """Return a paragraph."""
     return textwrap.fill(" ".join(text.split()), 120) + "\n"
@@ -202,7 +207,7 @@ def prose(text: str) -> str:
 def markdown(found: dict[str, Any]) -> str:
     """Return the tables of what was measured, and what they say."""
     ns, rows = found["ns"], needs(found)
-    bound = sum(times * cost for _, times, cost in rows)
+    bound = bound_ns(found)
     others = [
         ("the kernel", ns["kernel"]),
         ("the same law written plainly, compiled (`benchmarks/naive.py`)", ns["naive"]),
@@ -256,24 +261,31 @@ def markdown(found: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return the kernel over its bound and over the other samplers, and two threads over one."""
+    ns = found["ns"]
+    over = {
+        "the kernel over the bound": bound_ns(found),
+        "the kernel over the same law written plainly": ns["naive"],
+        "the kernel over the grid sampler": ns["grid"],
+    }
+    return {name: Ratio(value=ns["kernel"] / other) for name, other in over.items()} | {
+        "speed of two threads over one": Ratio(value=found["scaling"]["ratio"], better="more")
+    }
+
+
 def main() -> None:
-    """Measure, or write again what was measured."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
-    parser.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
-    parser.add_argument("--out", type=Path, help="Write all files there.")
-    options = parser.parse_args()
-    results = options.out or RESULTS
+    """Measure, or read again what was measured, write both files, and compare."""
+    options_of = parser(__doc__)
+    options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options = options_of.parse_args()
     if options.draw:
-        found = json.loads((results / "roofline.json").read_text(encoding="utf-8"))
+        found = written("roofline", options)
     else:
         found = {"machine": machine(), "load_before": load()}
         found |= measure(repeats=1 if options.tiny else 25, size=4000 if options.tiny else 100_000)
         found["load_after"] = load()
-        keep("roofline", found, results=results)
-    text = markdown(found)
-    ((options.out or DOCS) / "roofline.md").write_text(text, encoding="utf-8")
-    print(text)
+    conclude("roofline", found, markdown(found), ratios=ratios, options=options)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,18 @@
 """Measure S over the rounds of a calibration, with and without the likelihood estimate.
 
 Simulated trials whose true models differ are calibrated window by window, each round
-starting from the one before, as online. Writes ``benchmarks/results/rounds.json``,
-``docs/pictures/rounds.png`` and ``docs/benchmarks-rounds.md``.
+starting from the one before, as online. Makes ``rounds.json``, ``pictures/rounds.png``
+and ``benchmarks-rounds.md``: in ``build/benchmarks``, with ``--write`` in
+``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_rounds.py
+    .venv/bin/python benchmarks/bench_rounds.py --write
     .venv/bin/python benchmarks/bench_rounds.py --real ../shared/data
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 import subprocess
 import sys
@@ -24,7 +25,8 @@ from typing import Any
 
 import numpy as np
 import rounds_document
-from measuring import DOCS, RESULTS, keep, load, machine
+from measuring import load, machine
+from regressions import Ratio, conclude, parser, places, written
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import read_model, write_model
@@ -86,7 +88,7 @@ class Effort:
         Times that a new process estimates by likelihood.
     """
 
-    seeds: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    seeds: tuple[int, ...] = (1, 2)
     last_s: int = 480
     generations: int = DEFAULT_GENERATIONS
     processes: int = 3
@@ -101,6 +103,9 @@ class Effort:
         """How much a round does."""
         return Settings(generations=self.generations)
 
+
+FULL = Effort(seeds=(1, 2, 3, 4, 5, 6))
+"""What is committed."""
 
 TINY = Effort(seeds=(1, 2), last_s=180, generations=1, processes=1)
 
@@ -322,29 +327,52 @@ def measure(effort: Effort) -> dict[str, Any]:
     return found
 
 
+def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
+    """Return S of each trial against what it is measured by, and what the estimate takes.
+
+    By trial, so that a run on some of the committed trials is compared with these.
+    """
+    made = {}
+    for trial in found["simulated"]:
+        guided, alone, ceiling = (
+            float(rounds_document.of_trials([trial], who, key)[0])
+            for who, key in (("guided", "S"), ("alone", "S"), ("guided", "ceiling"))
+        )
+        name = f"trial {trial['seed']}: S with the estimate over"
+        made[f"{name} S without"] = Ratio(value=guided / alone, better="more")
+        made[f"{name} the ceiling"] = Ratio(value=guided / ceiling, better="more")
+    times = {key: values[-1] for key, values in found["likelihood_times"].items()}
+    first_s, later_s = times["cold_median_s"], times["warm_median_s"]
+    return made | {
+        "the first estimate of a process over a later one": Ratio(value=first_s / later_s),
+        "processor seconds of an estimate": Ratio(value=later_s),
+    }
+
+
+def effort_of(options: argparse.Namespace) -> Effort:
+    """Return what is measured with these options; what is to be committed is measured in full."""
+    if options.tiny:
+        return TINY
+    return FULL if options.full or options.write else Effort()
+
+
 def main() -> None:
-    """Measure, or draw again what was measured, and write the three files."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
-    parser.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
-    parser.add_argument("--real", type=Path, help="Measure the real recordings there, alone.")
-    parser.add_argument("--times", action="store_true", help="Time the estimate anew, alone.")
-    parser.add_argument("--out", type=Path, help="Write all files there.")
-    options = parser.parse_args()
-    results, effort = options.out or RESULTS, TINY if options.tiny else Effort()
-    place = results / "rounds.json"
-    known = json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
+    """Measure, or draw again what was measured, write the three files, and compare."""
+    options_of = parser(__doc__)
+    options_of.add_argument("--full", action="store_true", help="All trials, as --write does.")
+    options_of.add_argument("--draw", action="store_true", help="Measure nothing; read the JSON.")
+    options_of.add_argument("--real", type=Path, help="Measure the real recordings there, alone.")
+    options_of.add_argument("--times", action="store_true", help="Time the estimate anew, alone.")
+    options = options_of.parse_args()
+    effort, place = effort_of(options), places(options)
+    anew = not (options.draw or options.real or options.times)
+    found = measure(effort) if anew else written("rounds", options)
     if options.real:
-        known["recorded"] = recorded(options.real, effort)
+        found["recorded"] = recorded(options.real, effort)
     elif options.times:
-        known["likelihood_times"] = likelihood_times(effort)
-    elif not options.draw:
-        known |= measure(effort)
-    keep("rounds", known, results=results)
-    rounds_document.draw(known, (options.out or DOCS / "pictures") / "rounds.png")
-    text = rounds_document.markdown(known)
-    ((options.out or DOCS) / "benchmarks-rounds.md").write_text(text, encoding="utf-8")
-    print(text)
+        found["likelihood_times"] = likelihood_times(effort)
+    rounds_document.draw(found, place.docs / "pictures" / "rounds.png")
+    conclude("rounds", found, rounds_document.markdown(found), ratios=ratios, options=options)
 
 
 if __name__ == "__main__":

@@ -102,29 +102,21 @@ def _factor(fresh: Ratio, committed: Ratio) -> float:
     return above / below if below > 0 else math.nan
 
 
-def parser(doc: str | None, *, tiny: bool = True) -> argparse.ArgumentParser:
+def parser(doc: str | None) -> argparse.ArgumentParser:
     """Return the options that all benchmarks have.
 
     Parameters
     ----------
     doc
         The script's docstring; its first line is shown.
-    tiny
-        Whether the script can measure next to nothing.
     """
     made = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
-    if tiny:
-        made.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
+    made.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
     made.add_argument(
         "--write", action="store_true", help="Renew the committed results and documentation."
     )
     made.add_argument("--out", type=Path, help="Write all files there.")
     return made
-
-
-def is_tiny(options: argparse.Namespace) -> bool:
-    """Return whether the run is only to see whether it runs."""
-    return getattr(options, "tiny", False)
 
 
 def places(options: argparse.Namespace) -> Places:
@@ -135,7 +127,7 @@ def places(options: argparse.Namespace) -> Places:
     SystemExit
         A tiny run is to be committed.
     """
-    if options.write and is_tiny(options):
+    if options.write and options.tiny:
         raise SystemExit("What --tiny measures is not worth keeping: leave out --write.")
     if options.out is not None:
         return Places(results=options.out, docs=options.out)
@@ -148,6 +140,21 @@ def read(name: str, folder: Path | None = None) -> dict[str, Any] | None:
     """Return what was measured, the committed results by default; None if there is nothing."""
     path = (folder or RESULTS) / f"{name}.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+
+
+def written(name: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Return what an earlier run with the same place has measured.
+
+    Raises
+    ------
+    SystemExit
+        There is nothing.
+    """
+    folder = places(options).results
+    found = read(name, folder)
+    if found is None:
+        raise SystemExit(f"{folder} has no {name}.json; --write takes the committed one.")
+    return found
 
 
 def report(name: str, fresh: Mapping[str, Ratio], committed: Mapping[str, Ratio]) -> str:
@@ -199,7 +206,7 @@ def conclude(
     document = place.docs / f"benchmarks-{name.replace('_', '-')}.md"
     document.write_text(text, encoding="utf-8")
     print(text)
-    if is_tiny(options):
+    if options.tiny:
         print(f"Kept in {document}; a tiny run is not compared.\n")
         return
     print(f"Kept in {document}. Against the committed results:\n")

@@ -182,7 +182,8 @@ def _head(found: dict[str, Any]) -> list[str]:
         _prose(
             f"""Made by `benchmarks/bench_rounds.py`; numbers in `benchmarks/results/rounds.json`.
             Machine: {found["machine"]}; {found["took_s"]:.0f} s, {found["processor_s"]:.0f} s of
-            processor time."""
+            processor time. With `--write` or `--full` all six trials are measured, which is what
+            is committed; by default the first two, in a third of the time."""
         ),
         _prose(
             f"""{found["n_trials"]} simulated trials of four fish and a robot in `two-rooms`, the

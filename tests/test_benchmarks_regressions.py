@@ -1,6 +1,5 @@
 """Where a benchmark's results go, and what it says of those that became worse."""
 
-import argparse
 import importlib
 import json
 import math
@@ -8,8 +7,11 @@ import sys
 
 import pytest
 
-SCRIPTS = ("bench_cluster", "bench_growth", "bench_main_job", "growth_document", "measuring",
-           "regressions")  # fmt: skip
+COMMITTED = ("calibration", "cluster", "growth", "long", "main_job", "optimisers", "roofline",
+             "rounds")  # fmt: skip
+
+SCRIPTS = (*(f"bench_{name}" for name in COMMITTED), "growth_document", "measuring", "naive",
+           "optimisers", "optimisers_document", "regressions", "rounds_document")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -116,16 +118,34 @@ def test_a_tiny_run_is_neither_compared_nor_committed(regressions, tmp_path, cap
         finish(regressions, {"a": 9.0, "b": 2.0}, "--tiny", "--write")
 
 
-@pytest.mark.parametrize("name", ["cluster", "growth", "main_job"])
+@pytest.mark.parametrize("name", COMMITTED)
 def test_the_committed_results_have_ratios(scripts, repository, name):
     """Each a positive number, and against themselves none has become worse."""
     path = repository / "benchmarks" / "results" / f"{name}.json"
     found = json.loads(path.read_text(encoding="utf-8"))
+    if name == "optimisers":
+        for package in ("cma", "pymoo", "skopt"):
+            pytest.importorskip(package, reason="in requirements-bench.lock")
     ratios = scripts(f"bench_{name}").ratios(found)
     assert ratios
     assert all(ratio.value > 0 for ratio in ratios.values())
     same = scripts("regressions").changes(ratios, ratios)
     assert [change.factor for change in same] == [1.0] * len(ratios)
+
+
+def test_every_benchmark_has_committed_results(repository):
+    """What make bench runs, and nothing else."""
+    found = sorted(path.stem for path in (repository / "benchmarks").glob("bench_*.py"))
+    assert found == [f"bench_{name}" for name in COMMITTED]
+
+
+def test_what_an_earlier_run_has_written(regressions, tmp_path):
+    """Where a run with the same options puts it; without one it is said where."""
+    options = regressions.parser("Measure two things.").parse_args([])
+    with pytest.raises(SystemExit, match=r"build has no two\.json"):
+        regressions.written("two", options)
+    finish(regressions, {"a": 1.0, "b": 2.0})
+    assert regressions.written("two", options) == {"a": 1.0, "b": 2.0}
 
 
 def test_a_cluster_that_became_slower_is_noticed(scripts, repository):
@@ -138,11 +158,3 @@ def test_a_cluster_that_became_slower_is_noticed(scripts, repository):
     ratios = scripts("bench_cluster").ratios
     found = scripts("regressions").changes(ratios(fresh), ratios(committed))
     assert {c.name.partition(": ")[2] for c in found if c.is_worse} == {"cluster, 2 workers"}
-
-
-def test_options_of_a_benchmark_without_a_tiny_run(scripts):
-    """It does not offer what it cannot do."""
-    module = scripts("regressions")
-    options = module.parser("Measure.", tiny=False).parse_args([])
-    assert isinstance(options, argparse.Namespace)
-    assert not module.is_tiny(options)

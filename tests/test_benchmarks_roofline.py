@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-SCRIPTS = ("bench_roofline", "naive", "measuring")
+SCRIPTS = ("bench_roofline", "naive", "measuring", "regressions")
 
 
 @pytest.fixture(scope="module")
@@ -20,21 +20,29 @@ def roofline(repository):
         sys.modules.pop(name, None)
 
 
+FOUND = {
+    "machine": "a machine", "load_before": 0.1, "load_after": 0.2, "words": 7.3,
+    "ns": {"turn": 20.0, "word": 1.0, "angle": 5.0, "zone": 4.0, "wall": 8.0,
+           "kernel": 220.0, "naive": 1100.0, "grid": 11_000.0},
+    "scaling": {"one_s": 1.0, "two_s": 0.5, "ratio": 2.0},
+}  # fmt: skip
+
+
 def test_the_bound_adds_up_what_a_step_needs(roofline):
     """20 + 3 * 1 + 4 * 5 + 4 + 8 = 55 ns of 220 are a quarter."""
-    found = {
-        "machine": "a machine", "load_before": 0.1, "load_after": 0.2, "words": 7.3,
-        "ns": {"turn": 20.0, "word": 1.0, "angle": 5.0, "zone": 4.0, "wall": 8.0,
-               "kernel": 220.0, "naive": 1100.0, "grid": 11_000.0},
-        "scaling": {"one_s": 1.0, "two_s": 0.5, "ratio": 2.0},
-    }  # fmt: skip
-
-    text = " ".join(roofline.markdown(found).split())
+    text = " ".join(roofline.markdown(FOUND).split())
 
     assert "Together 55 ns" in text
     assert "the bound is 25 %" in text
     assert "| 1,100 | 5 |" in text
     assert "2.00 times as fast" in text
+
+
+def test_the_kernel_is_compared_with_what_is_beside_it(roofline):
+    """220 ns over 55, 1,100 and 11,000; two threads at twice the speed are better."""
+    found = roofline.ratios(FOUND)
+    assert [ratio.value for ratio in found.values()] == pytest.approx([4.0, 0.2, 0.02, 2.0])
+    assert [ratio.better for ratio in found.values()] == ["less"] * 3 + ["more"]
 
 
 def test_the_plain_programs_solid_angles_are_the_published_ones(roofline):

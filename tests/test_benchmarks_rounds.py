@@ -8,7 +8,7 @@ import pytest
 
 from zfcal.parameters import natural, to_genes
 
-SCRIPTS = ("bench_rounds", "rounds_document", "measuring")
+SCRIPTS = ("bench_rounds", "rounds_document", "measuring", "regressions")
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +81,29 @@ def test_true_models_differ_and_stay_within_bounds(rounds):
     assert ((genes > 0) & (genes <= 1)).all()
     spread = np.log(genes[:, 0] / to_genes(start)[0]).std()
     assert spread == pytest.approx(rounds.SPREAD, rel=0.35)
+
+
+def test_each_trial_is_compared_with_itself(rounds, trials):
+    """S 0.85 over 0.7 in the first, 0.65 over 0.6 in the second; 2 s against 0.5 s."""
+    for trial, ceiling in zip(trials, (1.0, 0.5), strict=True):
+        trial["seed"] = 4
+        for row in trial["guided"]:
+            row["ceiling"] = ceiling
+    times = {"load": [3.0], "cold_median_s": [9.0, 2.0], "warm_median_s": [3.0, 0.5],
+             "warm_largest_s": [4.0, 0.7]}  # fmt: skip
+    first, second = (
+        [r.value for r in rounds.ratios({"simulated": [t], "likelihood_times": times}).values()]
+        for t in trials
+    )
+    assert first == pytest.approx([0.85 / 0.7, 0.85, 4.0, 0.5])
+    assert second == pytest.approx([0.65 / 0.6, 1.3, 4.0, 0.5])
+
+
+@pytest.mark.parametrize(("words", "n"), [([], 2), (["--full"], 6), (["--write"], 6)])
+def test_what_is_committed_is_measured_in_full(rounds, words, n):
+    """And what is measured by default is among it, to be compared with."""
+    options_of = rounds.parser(rounds.__doc__)
+    options_of.add_argument("--full", action="store_true")
+    seeds = rounds.effort_of(options_of.parse_args(words)).seeds
+    assert len(seeds) == n
+    assert set(seeds) <= set(rounds.FULL.seeds)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import kernel
+from zfcal.model.compiled import inlined, kernel
 from zfcal.model.geometry import Tank, zone_of
 from zfcal.model.kernels.hooks import call_component, call_factor, call_sight, call_speed
 from zfcal.model.kernels.perception import make_sight, see
@@ -205,6 +205,18 @@ def ask_components(
             row[i * n + j] = 0.0
 
 
+@inlined
+def _cell_zone(share: NDArray[np.uint8], probability: Floats, s: int, g: int) -> int:
+    """Return the zone with most of a cell; 0 for none, or where hardly any heading is taken."""
+    zone, most = 0, 0
+    for z in range(share.shape[2]):
+        if share[s, g, z] > most:
+            most, zone = share[s, g, z], z + 1
+    if probability.shape[0] > 0 and probability[s, g] < _HARDLY:
+        zone = 0
+    return zone
+
+
 @kernel
 def ask_factors(
     states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
@@ -238,13 +250,8 @@ def ask_factors(
         for g in range(-1, cells):
             ux, uy, zone = taken[s, 0], taken[s, 1], landing[s]
             if g >= 0:
-                ux, uy, zone, most = gx[g], gy[g], 0, 0
-                for z in range(share.shape[2]):
-                    if share[s, g, z] > most:
-                        most, zone = share[s, g, z], z + 1
+                ux, uy, zone = gx[g], gy[g], _cell_zone(share, probability, s, g)
             product = 1.0
-            if g >= 0 and probability.shape[0] > 0 and probability[s, g] < _HARDLY:
-                zone = 0
             if zone > 0:
                 for h in range(packed.factors.shape[0]):
                     product *= call_factor(
