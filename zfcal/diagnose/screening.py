@@ -163,13 +163,21 @@ class Screen:
         """Probability of each cell of headings, shape (turn, cell)."""
         return self._tables.probability
 
-    def project(self, scores: Floats) -> Floats:
-        """Return scores of turns less what the model's own parameters could explain."""
+    def project(self, scores: Floats, *, off_effects: bool = True) -> Floats:
+        """Return scores of turns less what the model's own parameters could explain.
+
+        Parameters
+        ----------
+        scores : ndarray, shape (turn,)
+        off_effects
+            Whether the parameters of its effects count as well as the base's. Projected
+            off itself the score of an effect in the model is nothing, however it fits.
+        """
         rest = np.where(self.fitted.used, scores, 0.0)
         zones, psi = self._bases
         for basis, turns in zip(zones, self.fitted.turns, strict=True):
             rest[turns.rows] -= basis @ (basis.T @ rest[turns.rows])
-        return np.asarray(rest - psi @ (psi.T @ rest))
+        return np.asarray(rest - psi @ (psi.T @ rest)) if off_effects else rest
 
     def ask(self, candidate: Candidate) -> Score:
         """Return the score of one candidate."""
