@@ -272,7 +272,7 @@ def _turns(parts: _Parts, arena: Arena, dt_s: float) -> Turns:
         share=share,
     )
     # A jump into a far corner can miss it at all headings that are looked at.
-    return turns.take(share.any(axis=(1, 2)))
+    return turns.take(np.flatnonzero(share.any(axis=(1, 2))))
 
 
 def thin(scene: Scene, rows: NDArray[np.bool_], moves: NDArray[np.bool_]) -> Scene:
