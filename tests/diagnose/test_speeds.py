@@ -18,7 +18,7 @@ def test_uniform_draws_have_a_flat_density():
 
 
 def test_a_factor_is_divided_out():
-    """Log f(v) = log f0(v / factor) - log factor."""
+    """As in log f(v) = log f0(v / factor) - log factor."""
     rng = np.random.default_rng(1)
     draws, zone = rng.gamma(2.0, 0.03, 3000), rng.integers(1, 4, 3000)
     alone = log_density(draws, np.ones(3000), zone)
