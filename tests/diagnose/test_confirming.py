@@ -11,6 +11,7 @@ from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene
+from zfcal.model.simulate import simulate_tracks
 
 
 def added(screen, candidate):
@@ -72,6 +73,11 @@ def test_the_halves_of_a_right_model_agree(screen):
     assert 0 < halves_note(screen(11)).values["largest"] < 4
 
 
+def test_the_halves_of_a_fish_alone_can_be_compared(screen):
+    """It says nothing of neighbours: what cannot be known has no difference."""
+    assert 0 < halves_note(screen(5, n_fish=1)).values["largest"] < 4
+
+
 def test_halves_that_differ_are_told(record, worlds, tank, fish):
     """Every other minute fish keep their heading half as well."""
     xy = record(11).xy_m.copy()
@@ -79,8 +85,6 @@ def test_halves_that_differ_are_told(record, worlds, tank, fish):
         fish,
         zones=tuple(dataclasses.replace(zone, kappa_0=zone.kappa_0 / 3) for zone in fish.zones),
     )
-    from zfcal.model.simulate import simulate_tracks
-
     other, _ = simulate_tracks(loose, tank, n_agents=5, n_steps=3000, seed=12)
     odd = (np.arange(3000) // 300) % 2 == 1
     xy[odd] = other[odd]

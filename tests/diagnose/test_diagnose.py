@@ -40,7 +40,7 @@ BIAS = {"turning-bias": {"strength": 0.4}}
 @pytest.fixture(scope="module")
 def named(ask, record):
     """Return a quick diagnosis of fish that tend to the left."""
-    return ask(record(23, BIAS))
+    return ask(record(23, BIAS, minutes=6.0))
 
 
 def test_an_effect_is_named_and_measured(named):
@@ -67,7 +67,7 @@ def test_all_effects_are_accounted_for(named):
     assert lacking == {"robot-avoidance": "a robot"}
     sizes = [abs(each.z) for each in named.screened if not each.lacks]
     assert sizes == sorted(sizes, reverse=True)
-    assert named.minutes == pytest.approx(10.0)
+    assert named.minutes == pytest.approx(6.0)
     assert {note.name for note in named.notes} == {"noise", "halves", "controls", "omnibus", "null"}
 
 
@@ -80,7 +80,7 @@ def test_what_disagrees_is_located(named):
 
 def test_a_right_model_has_nothing_missing(ask, record):
     """No effect, and the model that was fitted as it is; every z is told."""
-    found = ask(record(11))
+    found = ask(record(11, minutes=6.0))
     assert found.verdict is Verdict.NO_EFFECT
     assert found.effects == ()
     assert found.extended == found.base
@@ -88,9 +88,9 @@ def test_a_right_model_has_nothing_missing(ask, record):
 
 
 def test_the_null_through_the_measurement_does_not_depend_on_workers(ask, record):
-    """Five replicates of four minutes; stages are told in order, and none is left out."""
+    """Five replicates of three minutes; stages are told in order, and none is left out."""
     told = []
-    samples = record(23, BIAS, minutes=4.0)
+    samples = record(23, BIAS, minutes=3.0)
     one, two = (
         ask(samples, quick=False, n_workers=n, tell=lambda *a: told.append(a)) for n in (1, 2)
     )
@@ -128,8 +128,8 @@ def test_the_model_keeps_the_effects_that_it_has(record, tank, fish):
     """A bias in the model is fitted along and not asked for again."""
     having = dataclasses.replace(fish, effects={"turning-bias": {"strength": 0.1}})
     question = Question(
-        samples=record(23, BIAS), arena=tank, model=having, noise_m=0.0, noise_source="known",
-        n_null=5, quick=True, seed=1, n_workers=2,
+        samples=record(23, BIAS, minutes=6.0), arena=tank, model=having, noise_m=0.0,
+        noise_source="known", n_null=5, quick=True, seed=1, n_workers=2,
     )  # fmt: skip
     found = diagnose(question, lambda _stage, _done, _all: None)
     assert found.verdict is Verdict.NO_EFFECT

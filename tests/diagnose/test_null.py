@@ -59,7 +59,7 @@ def test_theory_is_the_standard_normal():
 
 
 def test_centre_and_spread_by_hand():
-    """With z of 0 and 4: centre 2, squares 8; with twenty of theory sqrt(28 / 21)."""
+    """Z of 0 and 4: centre 2, squares 8; with twenty of theory sqrt(28 / 21)."""
     null = from_replicates(np.array([[0.0, 1.0], [4.0, 1.0]]))
     assert null.centre == pytest.approx([2.0, 1.0])
     assert null.spread == pytest.approx([math.sqrt(28 / 21), math.sqrt(20 / 21)])
@@ -130,11 +130,11 @@ def test_noise_poses_as_memory_in_theory_and_not_in_the_chain(record, chain_of, 
 
     A point that is misplaced turns the step into it and the one out of it in opposite ways.
     """
-    samples = record(6, minutes=6.0)
+    samples = record(8)
     rng = np.random.default_rng(8)
-    noisy = dataclasses.replace(samples, xy_m=samples.xy_m + rng.normal(0, 0.002, (1800, 5, 2)))
+    noisy = dataclasses.replace(samples, xy_m=samples.xy_m + rng.normal(0, 0.002, (3000, 5, 2)))
     chain = chain_of(noisy, noise_m=0.002)
-    memory = candidate("turning-memory")
+    memory = candidate("turning-memory", forgets_wide=1.0)
     z = Screen(scene=make_scene(noisy, chain.arena), fitted=chain.fitted).ask(memory).z
     rows = run_null(chain, lambda _n, screen: np.array([screen.ask(memory).z]), 6, n_workers=2)
     null = from_replicates(np.array(rows))

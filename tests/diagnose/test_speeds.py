@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed, log_density
+from zfcal.model.extended import maximise
+from zfcal.model.scene import make_scene
 
 
 def test_uniform_draws_have_a_flat_density():
@@ -82,3 +85,15 @@ def test_fish_that_never_stop_have_a_rate_near_zero(screen, candidate):
     found = fit_speed(own, candidate("freezing"), 0.02)
     assert found.values["rate_per_s"] < 0.01
     assert found.gain.sum() < 20
+
+
+def test_speeds_that_would_be_any_power_are_fitted_within_bounds(worlds, tank, fish, candidate):
+    """Constant speeds: a strength at its bound, not beyond, where differences are taken."""
+    angle = np.arange(600) * 0.2
+    xy_m = np.stack([0.22 + 0.05 * np.cos(angle), 0.77 + 0.05 * np.sin(angle)], axis=1)[:, None]
+    scene = make_scene(worlds.samples_of(xy_m), tank)
+    own = Screen(scene=scene, fitted=maximise(scene, fish))
+    for start in (-2.0, 0.01, 2.0):
+        found = fit_speed(own, candidate("burst-and-coast"), start)
+        assert -1.5 <= found.values["exponent"] <= 1.5
+        assert np.isfinite(found.gain).all()

@@ -1,11 +1,16 @@
 """An effect's statistic, step by step and against what it responds to."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from zfcal.diagnose.naming import refit
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.tracing import trace
+from zfcal.model.extended import maximise
 from zfcal.model.kernels.world import X, Y
+from zfcal.model.scene import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -74,12 +79,6 @@ def test_the_cue_is_what_the_effect_responds_to(traced, name, values, company, c
 
 def test_neighbours_that_were_lost_are_not_near(record, candidate, tank, fish):
     """Where nobody else is seen a step has no distance, and is left out of the curve."""
-    import dataclasses
-
-    from zfcal.diagnose.screening import Screen
-    from zfcal.model.extended import maximise
-    from zfcal.model.scene import make_scene
-
     samples = record(23, {"alignment": {"weight": 20.0}}, minutes=4.0, n_fish=2)
     xy_m = samples.xy_m.copy()
     xy_m[600:, 1] = np.nan

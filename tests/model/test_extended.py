@@ -357,6 +357,21 @@ def test_a_zone_with_few_turns_is_left_alone(two_rooms, model):
     assert math.isfinite(fitted.nats)
 
 
+def test_a_zone_with_few_ways_out_has_a_finite_maximum(two_rooms, model):
+    """31 turns that begin and end in the corridor: nobody lands elsewhere, and no gamma runs off.
+
+    The attraction of what is never chosen goes to its bound, e^-7, and stays there.
+    """
+    xy_m, _ = simulate_tracks(model, two_rooms, n_agents=5, n_robots=1, n_steps=600, seed=2)
+    samples = dataclasses.replace(samples_of(xy_m), kind=np.array([0, 0, 0, 0, 1], dtype=np.int8))
+    fitted = maximise(make_scene(samples, two_rooms), model)
+    assert math.isfinite(fitted.nats)
+    for x in fitted.x:
+        assert ((x[3:-1] >= -7.0) & (x[3:-1] <= 0.0)).all()
+    for x, turns, view in zip(fitted.x, fitted.turns, [fitted.view] * 3, strict=True):
+        assert np.isfinite(nats_of(x, turns, view)).all()
+
+
 def test_effects_come_and_go(model):
     """Values are merged; without effects it is the base again."""
     one = with_effect(model, "alignment", {"weight": 5.0})
@@ -367,5 +382,5 @@ def test_effects_come_and_go(model):
 
 
 def test_units_of_a_fit():
-    """The kappa of the base and of the neighbours in units of 30, alpha of 50."""
+    """Kappa of the base and of the neighbours in units of 30, alpha of 50."""
     assert SCALES.tolist() == [30.0, 30.0, 50.0]

@@ -308,3 +308,12 @@ def test_a_recording_in_which_all_are_lost_has_no_steps(two_rooms):
     """Fish that were never seen make a scene without columns."""
     scene = make_scene(samples_of([AWAY] * 9, [AWAY] * 9), two_rooms)
     assert len(scene.turns) == len(scene.moves) == scene.n_fish == 0
+
+
+def test_a_jump_that_no_heading_explains_is_no_turn(two_rooms):
+    """From one corner of the tank into the opposite one: all cells of headings miss it."""
+    path = [(0.064, 0.936), (0.058, 0.942), (0.942, 0.058), (0.936, 0.064), (0.930, 0.070)]
+    scene = make_scene(samples_of(path), two_rooms)
+    assert scene.moves.at.tolist() == [1, 2, 3]
+    assert 1 not in scene.turns.at
+    assert scene.turns.share.any(axis=(1, 2)).all()

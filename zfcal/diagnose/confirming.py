@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 BLOCK_S = 60.0
 _ROUNDS = 6
 _SURE = 2.0
+_LEAST_VARIANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,9 +115,11 @@ def halves_note(screen: Screen) -> Note:
         if len(turns.rows) < 4 * MIN_STEPS:
             continue
         by = fits[0].x[zone][:3] - fits[1].x[zone][:3]
-        variances = [_variance(fit.scores[zone]) for fit in fits]
-        differences.append(np.abs(by) / np.sqrt(variances[0] + variances[1]))
-    largest = float(np.max(differences)) if differences else 0.0
+        variance = np.sum([_variance(fit.scores[zone]) for fit in fits], axis=0)
+        # Of what no step tells, such as neighbours of a fish alone, there is no error.
+        told = variance > _LEAST_VARIANCE
+        differences += list(np.abs(by[told]) / np.sqrt(variance[told]))
+    largest = max(map(float, differences), default=0.0)
     return Note(
         name="halves",
         says="Largest difference between the fits of the two halves, in standard errors.",
@@ -126,4 +129,4 @@ def halves_note(screen: Screen) -> Note:
 
 def _variance(scores: Floats) -> Floats:
     information = scores.T @ scores
-    return np.asarray(np.diag(np.linalg.pinv(information))[:3])
+    return np.asarray(np.diag(np.linalg.pinv(information, hermitian=True))[:3])

@@ -15,6 +15,7 @@ effect responds to, within each zone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -51,6 +52,9 @@ Floats = NDArray[np.float64]
 
 _FLOOR = 0.01
 """Share of a uniform law in a heading's density, beside the lapse that was fitted."""
+
+_LEFT = 1e-4
+"""Share of a score's squares below which the model explains all of it."""
 
 _FAST_QUANTILE = 0.995
 _STEEPEST = 8.0
@@ -189,7 +193,11 @@ class Screen:
             # Scores by a trait of one; whoever has which shows in how they scatter.
             scene = replace(scene, states=scene.states.copy())
             scene.states[:, TRAIT] = 1.0
-        steps = self.project(self.heading_scores(scene, candidate))
+        raw = self.heading_scores(scene, candidate)
+        steps = self.project(raw)
+        if not (steps**2).sum() > _LEFT * (raw**2).sum():
+            # What the model has already leaves but the error of its own approximation.
+            steps = np.zeros_like(raw)
         if effect.individual:
             return self._scatter(candidate, steps)
         return summed(candidate, steps)
@@ -348,6 +356,9 @@ def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
 def normal_deviate(chi2: float, df: int) -> float:
     """Return the normal deviate of the same upper tail as a chi-square."""
     tail = float(stats.chi2.logsf(chi2, df))
+    if math.isinf(tail):  # beyond what a double holds: the first term of its expansion
+        half = chi2 / 2
+        tail = (df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)
     return float(stats.norm.isf(np.exp(tail))) if tail > -600 else float(np.sqrt(-2 * tail))
 
 

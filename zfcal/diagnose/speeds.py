@@ -120,7 +120,8 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     )
     best = float(found.x)
     by = max(0.05 * abs(best), 1e-3 * (high - low))
-    here, up, down = (float(log_p(best + d * by).sum()) for d in (0, 1, -1))
+    middle = float(np.clip(best, low + by, high - by))
+    here, up, down = (float(log_p(middle + d * by).sum()) for d in (0, 1, -1))
     curvature = (2 * here - up - down) / by**2
     half = 1.96 / math.sqrt(curvature) if curvature > 0 else math.inf
     return SpeedFit(
@@ -156,7 +157,10 @@ def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
         gain[rows] = np.where(now[rows], np.log(chance / alike), np.log((1 - chance) / (1 - alike)))
     # What stays without the effect: the share of draws too short to be told from none.
     short = float(now[~before].mean()) if (~before).any() else 0.0
-    held = float(np.clip((stays - short) / max(1 - short, 1e-9), 1e-6, 0.999))
+    # One draw that is short is no rest: how long rests last shows in those of two steps.
+    twice = _still_twice(before, screen)
+    again = float(now[twice].mean()) if twice.any() else stays
+    held = float(np.clip((again - short) / max(1 - short, 1e-9), 1e-6, 0.999))
     duration_s = -dt_s / math.log(held)
     entries = _entries(now, before, screen)
     rate = entries / max(float((~before).sum()) * dt_s, 1e-9)
@@ -167,6 +171,16 @@ def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
         interval=(max(0.0, rate - half), rate + half),
         gain=gain,
     )
+
+
+def _still_twice(before: NDArray[np.bool_], screen: Screen) -> NDArray[np.bool_]:
+    """Return whether both of the two moves before each one were none, shape (move,)."""
+    moves = screen.scene.moves
+    order = np.lexsort((moves.at, moves.who))
+    next_one = (np.diff(moves.at[order]) == 1) & (np.diff(moves.who[order]) == 0)
+    twice = np.zeros(len(before), dtype=bool)
+    twice[order[1:]] = next_one & before[order[1:]] & before[order[:-1]]
+    return twice
 
 
 def _entries(now: NDArray[np.bool_], before: NDArray[np.bool_], screen: Screen) -> float:

@@ -463,7 +463,7 @@ class _Climb:
                 for own, by, turns in zip(here.x, blocks, self.turns, strict=True)
             ]
             there = self.at(self._moved(here.parameters, length * by_psi), x)
-            if there.nats > here.nats:
+            if _is_better(there, here):
                 return there
             length /= 3
         return None
@@ -513,9 +513,16 @@ def _limits(x: Floats, turns: ZoneTurns) -> tuple[Floats, Floats]:
 
 def _shifted(x: Floats, by: Floats, turns: ZoneTurns) -> Floats:
     """Return a zone's parameters moved within their limits, the largest log gamma zero."""
-    moved = np.clip(x + by, *_limits(x, turns))
-    moved[3:-1] -= moved[3:-1].max()
-    return np.asarray(moved)
+    moved = x + by
+    # A common factor of all gammas is no matter: it goes before the limits, not after.
+    moved[3:-1] -= moved[3:-1][turns.reachable].max()
+    return np.clip(moved, *_limits(x, turns))
+
+
+def _is_better(there: Fitted, here: Fitted) -> bool:
+    """Return whether a point is higher, and so by the densities of the same turns."""
+    same = np.array_equal(there.used, here.used)
+    return same and math.isfinite(there.nats) and there.nats > here.nats
 
 
 def _information(here: Fitted, psi: Floats) -> Floats:

@@ -258,7 +258,8 @@ def _turns(parts: _Parts, arena: Arena, dt_s: float) -> Turns:
     own, then = states[at, :, who], states[at + 1, :, who]
     reach = parts.speed[at + 1, who] * dt_s
     xy = np.ascontiguousarray(own[:, [X, Y]])
-    return Turns(
+    share = landing_shares(xy, reach, tank_of(arena), len(arena.zones), ANGLES, PER_CELL)
+    turns = Turns(
         at=at,
         who=who,
         track=parts.tracks[at, who],
@@ -268,8 +269,10 @@ def _turns(parts: _Parts, arena: Arena, dt_s: float) -> Turns:
         heading=np.ascontiguousarray(own[:, [HX, HY]]),
         taken=np.ascontiguousarray(then[:, [HX, HY]]),
         along_wall=np.ascontiguousarray(own[:, [TAU_X, TAU_Y]]),
-        share=landing_shares(xy, reach, tank_of(arena), len(arena.zones), ANGLES, PER_CELL),
+        share=share,
     )
+    # A jump into a far corner can miss it at all headings that are looked at.
+    return turns.take(np.flatnonzero(share.any(axis=(1, 2))))
 
 
 def thin(scene: Scene, rows: NDArray[np.bool_], moves: NDArray[np.bool_]) -> Scene:
