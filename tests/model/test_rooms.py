@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from zfcal.arena import make_arena
+from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.world import (
     LEFT_AT_S,
     LEFT_S,
@@ -45,6 +46,20 @@ def test_a_mouth_is_the_middle_of_the_opening(two_rooms):
     assert mouths[np.argsort(mouths[:, 1]), 1:] == pytest.approx(
         np.array([(0.3655, 0.6345), (0.6345, 0.3655)]), abs=1e-4
     )
+
+
+def test_a_cell_is_of_the_nearest_room(two_rooms):
+    """Every one, though most are told by squares of them; 40 cells a side fill no square."""
+    for cells in (300, 40):
+        tank = make_tank(two_rooms, cells=cells)
+        _, rooms = find_rooms(two_rooms)
+        row, column = np.indices(tank.rooms.cells.shape)
+        places = shapely.points(
+            tank.x0_m + (column + 0.5) / tank.per_m, tank.y0_m + (row + 0.5) / tank.per_m
+        )
+        distance_m = np.array([shapely.distance(room, places) for room in rooms])
+        taken = np.take_along_axis(distance_m, tank.rooms.cells[None].astype(int) - 1, axis=0)[0]
+        assert (taken == distance_m.min(axis=0)).all()
 
 
 def test_an_open_tank_has_no_rooms():

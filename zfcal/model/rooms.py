@@ -7,7 +7,7 @@ agent has just left the room needs to know of rooms; the base model does not.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -22,6 +22,9 @@ _WIDEST_MOUTH = 0.3
 """A part that shares more of its border than this with the zone is a belt of the tank."""
 
 _MERGE_M = 1e-6
+
+_SQUARE = 16
+"""Cells of the grid along a side of those squares that are looked at as a whole."""
 
 Floats = NDArray[np.float64]
 
@@ -85,15 +88,10 @@ def make_rooms(
         Cells in a metre.
     """
     exit_zone, parts = find_rooms(arena)
-    cells = np.zeros(shape, dtype=np.uint8)
     if not exit_zone:
+        cells = np.zeros(shape, dtype=np.uint8)
         return Rooms(cells=cells, mouths=np.zeros((0, 3)), exit_zone=0)
-    rows, columns = np.indices(shape)
-    points = shapely.points(
-        origin_m[0] + (columns.ravel() + 0.5) / per_m, origin_m[1] + (rows.ravel() + 0.5) / per_m
-    )
-    tree = shapely.STRtree(parts)
-    cells[:] = (tree.nearest(points) + 1).reshape(shape)
+    cells = _nearest(parts, shape, origin_m, per_m)
     zone = arena.zones[exit_zone - 1].polygon
     mouths = [
         (number, *_middle(line))
@@ -101,6 +99,43 @@ def make_rooms(
         for line in _lines(_opening(part, zone))
     ]
     return Rooms(cells=cells, mouths=np.array(mouths, dtype=np.float64), exit_zone=exit_zone)
+
+
+def _nearest(
+    parts: tuple[shapely.Polygon, ...],
+    shape: tuple[int, int],
+    origin_m: tuple[float, float],
+    per_m: float,
+) -> NDArray[np.uint8]:
+    """Return the nearest part of each cell, counted from one.
+
+    A square of cells has one answer where, seen from its middle, the nearest part leads by
+    more than the square's diagonal: no distance changes faster than the place. Cell by cell
+    it takes a third of a second at every start.
+    """
+    tall, wide = (-(-n // _SQUARE) for n in shape)
+    rows, columns = (_SQUARE * (k.ravel() + 0.5) - 0.5 for k in np.indices((tall, wide)))
+    middles = _middles(rows, columns, origin_m, per_m)
+    distance_m = np.sort([shapely.distance(part, middles) for part in parts], axis=0)
+    tree = shapely.STRtree(parts)
+    clear = distance_m[1] - distance_m[0] > math.sqrt(2) * _SQUARE / per_m
+    blocks = np.where(clear, tree.nearest(middles) + 1, 0).reshape(tall, wide).astype(np.uint8)
+    cells = np.kron(blocks, np.ones((_SQUARE, _SQUARE), dtype=np.uint8))[: shape[0], : shape[1]]
+    at = np.nonzero(cells == 0)
+    cells[at] = tree.nearest(_middles(at[0], at[1], origin_m, per_m)) + 1
+    return np.ascontiguousarray(cells)
+
+
+def _middles(
+    rows: NDArray[Any],
+    columns: NDArray[Any],
+    origin_m: tuple[float, float],
+    per_m: float,
+) -> NDArray[np.object_]:
+    points: Any = shapely.points(
+        origin_m[0] + (columns + 0.5) / per_m, origin_m[1] + (rows + 0.5) / per_m
+    )
+    return points
 
 
 def _opening(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
@@ -136,7 +136,8 @@ def individuals(n_agents: int, n_robots: int) -> NDArray[np.float64]:
     n_fish = n_agents - n_robots
     table[0, n_fish:] = 1.0
     if n_fish > 1:
-        quantiles = ndtri((np.arange(n_fish) + 0.5) / n_fish)
+        inverse = NormalDist().inv_cdf
+        quantiles = np.array([inverse((k + 0.5) / n_fish) for k in range(n_fish)])
         table[1, :n_fish] = quantiles / quantiles.std()
     return table
 
