@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis_plan import EXTEND, SECTIONS, VIDEO
-from diagnosis_summary import DESCRIBES, NOTHING
+from diagnosis_summary import DESCRIBES, NAMELESS, NOTHING
 from measuring import table
 
 MODES = {"full": "39 replicates", "quick": "`--quick`"}
@@ -142,11 +142,11 @@ def _confusion(mode: str, told: Mapping[str, Any]) -> list[str]:
     if not told["confusion"]:
         return []
     rows = [
-        [true, sum(answers.values()), answers.get(true, 0), _counted(answers, but=true)]
+        [true, sum(answers.values()), _named(true, answers), _counted(answers, but=true)]
         for true, answers in told["confusion"].items()
     ]
     turned = [
-        [answer, _of_what(answer, each, told["confusion"]), _counted(each["hidden"], but=answer)]
+        [answer, _of_what(answer, each), _counted(each["hidden"], but=answer)]
         for answer, each in told["inversion"].items()
     ]
     return [
@@ -161,10 +161,13 @@ def _confusion(mode: str, told: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _of_what(answer: str, each: Mapping[str, Any], matrix: Mapping[str, Any]) -> str:
+def _named(true: str, answers: Mapping[str, int]) -> object:
+    return _DASH if true == NOTHING else answers.get(true, 0)
+
+
+def _of_what(answer: str, each: Mapping[str, Any]) -> str:
     """Return how often a name was right; a verdict that names nothing has no such share."""
-    names = set(matrix) - {NOTHING}
-    return share(each["rate"]) if answer in names or each["rate"]["hits"] else _DASH
+    return _DASH if answer in NAMELESS else share(each["rate"])
 
 
 def _counted(counts: Mapping[str, int], *, but: str) -> str:

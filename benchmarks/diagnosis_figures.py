@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 from diagnosis_document import MODES
-from diagnosis_summary import BEYOND, ERROR, NOTHING, TIE
+from diagnosis_summary import NAMELESS, NOTHING
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 
 from zfcal.report.theme import FISH, GROUND, INK, MODEL, MUTED, new_figure, save_png, style
 
-_LAST = (TIE, BEYOND, "unexplained", "untestable", "no-effect", ERROR)
 _SHADES = LinearSegmentedColormap.from_list("shades", (GROUND, FISH))
 _MARKS = ("o", "^", "s", "D")
 
@@ -33,9 +32,9 @@ def _columns(matrix: Mapping[str, Mapping[str, int]]) -> tuple[list[str], list[s
     """Return what was hidden and what was said, in one order; nothing and verdicts last."""
     said = {answer for answers in matrix.values() for answer in answers}
     hidden = [true for true in matrix if true != NOTHING]
-    names = sorted({*hidden, *said} - {*_LAST, NOTHING})
+    names = sorted({*hidden, *said} - {*NAMELESS, NOTHING})
     rows = [name for name in names if name in matrix]
-    last = [each for each in _LAST if each in said]
+    last = [each for each in NAMELESS if each in said]
     return [*rows, *([NOTHING] if NOTHING in matrix else [])], [*names, *last]
 
 
@@ -52,7 +51,9 @@ def _confusion(matrix: Mapping[str, Mapping[str, int]], path: Path, mode: str) -
                 ink = GROUND if of_row[y, x] > 0.5 else INK
                 axes.text(x, y, str(n), ha="center", va="center", color=ink, fontsize=7.5)
         totals = [f"{row} ({counts[y].sum()})" for y, row in enumerate(rows)]
-        axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
+        axes.set_xticks(
+            range(len(columns)), columns, rotation=60, ha="right", rotation_mode="anchor"
+        )
         axes.set_yticks(range(len(rows)), totals)
         axes.grid(visible=False)
         axes.set(xlabel="said", ylabel="hidden (trials)", title=f"Hidden and said: {_named(mode)}")
@@ -89,7 +90,9 @@ def _line(
     if not part:
         return
     label, colour, marker = mark
-    x = np.maximum([each["median_nats"] for each in part], 1.0)
+    # A little aside, so that the intervals of two curves do not hide each other.
+    aside = 1.0 + 0.06 * _MARKS.index(marker)
+    x = aside * np.maximum([each["median_nats"] for each in part], 1.0)
     y = 100 * np.array([each[key]["share"] for each in part])
     low, high = (100 * np.array([each[key][end] for each in part]) for end in ("low", "high"))
     # Rounding can put the share a hair outside its own interval.
@@ -105,4 +108,4 @@ def _decorate(axes: Axes, title: str) -> None:
     axes.set_ylim(-4, 104)
     axes.set(title=title, xlabel="oracle nats (median of the bin)")
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="center left")
+        axes.legend(loc="upper left")

@@ -33,6 +33,9 @@ ERROR = "error"
 SILENT = ("no-effect", "untestable", ERROR)
 """Verdicts that claim nothing; failures are counted by themselves."""
 
+NAMELESS = (TIE, BEYOND, "unexplained", *SILENT)
+"""Answers that are no effect's name."""
+
 DESCRIBES = {
     "waxing-walls": ("wall-persistence",),
     "startle": ("burst-and-coast", "speed-matching"),

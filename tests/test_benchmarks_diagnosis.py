@@ -381,7 +381,11 @@ def test_gaps_are_medians_over_extended_trials(summary, row):
 
 def test_the_document_says_that_a_run_is_partial(bench, summary, row, tmp_path):
     """Numbers, document and figures are made of however few trials there are."""
-    rows = [row(("alignment",), ("alignment",), nats=150.0), row()]
+    rows = [
+        row(("alignment",), ("alignment",), nats=150.0),
+        row(("alignment",), ("fatigue",), nats=150.0, seed=2),
+        row(seed=3),
+    ]
     planned = dict.fromkeys(sys.modules["diagnosis_plan"].SECTIONS, 20)
     found = {
         "machine": "a machine",
@@ -393,9 +397,11 @@ def test_the_document_says_that_a_run_is_partial(bench, summary, row, tmp_path):
     text = (tmp_path / "benchmarks-diagnosis.md").read_text()
     assert "**A partial run.**" in text
     assert "Not run: needs zfcal track." in text
-    assert "100 % (1/1, 21 to 100)" in text
+    assert "| alignment | 100 % (1/1, 21 to 100) | – |" in text
+    assert "| fatigue | 0 % (0/1, 0 to 79) | alignment 1 |" in text
+    assert "| no-effect | – | nothing 1 |" in text
     kept = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert [trial["answer"] for trial in kept["trials"]] == ["alignment", "no-effect"]
+    assert [trial["answer"] for trial in kept["trials"]] == ["alignment", "fatigue", "no-effect"]
     assert all(not math.isnan(trial["cpu_s"]) for trial in kept["trials"])
     for figure in ("confusion", "power"):
         assert (tmp_path / "pictures" / f"diagnosis-{figure}-quick.png").stat().st_size > 5000
