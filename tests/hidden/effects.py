@@ -146,7 +146,7 @@ EFFECTS = {
         listed=False,
     ),
     "startle": _effect(
-        K.STARTLE, BOTH, (0.0028, 0.006, 0.013),
+        K.STARTLE, BOTH, (0.0028, 0.0048, 0.013),
         "at so many times a second a fish darts for 0.6 s at 14 to 20 cm/s; others within 15 cm "
         "of one that begins to dart follow with probability 0.6",
         listed=False,
