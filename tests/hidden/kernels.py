@@ -1,8 +1,6 @@
 """The second simulator's loops: where, what is seen, which way, how fast.
 
-They stand in one file, so that the compiler's cache knows when one of them has
-changed; of `hidden.states` and `hidden.geometry` it does not: touch this file after
-an edit there. Lengths are metres, times seconds, angles radians.
+Lengths are metres, times seconds, angles radians.
 """
 
 from __future__ import annotations

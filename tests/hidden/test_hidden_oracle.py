@@ -9,6 +9,7 @@ import pytest
 from hidden import geometry, kernels, states
 from hidden.chain import Chain
 from hidden.effects import EFFECTS, LISTED, UNLISTED
+from hidden.freshness import forget_stale_kernels
 from hidden.law import empty_past, law_of, natural, no_plan, world_of
 from hidden.oracle import acts_on, fit_base, log_base_speed, usable_steps
 from hidden.scenario import Scenario, make_trial
@@ -132,3 +133,19 @@ def test_the_simulator_shares_no_code_with_zfcal():
     assert len(modules) > 8
     for path in modules:
         assert not re.search(r"^\s*(import|from) zfcal", path.read_text(), re.MULTILINE), path
+
+
+def test_compiled_loops_are_dropped_when_a_source_changes(tmp_path):
+    """The first look and one after an edit empty the cache, the one between does not."""
+    for path in Path(kernels.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "__pycache__").mkdir()
+    stale = tmp_path / "__pycache__" / "kernels.run.nbi"
+    found = []
+    for edit in ("", "", "# edited"):
+        stale.write_bytes(b"")
+        with (tmp_path / "states.py").open("a") as file:
+            file.write(edit)
+        found.append((forget_stale_kernels(tmp_path), stale.exists()))
+
+    assert found == [(True, False), (False, True), (True, False)]
