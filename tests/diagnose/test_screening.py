@@ -25,19 +25,27 @@ def family(screen, arena):
     return candidates_of(askable(screen.scene, screen.fitted.parameters)[0], arena)
 
 
-def test_scores_of_a_right_model_are_standard_normal(screen, tank):
-    """All shapes of all effects, on five recordings of five minutes: some 370 z.
+def rests_on_few_steps(candidate):
+    """Return whether a handful of steps decides: across a way out, or still after still.
 
-    With about 40 shapes that are not alike, the mean has a standard error of 0.07 and the
-    spread one of 0.05: a centre of 0.3 or a spread wrong by a third is noticed. In five
-    minutes the rarest answers are a handful, and the spread is a little above one.
+    Of these the sum is not normal in minutes of a recording; replicates say how it scatters.
+    """
+    return candidate.name == "freezing" or candidate.shape.get("heading_share") == 0.0
+
+
+def test_scores_of_a_right_model_are_standard_normal(screen, tank):
+    """All shapes of all effects that rest on many steps, in five recordings of five minutes.
+
+    Of some 350 z about 150 are not alike: the mean has a standard error of 0.08 and the
+    spread one of 0.06, so that a centre of 0.3 or a spread wrong by a quarter is noticed.
     """
     z = []
     for seed in range(5):
         own = screen(300 + seed, minutes=5.0)
-        z += [score.z for score in ask_all(own, family(own, tank), 1)]
+        asked = [each for each in family(own, tank) if not rests_on_few_steps(each)]
+        z += [score.z for score in ask_all(own, asked, 1)]
     assert abs(np.mean(z)) < 0.25
-    assert 0.8 < np.std(z) < 1.3
+    assert 0.8 < np.std(z) < 1.2
     assert np.abs(z).max() < 4.5
 
 
