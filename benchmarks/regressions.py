@@ -102,16 +102,20 @@ def _factor(fresh: Ratio, committed: Ratio) -> float:
     return above / below if below > 0 else math.nan
 
 
-def parser(doc: str | None) -> argparse.ArgumentParser:
+def parser(doc: str | None, *, tiny: bool = True) -> argparse.ArgumentParser:
     """Return the options that all benchmarks have.
 
     Parameters
     ----------
     doc
         The script's docstring; its first line is shown.
+    tiny
+        Whether the script can measure next to nothing; otherwise it never does.
     """
     made = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
-    made.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
+    made.set_defaults(tiny=False)
+    if tiny:
+        made.add_argument("--tiny", action="store_true", help="Only see whether it runs.")
     made.add_argument(
         "--write", action="store_true", help="Renew the committed results and documentation."
     )
