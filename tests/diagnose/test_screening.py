@@ -163,11 +163,19 @@ def test_workers_do_not_change_numbers(base, tank):
 
 
 def test_a_score_by_hand(candidate):
-    """Scores 1, 2, -1: sum 2, squares 6; z is 2 / sqrt 6 and a Newton step 1/3."""
-    score = summed(candidate("turning-bias"), np.array([1.0, 2.0, -1.0]))
-    assert score.z == pytest.approx(2 / math.sqrt(6))
+    """A hundred times 1, 2, -1: sum 200, squares 600; z is 200 / sqrt 600, a Newton step 1/3."""
+    score = summed(candidate("turning-bias"), np.tile([1.0, 2.0, -1.0], 100))
+    assert score.z == pytest.approx(200 / math.sqrt(600))
     assert score.strength == pytest.approx(1 / 3)
-    assert score.information == pytest.approx(6.0)
+    assert score.information == pytest.approx(600.0)
+
+
+def test_a_few_steps_that_make_up_all_count_for_less(candidate):
+    """Six steps of one size, where sixty would be as good as normal: z times sqrt(6 / 60)."""
+    scores = np.zeros(1000)
+    scores[:6] = 2.0
+    score = summed(candidate("turning-bias"), scores)
+    assert score.z == pytest.approx(math.sqrt(6) * math.sqrt(0.1))
 
 
 def test_nothing_asked_is_nothing_answered(candidate):

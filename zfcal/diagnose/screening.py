@@ -57,6 +57,9 @@ _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""
 
 _FAST_QUANTILE = 0.995
+_SEVERAL = 60.0
+"""Steps of one size that a score must be made of, to be as good as normal."""
+
 _STEEPEST = 8.0
 """What a speed responds to counts for no more than so many standard deviations: one
 swapped identity must not look like an effect."""
@@ -367,9 +370,11 @@ def summed(candidate: Candidate, steps: Floats) -> Score:
     total, information = float(steps.sum()), float((steps**2).sum())
     if not information > 0:
         return Score(candidate=candidate, z=0.0, strength=0.0, information=0.0, steps=steps)
+    # Where a few steps make up all of the sum it is not normal: they count for less.
+    several = information**2 / float((steps**4).sum())
     return Score(
         candidate=candidate,
-        z=total / np.sqrt(information),
+        z=total / np.sqrt(information) * min(1.0, np.sqrt(several / _SEVERAL)),
         strength=total / information,
         information=information,
         steps=steps,

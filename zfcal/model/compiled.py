@@ -132,5 +132,17 @@ def hook(signature: Any) -> Callable[[F], Any]:
     """
     if not is_warm():
         _announcer.tell()
+    if _config.DISABLE_JIT:
+        # Plain Python has no addresses; effects are tested compiled.
+        return _Plain
     made: Any = cfunc(signature, cache=KEPT, error_model="numpy")
     return made
+
+
+class _Plain:
+    """An effect's function where the compiler is off: it can be named, and not be called."""
+
+    address = 0
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function = function
