@@ -124,6 +124,42 @@ def count_step(
 
 
 @kernel
+def own_counts(n_zones: int) -> Counts:
+    """Return histograms of one simulation, for one thread.
+
+    Those of neighbouring models lie side by side in memory, and two processors that
+    count there take the same lines from one another at every step.
+    """
+    return Counts(
+        np.zeros((1, 1, n_zones, 10), dtype=np.int64),
+        np.zeros((1, 1, n_zones, 10), dtype=np.int64),
+        np.zeros((1, 1, n_zones), dtype=np.int64),
+        np.zeros((1, 1, n_zones, n_zones), dtype=np.int64),
+        np.zeros((1, 1, n_zones, 10), dtype=np.int64),
+    )
+
+
+@kernel
+def clear_counts(own: Counts) -> None:
+    """Set the histograms of one simulation to zero."""
+    own.distance[:] = 0
+    own.wall[:] = 0
+    own.occupation[:] = 0
+    own.transition[:] = 0
+    own.speed[:] = 0
+
+
+@kernel
+def hand_over(own: Counts, model: int, run: int, counts: Counts) -> None:
+    """Add the histograms of one simulation to those of all."""
+    counts.distance[model, run] += own.distance[0, 0]
+    counts.wall[model, run] += own.wall[0, 0]
+    counts.occupation[model, run] += own.occupation[0, 0]
+    counts.transition[model, run] += own.transition[0, 0]
+    counts.speed[model, run] += own.speed[0, 0]
+
+
+@kernel
 def count_runs(
     first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], individuals: Floats,
     packed: Packed, tank: Tank, counts: Counts,
@@ -145,21 +181,24 @@ def count_runs(
     state = np.zeros((STATES, n))
     work = make_work(n, packed.components.shape[0], GRID)
     sight = make_sight(in_vectors(n * n))
+    own = own_counts(counts.occupation.shape[2])
     for job in range(first, last):
         model, run = job // seeds.size, job % seeds.size
+        clear_counts(own)
         random = seeded(seeds[run])
         state[:] = 0.0
         start(state, burn_in, packed, tank, individuals, work, random)
         for _ in range(burn_in):
             advance(state, model, packed, tank, sight, random, work, False)
         state[TIME] = packed.clock_s[0]
-        _count_state(state, n_counted, tank, model, run, counts)
+        _count_state(state, n_counted, tank, 0, 0, own)
         for _ in range(samples - 1):
             for i in range(n_counted):
                 work.zones[i] = state[ZONE, i]
             advance(state, model, packed, tank, sight, random, work, False)
-            count_step(work.zones, state, n_counted, tank, model, run, counts)
-            _count_state(state, n_counted, tank, model, run, counts)
+            count_step(work.zones, state, n_counted, tank, 0, 0, own)
+            _count_state(state, n_counted, tank, 0, 0, own)
+        hand_over(own, model, run, counts)
 
 
 @inlined
