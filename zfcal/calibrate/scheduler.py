@@ -93,7 +93,7 @@ class Cluster:
         from distributed.comm.core import CommClosedError
 
         here = fingerprint()
-        answers = self.client.run(fingerprint, on_error="return")
+        answers = self._ask(fingerprint, on_error="return")
         found = {
             worker: there
             for worker, there in answers.items()
@@ -103,10 +103,17 @@ class Cluster:
             refuse_unlike(here, there, worker)
         known = {here.machine} | self._machines
         others = [worker for worker, there in found.items() if there.machine not in known]
-        for worker, there in self.client.run(trace, workers=others).items() if others else ():
+        for worker, there in self._ask(trace, workers=others).items() if others else ():
             refuse_other_bits(there, worker)
         self._machines.update(there.machine for there in found.values())
         return len(found) == len(answers)
+
+    def _ask(self, function: Callable[[], T], **how: Any) -> dict[str, Any]:
+        """Return what each worker answers, or say that the scheduler has gone."""
+        try:
+            return dict(self.client.run(function, **how))
+        except OSError as error:
+            raise self._gone() from error
 
     def warm_up(self) -> None:
         """Have every worker compile now what it will need, or load it."""
