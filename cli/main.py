@@ -27,6 +27,7 @@ from .output import EXIT_INTERRUPTED, ReaderGoneError, complain
 COMMANDS = {
     "demo": "demo",
     "init": "init",
+    "camera": "camera",
     "import": "import_",
     "simulate": "simulate",
     "analyse": "analyse",

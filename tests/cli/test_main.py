@@ -19,6 +19,14 @@ def all_commands():
     return {name: group.get_command(context, name) for name in group.list_commands(context)}
 
 
+def every_part(name):
+    """Return a command, or those of a group, by the words that call them."""
+    found = all_commands()[name]
+    if not isinstance(found, click.Group):
+        return {name: found}
+    return {f"{name} {part}": command for part, command in found.commands.items()}
+
+
 def test_help_lists_every_command(zfcal):
     """In the order of a day's work."""
     done = zfcal("--help")
@@ -40,16 +48,18 @@ def test_every_command_has_help_with_an_example(zfcal, name):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_says_what_it_does(name):
     """No option without a help text."""
-    for parameter in all_commands()[name].params:
-        if isinstance(parameter, click.Option):
-            assert parameter.help, parameter.name
+    for part in every_part(name).values():
+        for parameter in part.params:
+            if isinstance(parameter, click.Option):
+                assert parameter.help, parameter.name
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_speaks_json_and_keeps_quiet(name):
     """The options that are the same everywhere are there everywhere."""
-    options = {word for parameter in all_commands()[name].params for word in parameter.opts}
-    assert {"--json", "--verbose", "--quiet", "--traceback"} <= options
+    for words, part in every_part(name).items():
+        options = {word for parameter in part.params for word in parameter.opts}
+        assert {"--json", "--verbose", "--quiet", "--traceback"} <= options, words
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -59,10 +69,12 @@ def test_every_command_stands_in_the_documentation(repository, name):
     section = text.partition(f"\n## zfcal {name}")[2].partition("\n## ")[0]
     assert section, f"no section on zfcal {name}"
     common = {"--json", "--verbose", "--quiet", "--traceback"}
-    for parameter in all_commands()[name].params:
-        for word in set(parameter.opts) - common:
-            if word.startswith("--"):
-                assert f"`{word}" in section, f"{name} {word}"
+    for words, part in every_part(name).items():
+        assert f"zfcal {words}" in section, words
+        for parameter in part.params:
+            for word in set(parameter.opts) - common:
+                if word.startswith("--"):
+                    assert f"`{word}" in section, f"{words} {word}"
 
 
 def test_help_loads_nothing_heavy():

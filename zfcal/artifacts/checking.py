@@ -18,6 +18,7 @@ from zfcal.arena import Arena
 from zfcal.artifacts import machine
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
+from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.freshness import hash_of
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
@@ -301,6 +302,11 @@ def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
         yield Finding(level=WARNING, where=name, says=says, hint="Commands read what is whole.")
 
 
+def _check_camera(_: _Place, path: Path) -> Iterator[Finding]:
+    read_camera_file(path)
+    yield from ()
+
+
 def _check_findings(_: _Place, path: Path) -> Iterator[Finding]:
     check(read_json(path), "findings", path)
     yield from ()
@@ -321,6 +327,7 @@ _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
     r"models/\d{6,}\.parquet": _table_checker(POPULATION),
     r"models/[^/]+\.toml": _check_model,
     r"(poses|drive|frames/(overhead|below))/\d{6,}\.mcap": _check_mcap,
+    r"cameras/[^/]+\.toml": _check_camera,
     r"diagnosis/([^/]+/)?findings\.json": _check_findings,
 }
 

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from zfcal.artifacts.arenas import read_arena
+from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.columns import TABLE_SCHEMAS, form_of, problem_of
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.mcap_files import overview
@@ -201,6 +202,7 @@ def _toml(path: Path) -> tuple[str | None, str | None, Description]:
     readers: dict[object, Callable[[Path], object]] = {
         "zfcal.trial/1": lambda file: path.name == CONFIG_NAME and read_trial(file.parent),
         "zfcal.model/1": read_model,
+        "zfcal.camera/1": read_camera_file,
     }
     problem = None
     if schema not in readers:

@@ -82,6 +82,42 @@ def write_trial(trial: Trial) -> None:
     write_text_whole(trial.config, tomlkit.dumps(document))
 
 
+def name_camera(root: Path, name: str, file: Path) -> bool:
+    """Let ``trial.toml`` name the file of a camera; all else in it stays as it is.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    name
+        ``overhead`` or ``below``.
+    file
+        The camera file, inside the trial.
+
+    Returns
+    -------
+    bool
+        Whether the settings had to be changed.
+
+    Raises
+    ------
+    InputError
+        There is no such trial, or its settings are wrong.
+    StorageError
+        They cannot be written.
+    """
+    trial = read_trial(root)
+    relative = file.relative_to(root).as_posix()
+    if (trial.cameras or {}).get(name, {}).get("file") == relative:
+        return False
+    document = tomlkit.parse(trial.config.read_text(encoding="utf-8-sig"))
+    cameras = document.setdefault("cameras", tomlkit.table(is_super_table=True))
+    cameras.setdefault(name, tomlkit.table())["file"] = relative
+    check(document.unwrap(), "trial", trial.config)
+    write_text_whole(trial.config, tomlkit.dumps(document))
+    return True
+
+
 def _as_document(trial: Trial) -> tomlkit.TOMLDocument:
     values: dict[str, Any] = {
         "schema": SCHEMA,

@@ -1,0 +1,59 @@
+"""`zfcal camera corners`: a camera from the four corners of the arena."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .camera_options import box, image_options, numbers, place_of, place_options
+from .options import makes_artifacts, speaks
+from .output import Output
+
+
+@click.command("corners")
+@click.argument("corners", nargs=4, metavar="LL LR UR UL")
+@click.option("--arena", metavar="NAME|FILE", help="Whose corners; default: the trial's arena.")
+@click.option("--bounds-m", callback=box, metavar="X0,Y0,X1,Y1", help="Instead of an arena.")
+@image_options
+@place_options
+@makes_artifacts
+@speaks
+def corners(
+    out: Output,
+    corners: tuple[str, ...],
+    *,
+    arena: str | None,
+    bounds_m: tuple[float, float, float, float] | None,
+    size: tuple[int, int] | None,
+    image: Path | None,
+    place: Path | None,
+    trial: Path | None,
+    name: str | None,
+    dry_run: bool,
+    force: bool,
+) -> None:
+    r"""Take the pixels of the arena's four corners, X,Y each.
+
+    In the order lower left, lower right, upper right, upper left as the arena
+    has them (y up), however the camera is turned. The corners are those of
+    the rectangle round the arena. A lens that bends lines needs more: points.
+
+    \b
+    Example:
+        zfcal camera corners 52,448 447,450 449,51 50,53 --size 500x500 \
+            --trial trial --camera overhead
+    """
+    from zfcal.online.camera_corners import Corners, make_from_corners
+    from zfcal.online.opening import Task
+
+    given = Corners(
+        px=tuple((x, y) for x, y in (numbers(text, 2) for text in corners)),
+        size_px=size,
+        image=image,
+        arena=arena,
+        bounds_m=bounds_m,
+    )
+    where = place_of(place, trial, name)
+    task = Task(dry_run=dry_run, force=force)
+    out.attempt(lambda: make_from_corners(where, given, out.tell, task=task))

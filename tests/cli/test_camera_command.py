@@ -1,0 +1,124 @@
+"""`zfcal camera`, as a person uses it."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from zfcal.online.cameras import read_camera
+
+CORNERS = ("50,450", "450,450", "450,50", "50,50")
+
+
+@pytest.fixture
+def trial(zfcal, tmp_path):
+    """Return a trial in two rooms."""
+    assert zfcal("init", "trial", "--arena", "two-rooms", "--fish", "4", "--robot").code == 0
+    return tmp_path / "trial"
+
+
+def test_corners_make_a_camera_that_the_trial_names(zfcal, trial):
+    """The file appears, trial.toml names it, and the trial is sound."""
+    done = zfcal(
+        "camera",
+        "corners",
+        *CORNERS,
+        "--size",
+        "500x500",
+        "--trial",
+        "trial",
+        "--camera",
+        "overhead",
+    )
+    assert done.code == 0
+    assert done.lines == ["trial/cameras/overhead.toml"]
+    assert 'file = "cameras/overhead.toml"' in (trial / "trial.toml").read_text()
+    assert zfcal("check", "trial").code == 0
+    camera = read_camera(trial / "cameras" / "overhead.toml")
+    # The shipped arena starts 51 mm from its origin.
+    there = camera.to_metres(np.array([50.0, 450.0]))
+    np.testing.assert_allclose(there, [0.051, 0.051], atol=1e-6)
+
+
+def test_the_second_time_nothing_is_done(zfcal, trial):
+    """The same corners: up to date; others: made again, and why is told."""
+    words = ["--size", "500x500", "--trial", "trial", "--camera", "overhead", "-v"]
+    zfcal("camera", "corners", *CORNERS, *words)
+    before = (trial / "cameras" / "overhead.toml").read_bytes()
+    again = zfcal("camera", "corners", *CORNERS, *words)
+    assert "up to date" in again.err
+    assert (trial / "cameras" / "overhead.toml").read_bytes() == before
+    moved = zfcal("camera", "corners", "52,450", *CORNERS[1:], *words)
+    assert "option corners_px" in moved.err
+
+
+def test_what_a_person_wrote_in_the_settings_stays(zfcal, trial):
+    """Comments, and the camera's source."""
+    path = trial / "trial.toml"
+    text = path.read_text() + '\n# My rig.\n[cameras.overhead]\nsource = "0" # on the ceiling\n'
+    path.write_text(text)
+    words = ["--size", "500x500", "--trial", "trial", "--camera", "overhead"]
+    assert zfcal("camera", "corners", *CORNERS, *words).code == 0
+    assert '# My rig.\n[cameras.overhead]\nsource = "0" # on the ceiling\nfile' in path.read_text()
+
+
+def test_an_image_gives_the_size(zfcal, tmp_path):
+    """And must have the one that is given as well."""
+    cv2.imwrite(str(tmp_path / "tank.png"), np.zeros((480, 500, 3), np.uint8))
+    words = ["camera", "corners", *CORNERS, "--bounds-m", "0,0,1,1", "-o", "c.toml"]
+    assert zfcal(*words, "--image", "tank.png").code == 0
+    assert read_camera(tmp_path / "c.toml").size_px == (500, 480)
+    wrong = zfcal(*words, "--image", "tank.png", "--size", "500x500")
+    assert wrong.code == 1
+    assert "tank.png: is 500 x 480 px, --size says 500 x 500" in wrong.err
+
+
+def test_json_holds_the_file_and_how_it_went(zfcal):
+    """One document."""
+    words = ["--size", "500x500", "--bounds-m", "0,0,1,1", "-o", "c.toml", "--json"]
+    document = json.loads(zfcal("camera", "corners", *CORNERS, *words).out)
+    assert [artifact["path"] for artifact in document["artifacts"]] == ["c.toml"]
+    assert document["results"][0]["n_points"] == 4
+
+
+def test_a_dry_run_writes_nothing(zfcal, trial):
+    """Neither the camera nor the settings."""
+    before = (trial / "trial.toml").read_bytes()
+    words = ["--size", "500x500", "--trial", "trial", "--camera", "below", "--dry-run"]
+    done = zfcal("camera", "corners", *CORNERS, *words)
+    assert "would make trial/cameras/below.toml: missing" in done.err
+    assert not (trial / "cameras").exists()
+    assert (trial / "trial.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["-o", "c.toml", "--bounds-m", "0,0,1,1"], 1, "How large are the camera's images?"),
+        (["-o", "c.toml", "--size", "500x500"], 1, "Corners of which arena?"),
+        (["--size", "500x500", "--bounds-m", "0,0,1,1"], 2, "Give -o FILE, or --trial"),
+        (["-o", "c.toml", "--size", "500", "--bounds-m", "0,0,1,1"], 2, "expected WIDTHxHEIGHT"),
+        (["-o", "c.toml", "--size", "500x500", "--bounds-m", "0,1"], 2, "expected 4 numbers"),
+        (["-o", "c.json", "--size", "500x500", "--bounds-m", "0,0,1,1"], 1, "is TOML"),
+        (["--trial", "t", "--size", "500x500"], 2, "--trial and --camera go together"),
+        (["--trial", "t", "--camera", "below", "--size", "9x9"], 1, "is not a trial"),
+        (["-o", "c.toml", "--size", "200x200", "--bounds-m", "0,0,1,1"], 1, "outside the image"),
+    ],
+)
+def test_wrong_use_is_one_line_with_a_hint(zfcal, tmp_path, words, code, says):
+    """And leaves nothing behind."""
+    done = zfcal("camera", "corners", *CORNERS, *words)
+    assert done.code == code
+    assert says in done.err
+    assert "Traceback" not in done.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["corners"])
+def test_every_camera_command_has_help_with_an_example(zfcal, name):
+    """And the group too."""
+    assert "Example:" in zfcal("camera", "--help").out
+    assert "Example:\n      zfcal camera " + name in zfcal("camera", name, "--help").out

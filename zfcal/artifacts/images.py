@@ -1,0 +1,41 @@
+"""Single images as files: board images, a picture of the empty tank."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.artifacts.atomic import unreadable
+from zfcal.errors import DamagedError
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Read an image file that OpenCV knows (PNG, JPEG, TIFF, BMP, ...).
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Blue, green, red, as it stands in the file: a camera's own turning is not undone.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be opened.
+    DamagedError
+        It is no image, or one that is cut.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
+    if image is None:
+        raise DamagedError(
+            f"{path}: is no image that can be read.",
+            hint="Copy it again; PNG, JPEG, TIFF and BMP are read.",
+        )
+    return np.asarray(image, np.uint8)

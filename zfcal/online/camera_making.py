@@ -1,0 +1,171 @@
+"""From a calibration to its files: the camera, its figure, and its name in ``trial.toml``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from zfcal.artifacts.cameras import SCHEMA
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.settings import name_camera, read_trial
+from zfcal.errors import InputError
+from zfcal.online.cameras import write_camera
+from zfcal.online.events import Made, Note, Result, Tell
+from zfcal.online.opening import Task, at_work, reason_to_make
+from zfcal.trial import CONFIG_NAME
+from zfcal.vision.calibration import Calibration
+from zfcal.vision.lens import Lens
+
+NAMES = ("overhead", "below")
+
+Found: TypeAlias = Calibration | tuple[Lens, Mapping[str, Any]]
+"""A camera with its errors; or a lens alone with what is known of it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a camera file goes.
+
+    Parameters
+    ----------
+    path
+        The file.
+    root
+        The trial whose ``trial.toml`` is to name it; None for no trial.
+    name
+        What it is called there: ``overhead`` or ``below``.
+    """
+
+    path: Path
+    root: Path | None = None
+    name: str = ""
+
+    @property
+    def base(self) -> Path:
+        """What paths in the lineage are relative to."""
+        return self.path.parent if self.root is None else self.root
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """What a camera file is made from.
+
+    Parameters
+    ----------
+    command
+        The command, such as ``camera corners``.
+    options
+        Those that bear on the result.
+    inputs
+        Files that it reads.
+    """
+
+    command: str
+    options: Mapping[str, JSON] = field(default_factory=dict)
+    inputs: tuple[Path, ...] = ()
+
+    def lineage(self, base: Path) -> Lineage:
+        """Return the lineage of what it makes."""
+        return Lineage(
+            schema=SCHEMA,
+            command=self.command,
+            options=self.options,
+            inputs=hash_inputs(base, self.inputs),
+        )
+
+
+def place_for(*, out: Path | None, trial: Path | None, name: str | None) -> Place:
+    """Return where a camera file goes: a path, or a trial's camera of that name.
+
+    Raises
+    ------
+    InputError
+        No place was given, or two; or there is no such trial.
+    """
+    if (out is None) == (trial is None):
+        raise InputError(
+            "A camera file needs one place to go.",
+            hint="Give -o FILE.toml, or --trial TRIAL and --camera overhead (or below).",
+        )
+    if trial is None:
+        if out is None or out.suffix != ".toml":
+            raise InputError(f"{out}: a camera file is TOML.", hint="Let its name end in .toml.")
+        return Place(path=out)
+    if name not in NAMES:
+        raise InputError(
+            f"Which camera of {trial} is it?", hint=f"Give --camera with {' or '.join(NAMES)}."
+        )
+    read_trial(trial)
+    return Place(path=trial / "cameras" / f"{name}.toml", root=trial, name=name)
+
+
+def make_camera(
+    place: Place, recipe: Recipe, work: Callable[[], Found], tell: Tell, *, task: Task
+) -> None:
+    """Make a camera file, unless it is up to date.
+
+    Parameters
+    ----------
+    place
+        Where it goes.
+    recipe
+        What it is made from.
+    work
+        Does the calibration.
+    tell
+        Hears of the files, the errors and what a person should know.
+    task
+        Whether to write, and whether to do it again.
+    """
+    lineage = recipe.lineage(place.base)
+    with nullcontext() if place.root is None else at_work(place.root, "camera", task):
+        reason = reason_to_make(place.path, lineage, task, tell)
+        if reason is not None:
+            found = work()
+            _write(place, found, lineage)
+            tell(Made(path=place.path, reason=reason))
+            _tell_result(found, tell)
+        if place.root is not None and not task.dry_run:
+            _name(place.root, place, tell)
+
+
+def _write(place: Place, found: Found, lineage: Lineage) -> None:
+    if isinstance(found, Calibration):
+        points = (found.pairs.px, found.pairs.m)
+        write_camera(place.path, found.camera, lineage, result=found.result(), points=points)
+    else:
+        lens, result = found
+        write_camera(place.path, lens, lineage, result=result)
+
+
+def _name(root: Path, place: Place, tell: Tell) -> None:
+    if name_camera(root, place.name, place.path):
+        tell(Note(text=f"{root / CONFIG_NAME} names it as the {place.name} camera."))
+
+
+def _tell_result(found: Found, tell: Tell) -> None:
+    result = found.result() if isinstance(found, Calibration) else dict(found[1])
+    for note in result.get("notes", ()):
+        tell(Note(text=note, warning=True))
+    tell(Note(text=in_words(result)))
+    tell(Result(value=result))
+
+
+def in_words(result: Mapping[str, Any]) -> str:
+    """Return the errors of a calibration as a sentence."""
+    parts = [f"{result['method']}, {result['n_points']} points"]
+    for key, unit, words in (
+        ("error_mm", "mm", "error"),
+        ("left_out_mm", "mm", "of points left out"),
+        ("error_px", "px", "error"),
+    ):
+        if key in result:
+            found = result[key]
+            parts.append(
+                f"{words} {found['median']:.2f} {unit} median, {found['max']:.2f} {unit} largest"
+            )
+    return "; ".join(parts) + "."

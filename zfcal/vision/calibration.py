@@ -1,0 +1,426 @@
+"""What every calibration starts from and ends in: pairs of points, and errors in millimetres.
+
+How a camera is fitted stands in `calibration_points` (pairs on the tank's plane) and
+`calibration_boards` (images of a board).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zfcal.errors import InputError
+from zfcal.vision.camera import Camera, Homography, Projection
+from zfcal.vision.lens import Floats, check_size, shown_size
+
+SMALLEST_M = 0.01
+LARGEST_M = 20.0
+"""Points nearer together or farther apart are not in metres, or of no tank."""
+
+_ON_A_LINE = 1e-3
+"""Points whose spread across is less than this share of that along lie on a line."""
+
+_SINGULAR = 1e-6
+
+_OUTLIER_SD = 6.0
+"""Robust standard deviations, beyond which a point does not belong to the others."""
+
+_OUTLIER_M = 0.002
+_MM = 1000.0
+
+Fit: TypeAlias = Callable[["Pairs"], Camera | Homography]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pairs:
+    """Points of the tank's plane: where each lies, and where an image shows it.
+
+    Parameters
+    ----------
+    px : ndarray, shape (n, 2)
+        In pixels.
+    m : ndarray, shape (n, 2)
+        In metres.
+    size_px
+        Width and height of the image.
+    """
+
+    px: Floats
+    m: Floats
+    size_px: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        check_size(self.size_px)
+        for name in ("px", "m"):
+            values = getattr(self, name)
+            if values.ndim != 2 or values.shape[1] != 2:
+                raise InputError(f"Points must have shape (n, 2), got {values.shape}.")
+            for number in np.flatnonzero(~np.isfinite(values).all(axis=1)):
+                raise InputError(
+                    f"Point {number + 1} is not finite: {name} = {_shown(values[number])}.",
+                    hint="Leave a point out that is not known.",
+                )
+        if len(self.px) != len(self.m):
+            raise InputError(f"There are {len(self.px)} points in pixels, {len(self.m)} in metres.")
+        self._check_inside()
+        self._check_metres()
+
+    def __len__(self) -> int:
+        return len(self.px)
+
+    def without(self, number: int) -> Pairs:
+        """Return all pairs but one."""
+        kept = np.arange(len(self)) != number
+        return Pairs(px=self.px[kept], m=self.m[kept], size_px=self.size_px)
+
+    def check_spread(self, at_least: int, *, what: str) -> None:
+        """Refuse too few points, and points on a line.
+
+        Parameters
+        ----------
+        at_least
+            How many are needed.
+        what
+            What needs them, for the message.
+
+        Raises
+        ------
+        InputError
+            They do not determine a plane.
+        """
+        if len(self) < at_least:
+            raise InputError(
+                f"{what} needs {at_least} points or more, got {len(self)}.",
+                hint="Spread them over the whole tank; 12 to 20 let the error be judged too.",
+            )
+        for values, where in ((self.m, "metres"), (self.px, "pixels")):
+            spread = np.linalg.svd(values - values.mean(axis=0), compute_uv=False)
+            if not spread[1] > _ON_A_LINE * spread[0]:
+                raise InputError(
+                    f"The {len(self)} points lie on a line (in {where}).",
+                    hint="A plane needs points to both sides of any line: take all four corners.",
+                )
+        if not _determined(self):
+            raise InputError(
+                "The points do not determine the plane: all but one lie on a line.",
+                hint="Take points no three of which lie on a line, such as the four corners.",
+            )
+
+    def _check_inside(self) -> None:
+        width, height = self.size_px
+        low, high = np.array([-0.5, -0.5]), np.array([width - 0.5, height - 0.5])
+        outside = (self.px < low - 0.5) | (self.px > high + 0.5)
+        for number in np.flatnonzero(outside.any(axis=1)):
+            raise InputError(
+                f"Point {number + 1} lies outside the image: {_shown(self.px[number])} px in "
+                f"{shown_size(self.size_px)}.",
+                hint="Were the points taken in an image of another size, or of another camera?",
+            )
+
+    def _check_metres(self) -> None:
+        if len(self) < 2:
+            return
+        extent_m = float(np.ptp(self.m, axis=0).max())
+        if not SMALLEST_M <= extent_m <= LARGEST_M:
+            raise InputError(
+                f"The points span {extent_m:g} m, expected {SMALLEST_M:g} to {LARGEST_M:g} m.",
+                hint="Are they in centimetres or millimetres? Give metres.",
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """A camera that was fitted, and how well.
+
+    Parameters
+    ----------
+    camera
+        What was found.
+    pairs
+        The points of the plane that it was made from.
+    method
+        How, in a few words.
+    n_parameters
+        How many numbers were fitted to the points.
+    left_out_m : ndarray, shape (n, 2)
+        Where each point would lie by a fit to all others, less where it lies; NaN where that
+        cannot be done.
+    notes
+        What a person should know.
+    details
+        Further numbers for the file.
+    """
+
+    camera: Camera | Homography
+    pairs: Pairs
+    method: str
+    n_parameters: int
+    left_out_m: Floats
+    notes: tuple[str, ...] = ()
+    details: dict[str, Any]
+
+    @property
+    def residual_m(self) -> Floats:
+        """Where each pixel lies by the fit, less where its point lies; shape (n, 2)."""
+        return self.camera.to_metres(self.pairs.px) - self.pairs.m
+
+    @property
+    def residual_px(self) -> Floats:
+        """Where the fit sees each point, less its pixel; shape (n, 2)."""
+        return self.camera.to_pixels(self.pairs.m) - self.pairs.px
+
+    @property
+    def has_spare_points(self) -> bool:
+        """Whether there are more numbers measured than fitted."""
+        return 2 * len(self.pairs) > self.n_parameters
+
+    def result(self) -> dict[str, Any]:
+        """Return how it went, for a camera file and for JSON.
+
+        Errors of an exact fit are zero and tell nothing, so they are left out.
+        """
+        found: dict[str, Any] = {
+            "method": self.method,
+            "n_points": len(self.pairs),
+            "n_parameters": self.n_parameters,
+            "seen_from": seen_from(self.camera),
+        }
+        if self.has_spare_points:
+            found["error_mm"] = summary(self.residual_m * _MM)
+            found["error_px"] = summary(self.residual_px)
+        if np.isfinite(self.left_out_m).any():
+            found["left_out_mm"] = summary(self.left_out_m * _MM)
+        return {**found, **self.details, "notes": list(self.notes)}
+
+
+def summary(errors: Floats) -> dict[str, float]:
+    """Return median, root mean square, 95th percentile and largest length of errors.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n, 2)
+        Rows with NaN are left out.
+    """
+    lengths = np.hypot(*errors.T)
+    lengths = lengths[np.isfinite(lengths)]
+    if not len(lengths):
+        return {}
+    return {
+        "median": float(np.median(lengths)),
+        "rms": float(np.sqrt(np.mean(lengths**2))),
+        "p95": float(np.percentile(lengths, 95)),
+        "max": float(lengths.max()),
+    }
+
+
+def left_out(pairs: Pairs, fit: Fit) -> Floats:
+    """Return where each point would lie by a fit to all others, less where it lies.
+
+    Parameters
+    ----------
+    pairs
+        The points.
+    fit
+        Makes a camera of pairs. Points that it cannot do without stay NaN.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres.
+    """
+    errors = np.full((len(pairs), 2), np.nan)
+    for number in range(len(pairs)):
+        try:
+            camera = fit(pairs.without(number))
+        except InputError:
+            continue
+        errors[number] = camera.to_metres(pairs.px[number]) - pairs.m[number]
+    return errors
+
+
+def outlier_notes(errors_m: Floats) -> tuple[str, ...]:
+    """Return a sentence for each point that does not belong to the others.
+
+    Parameters
+    ----------
+    errors_m : ndarray, shape (n, 2)
+        Of each point by a fit to the others, or by one that hardly heeds outliers.
+    """
+    lengths = np.hypot(*errors_m.T)
+    usual = float(np.nanmedian(lengths)) if np.isfinite(lengths).any() else np.nan
+    # The median length of a normal error in two dimensions is 1.177 standard deviations.
+    limit = max(_OUTLIER_SD * usual / 1.177, _OUTLIER_M)
+    return tuple(
+        f"Point {number + 1} lies {lengths[number] * _MM:.1f} mm from where the others put it "
+        f"(half of them are within {usual * _MM:.1f} mm): check its line."
+        for number in np.flatnonzero(lengths > limit)
+    )
+
+
+def calibrate_homography(pairs: Pairs) -> Calibration:
+    """Fit a homography: a camera whose lens does not bend lines.
+
+    Parameters
+    ----------
+    pairs
+        Four points or more, no three of four on a line.
+
+    Raises
+    ------
+    InputError
+        The points do not determine it.
+    """
+    camera = fit_homography(pairs)
+    errors_m = left_out(pairs, fit_homography)
+    notes = outlier_notes(errors_m)
+    if len(pairs) == 4:
+        notes += ("Four points determine a homography exactly: its error is not known.",)
+    return Calibration(
+        camera=camera,
+        pairs=pairs,
+        method="homography",
+        n_parameters=8,
+        left_out_m=errors_m,
+        notes=notes,
+        details={},
+    )
+
+
+def fit_homography(pairs: Pairs) -> Homography:
+    """Return the homography with the least error in pixels.
+
+    Raises
+    ------
+    InputError
+        The points do not determine it.
+    """
+    pairs.check_spread(4, what="A homography")
+    found, _ = cv2.findHomography(pairs.m, pairs.px, method=0)
+    if found is None or not np.isfinite(found).all():
+        raise InputError(
+            "The points do not determine a homography.",
+            hint="Take points no three of which lie on a line, such as the four corners.",
+        )
+    inverse = np.linalg.inv(found)
+    rows = tuple(tuple(float(value) for value in row) for row in inverse / inverse[2, 2])
+    return Homography(size_px=pairs.size_px, matrix=rows)
+
+
+def corners_of(bounds_m: tuple[float, float, float, float]) -> Floats:
+    """Return the corners of a rectangle from the lower left one, counter-clockwise.
+
+    Parameters
+    ----------
+    bounds_m
+        ``(x0, y0, x1, y1)``, as of an arena's outline.
+
+    Returns
+    -------
+    ndarray, shape (4, 2)
+        In metres.
+    """
+    x0, y0, x1, y1 = bounds_m
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], np.float64)
+
+
+def homography_from_corners(
+    corners_px: ArrayLike, bounds_m: tuple[float, float, float, float], size_px: tuple[int, int]
+) -> Homography:
+    """Return the homography by which four pixels are the corners of the arena.
+
+    Parameters
+    ----------
+    corners_px : array_like, shape (4, 2)
+        The corners' pixels: lower left, lower right, upper right, upper left as the arena
+        has them (y up), however the camera is turned.
+    bounds_m
+        ``(x0, y0, x1, y1)`` of the arena.
+    size_px
+        Width and height of the image.
+
+    Raises
+    ------
+    InputError
+        They are not four, three lie on a line, or one lies outside the image.
+    """
+    return fit_homography(_corner_pairs(corners_px, bounds_m, size_px))
+
+
+def calibrate_corners(
+    corners_px: ArrayLike, bounds_m: tuple[float, float, float, float], size_px: tuple[int, int]
+) -> Calibration:
+    """Return `homography_from_corners` with what is known of its errors: nothing."""
+    return calibrate_homography(_corner_pairs(corners_px, bounds_m, size_px))
+
+
+def seen_from(camera: Projection) -> str:
+    """Return ``above`` or ``below``: whether the arena's y runs up in the image or is mirrored.
+
+    It is judged in the middle of the image; ``unknown`` where that shows no part of the plane.
+    """
+    middle = np.array(camera.size_px) / 2
+    here, right, down = camera.to_metres(middle + np.array([[0, 0], [1, 0], [0, 1]]))
+    (a, b), (c, d) = right - here, down - here
+    turn = a * d - b * c
+    if np.isnan(turn):
+        return "unknown"
+    return "above" if turn < 0 else "below"
+
+
+def _corner_pairs(
+    corners_px: ArrayLike, bounds_m: tuple[float, float, float, float], size_px: tuple[int, int]
+) -> Pairs:
+    corners = np.asarray(corners_px, np.float64)
+    if corners.shape != (4, 2):
+        raise InputError(f"Four corners X,Y are needed, got an array of shape {corners.shape}.")
+    pairs = Pairs(px=corners, m=corners_of(bounds_m), size_px=size_px)
+    pairs.check_spread(4, what="A homography")
+    _check_convex(corners)
+    return pairs
+
+
+def _check_convex(corners: Floats) -> None:
+    sides = np.roll(corners, -1, axis=0) - corners
+    after = np.roll(sides, -1, axis=0)
+    turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
+    if not (np.all(turns > 0) or np.all(turns < 0)):
+        raise InputError(
+            "The four corners cross over: they are not in order round the arena.",
+            hint="Give lower left, lower right, upper right, upper left, as the arena has them.",
+        )
+
+
+def _determined(pairs: Pairs) -> bool:
+    """Return whether the points determine a homography, by the rank of its equations."""
+    if len(pairs) == 4 and any(_has_line(points) for points in (pairs.m, pairs.px)):
+        return False
+    (x, y), (u, v) = _normal(pairs.m).T, _normal(pairs.px).T
+    none, one = np.zeros_like(x), np.ones_like(x)
+    first = np.column_stack([x, y, one, none, none, none, -u * x, -u * y, -u])
+    second = np.column_stack([none, none, none, x, y, one, -v * x, -v * y, -v])
+    values = np.linalg.svd(np.vstack([first, second]), compute_uv=False)
+    return bool(values[7] > _SINGULAR * values[0])
+
+
+def _has_line(points: Floats) -> bool:
+    """Return whether three of four points lie on a line."""
+    for left_out in range(4):
+        three = np.delete(points, left_out, axis=0)
+        spread = np.linalg.svd(three - three.mean(axis=0), compute_uv=False)
+        if not spread[1] > _ON_A_LINE * spread[0]:
+            return True
+    return False
+
+
+def _normal(points: Floats) -> Floats:
+    centred = points - points.mean(axis=0)
+    return centred / max(float(np.hypot(*centred.T).mean()), 1e-12)
+
+
+def _shown(point: Floats) -> str:
+    return ", ".join(f"{value:g}" for value in point)
