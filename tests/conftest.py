@@ -1,5 +1,6 @@
 """What all tests share: where the real recordings lie, and how hypothesis runs."""
 
+import importlib.util
 import math
 import os
 from pathlib import Path
@@ -40,6 +41,16 @@ def pytest_collection_modifyitems(items):
 def repository():
     """Return the root of the source tree."""
     return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def examine():
+    """Return what lists the problems of an MCAP file, as `mcap doctor` would."""
+    place = REPOSITORY / "tests" / "artifacts" / "doctor.py"
+    spec = importlib.util.spec_from_file_location("doctor", place)
+    doctor = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(doctor)
+    return doctor.examine
 
 
 @pytest.fixture(scope="session")

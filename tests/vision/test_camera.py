@@ -162,3 +162,11 @@ def test_the_calibration_of_another_camera_is_refused():
         InputError, match=r"overhead.toml: .* 500 x 500 images, these are 640 x 480"
     ):
         check_fits(ABOVE, (640, 480), camera="overhead.toml")
+
+
+@pytest.mark.parametrize("camera", [ABOVE, BELOW])
+def test_no_points_have_no_pixels(camera):
+    """Nor places."""
+    nothing = np.empty((0, 2))
+    assert camera.to_pixels(nothing).shape == (0, 2)
+    assert camera.to_metres(nothing).shape == (0, 2)

@@ -24,7 +24,7 @@ from zfcal.errors import DamagedError
 _RECORD_LIMIT = 2**28
 """Bytes of the longest record that is believed: a damaged length asks for more."""
 
-_BROKEN = (
+BROKEN = (
     McapError,
     ValueError,
     struct.error,
@@ -33,6 +33,7 @@ _BROKEN = (
     OverflowError,  # a damaged size of what a chunk unpacks to
     MemoryError,  # the same
 )
+"""What reading a damaged MCAP file may raise."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -88,18 +89,47 @@ def overview(path: Path) -> Overview:
         It is no MCAP file.
     """
     found = Overview()
+    for _ in read_messages(path, found):
+        pass
+    return found
+
+
+def read_messages(path: Path, found: Overview) -> Iterator[tuple[Channel, Message]]:
+    """Yield the messages of an MCAP file in file order, as far as they can be read.
+
+    Parameters
+    ----------
+    path
+        The file; it may have been cut short, or still grow.
+    found
+        A new overview, which is filled in while the file is read: afterwards it
+        says whether the file is whole, and what was lost.
+
+    Yields
+    ------
+    channel : Channel
+    message : Message
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be opened.
+    DamagedError
+        It is no MCAP file.
+    """
     channels: dict[int, Channel] = {}
     names: dict[int, str] = {}
     try:
         for record, position in _records(path, found):
             _note(record, found, channels, names)
             found.read_bytes = position
+            if isinstance(record, Message):
+                yield channels[record.channel_id], record
         found.whole = True
     except EndOfFile:
         found.problem = "the file ends in the middle of a record: it was cut short, or still grows"
-    except _BROKEN as error:
+    except BROKEN as error:
         found.problem = f"a damaged record ({error})"
-    return found
 
 
 def read_metadata(path: Path, name: str) -> dict[str, str] | None:
@@ -118,7 +148,7 @@ def read_metadata(path: Path, name: str) -> dict[str, str] | None:
                 return dict(record.metadata)
     except EndOfFile:
         return None
-    except _BROKEN as error:
+    except BROKEN as error:
         raise DamagedError(
             f"{path}: a record is damaged ({error}).",
             hint=f"See how much of it can be read with: zfcal inspect {path}",

@@ -1,0 +1,245 @@
+"""Images of a tank from positions: what the two cameras would have seen.
+
+A painter draws each moment by itself: the same moment and seed give the same image,
+whatever was drawn before. Cameras, files and time are the business of others.
+"""
+
+from __future__ import annotations
+
+from typing import final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.vision.bodies import Outlines, outlines_of
+from zfcal.vision.camera import Projection
+from zfcal.vision.frames import Image
+from zfcal.vision.look import Look
+from zfcal.vision.painting import Fill, Noise, Patch, darken, lay_over, mean_patch, patch_of
+from zfcal.vision.ripples import Ripples
+from zfcal.vision.swimming import Moment
+from zfcal.vision.tank import overhead_tank, photographed
+
+Floats = NDArray[np.float64]
+
+OVERHEAD = 21
+"""Tells the random numbers of overhead images from others of the same seed."""
+
+_SECTIONS = ((0, 9), (8, 16), (15, 22))
+"""Stations of head, trunk and tail."""
+
+_BACK_SHARE = 0.55
+"""Of the body's width: the back, between the flanks."""
+
+_STEP_PX = 0.7
+"""A body that moves farther while the shutter is open is drawn several times."""
+
+_MOST_STEPS = 5
+_ASIDE_RAD = 0.5
+
+
+@final
+class OverheadPainter:
+    """Draws what the overhead camera sees.
+
+    Parameters
+    ----------
+    arena
+        The tank.
+    camera
+        The overhead camera.
+    look
+        How things look.
+    seed
+        Of everything that is random.
+    photograph
+        Of the empty tank, instead of a drawn one.
+    """
+
+    def __init__(
+        self,
+        arena: Arena,
+        camera: Projection,
+        look: Look,
+        *,
+        seed: int,
+        photograph: Image | None = None,
+    ) -> None:
+        self._arena, self._camera, self._look, self._seed = arena, camera, look, seed
+        tank = overhead_tank(arena, camera, look, seed=seed)
+        self._wall = tank.wall
+        self._empty = tank.image if photograph is None else photographed(photograph, camera)
+        self._noise = Noise(self._empty.shape, look.noise_grey, seed)
+        size_px = look.ripple_m * _px_per_m(arena, camera)
+        self._ripples = Ripples(self._empty.shape, look.ripple_grey, size_px, seed)
+
+    @property
+    def empty(self) -> Image:
+        """The tank without anybody, noise and ripples."""
+        return self._empty.copy()
+
+    def paint(self, moment: Moment) -> Image:
+        """Draw a moment.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width)
+        """
+        look = self._look
+        rng = np.random.default_rng([self._seed, OVERHEAD, moment.number])
+        image = self._ripples.add_to(self._empty, moment.time_s)
+        if look.flicker > 0:
+            light = 1.0 + look.flicker * rng.standard_normal()
+            image = np.asarray(cv2.convertScaleAbs(image, alpha=light), np.uint8)
+        if len(moment.bodies):
+            self._draw_bodies(image, moment)
+        return self._noise.add_to(image, rng)
+
+    def _draw_bodies(self, image: Image, moment: Moment) -> None:
+        look = self._look
+        outlines = outlines_of(moment.bodies)
+        patches = self._patches(outlines, moment)
+        if look.shadow_opacity > 0:
+            for patch, xy_m in zip(patches, moment.bodies.xy_m, strict=True):
+                darken(image, self._shadow(patch, xy_m), look.shadow_opacity)
+        if look.reflection > 0:
+            self._draw_reflections(image, outlines, moment)
+        for patch in patches:
+            lay_over(image, patch)
+
+    def _patches(self, outlines: Outlines, moment: Moment) -> list[Patch]:
+        """Return a patch for each body, the robots' first: fish swim over them."""
+        look = self._look
+        left, right, fin = (
+            self._camera.to_pixels(line)
+            for line in (outlines.left_m, outlines.right_m, outlines.fin_m)
+        )
+        moved_m = moment.velocity_m_s * look.exposure_s / 2
+        moved_px = self._camera.to_pixels(moment.bodies.xy_m + moved_m) - self._camera.to_pixels(
+            moment.bodies.xy_m - moved_m
+        )
+        patches = []
+        for body in range(len(moment.bodies)):
+            fills = _fills(
+                left[body],
+                right[body],
+                None if moment.is_robot[body] else fin[body],
+                look,
+            )
+            n = 1 + int(np.hypot(*moved_px[body]) / _STEP_PX)
+            patches.append(_blurred(fills, moved_px[body], min(n, _MOST_STEPS), look.defocus_px))
+        return patches
+
+    def _shadow(self, patch: Patch, xy_m: Floats) -> Patch:
+        look = self._look
+        ends = self._camera.to_pixels(np.array([xy_m, xy_m + look.shadow_offset_m]))
+        x, y = np.rint(ends[1] - ends[0]).astype(int)
+        blur_px = look.shadow_blur_m * _px_per_m(self._arena, self._camera)
+        edge = int(np.ceil(2.5 * blur_px))
+        cover = cv2.copyMakeBorder(patch.cover, edge, edge, edge, edge, cv2.BORDER_CONSTANT)
+        soft = cv2.GaussianBlur(cover, (0, 0), blur_px) if blur_px > 0 else cover
+        at = patch.corner_px[0] + int(x) - edge, patch.corner_px[1] + int(y) - edge
+        return Patch(corner_px=at, cover=np.asarray(soft, np.float32), ink=patch.ink)
+
+    def _draw_reflections(self, image: Image, outlines: Outlines, moment: Moment) -> None:
+        look = self._look
+        for body, xy_m in enumerate(moment.bodies.xy_m):
+            for origin, normal, distance_m in _near_walls(
+                self._arena, xy_m, look.reflection_reach_m
+            ):
+                ring = outlines.silhouette_m[body]
+                mirrored = ring - 2 * ((ring - origin) @ normal)[:, None] * normal
+                fill = Fill(corners_px=self._camera.to_pixels(mirrored), grey=0.0)
+                patch = patch_of([fill], blur_px=1.0 + look.defocus_px)
+                near = 1.0 - distance_m / look.reflection_reach_m
+                darken(image, patch, look.reflection * near, self._wall)
+
+
+def render_overhead(  # noqa: PLR0913 - one keyword for each thing that an image depends on
+    moment: Moment,
+    arena: Arena,
+    camera: Projection,
+    *,
+    look: Look,
+    seed: int,
+    photograph: Image | None = None,
+) -> Image:
+    """Draw one overhead image; for many, keep an `OverheadPainter`.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width)
+    """
+    return OverheadPainter(arena, camera, look, seed=seed, photograph=photograph).paint(moment)
+
+
+def _fills(left: Floats, right: Floats, fin: Floats | None, look: Look) -> list[Fill]:
+    """Return the polygons of a body, in pixels: a fish with its fin, or a lure without."""
+    ring = np.concatenate([left, right[::-1]])
+    if fin is None:
+        return [Fill(corners_px=ring, grey=look.lure_grey)]
+    shades = np.linspace(look.fish_grey, look.tail_grey, len(_SECTIONS))
+    flank = (look.fish_grey + look.tail_grey) / 2 + look.stripe_grey
+    middle = (left + right) / 2
+    fills = [] if look.fin_opacity == 0 else [_fin(fin, look)]
+    fills.append(Fill(corners_px=ring, grey=min(flank, 255.0)))
+    sides = (middle + _BACK_SHARE * (left - middle), middle + _BACK_SHARE * (right - middle))
+    for (start, end), shade in zip(_SECTIONS, shades, strict=True):
+        back = np.concatenate([sides[0][start:end], sides[1][start:end][::-1]])
+        fills.append(Fill(corners_px=back, grey=shade))
+    return fills
+
+
+def _fin(corners_px: Floats, look: Look) -> Fill:
+    return Fill(corners_px=corners_px, grey=look.tail_grey, opacity=look.fin_opacity)
+
+
+def _blurred(fills: list[Fill], moved_px: Floats, n: int, defocus_px: float) -> Patch:
+    """Return the mean of a body's patches along its way, around the middle of the exposure."""
+    shares = (np.arange(n) + 0.5) / n - 0.5
+    return mean_patch(
+        [
+            patch_of(
+                [
+                    Fill(
+                        corners_px=fill.corners_px + share * moved_px,
+                        grey=fill.grey,
+                        opacity=fill.opacity,
+                    )
+                    for fill in fills
+                ],
+                blur_px=defocus_px,
+            )
+            for share in shares
+        ]
+    )
+
+
+def _near_walls(arena: Arena, xy_m: Floats, reach_m: float) -> list[tuple[Floats, Floats, float]]:
+    """Return a point, the normal and the distance of at most two walls within reach."""
+    start, end = arena.segments_m[:, :2], arena.segments_m[:, 2:]
+    along = end - start
+    length_m = np.hypot(along[:, 0], along[:, 1])
+    unit = along / length_m[:, None]
+    foot = ((xy_m - start) * unit).sum(axis=1)
+    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    distance_m = np.abs(((xy_m - start) * normal).sum(axis=1))
+    beside = (foot >= 0) & (foot <= length_m) & (distance_m < reach_m)
+    found: list[tuple[Floats, Floats, float]] = []
+    for wall in np.flatnonzero(beside)[np.argsort(distance_m[beside])]:
+        turned = [abs(normal[wall] @ other) < np.cos(_ASIDE_RAD) for _, other, _ in found]
+        if all(turned):
+            found.append((start[wall], normal[wall], float(distance_m[wall])))
+        if len(found) == 2:
+            break
+    return found
+
+
+def _px_per_m(arena: Arena, camera: Projection) -> float:
+    """Return the scale in the middle of the arena."""
+    x0, y0, x1, y1 = arena.outline.bounds
+    middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
+    ends = camera.to_pixels(middle + np.array([[-0.01, 0.0], [0.01, 0.0]]))
+    return float(np.hypot(*(ends[1] - ends[0])) / 0.02)

@@ -1,0 +1,50 @@
+"""Ripples on the water: two smooth patterns that drift across each other."""
+
+from __future__ import annotations
+
+from typing import final
+
+import cv2
+import numpy as np
+
+from zfcal.vision.frames import Image
+from zfcal.vision.painting import smooth_field
+
+_DRIFT_PX_S = ((23.0, 11.0), (-17.0, 19.0))
+_RIPPLES = 31
+
+
+@final
+class Ripples:
+    """Adds ripples to grey images.
+
+    Parameters
+    ----------
+    shape
+        Of the images.
+    sd_grey
+        Standard deviation of the grey levels.
+    size_px
+        Of a ripple.
+    seed
+        Of the patterns.
+    """
+
+    def __init__(self, shape: tuple[int, ...], sd_grey: float, size_px: float, seed: int) -> None:
+        rng = np.random.default_rng([seed, _RIPPLES])
+        self._shape = shape
+        self._fields = []
+        for _ in _DRIFT_PX_S if sd_grey > 0 else ():
+            field = smooth_field(rng, shape, size_px / 2) * sd_grey / np.sqrt(2.0)
+            # Twice the size: any cut of the image's size is whole.
+            self._fields.append(np.tile(np.rint(field).astype(np.int16), (2, 2)))
+
+    def add_to(self, image: Image, time_s: float) -> Image:
+        """Return a copy of the image with the ripples of an instant."""
+        if not self._fields:
+            return image.copy()
+        cuts = []
+        for field, (dx, dy) in zip(self._fields, _DRIFT_PX_S, strict=True):
+            x, y = int(dx * time_s) % self._shape[1], int(dy * time_s) % self._shape[0]
+            cuts.append(field[y : y + self._shape[0], x : x + self._shape[1]])
+        return np.asarray(cv2.add(image, cuts[0] + cuts[1], dtype=cv2.CV_8U), np.uint8)
