@@ -1,0 +1,190 @@
+"""Frames of known fish are tracked: where they are, who they are, where they head."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.vision.background import background_of
+from zfcal.vision.frames import Frame
+from zfcal.vision.seen import METHODS, TrackerOptions
+from zfcal.vision.tracker import FishTracker, follow
+
+
+@pytest.fixture
+def tracker(drawn):
+    """Return a tracker of three fish."""
+    return FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION)
+
+
+def black(number, size=200):
+    """Return a frame that shows nothing."""
+    return Frame(number=number, time_s=number / 15, image=np.zeros((size, size), np.uint8))
+
+
+def errors_px(told, bodies):
+    """Return how far each sighting is from the nearest body."""
+    at = np.array([body[:2] for body in bodies])
+    return [float(np.hypot(*(at - (s.x_px, s.y_px)).T).min()) for s in told]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_fish_apart_are_found_to_a_third_of_a_pixel_in_every_frame(drawn, method):
+    """Three fish on a circle, one id each from the first frame to the last, none beside."""
+    paths = drawn.circling(150)
+    tracker = FishTracker(TrackerOptions(n_agents=3, method=method), drawn.PROJECTION)
+
+    told = [seen for _, seen in follow(tracker, drawn.frames(paths))]
+
+    errors = [e for seen, bodies in zip(told, paths, strict=True) for e in errors_px(seen, bodies)]
+    assert {len(seen) for seen in told} == {3}
+    assert {s.agent for seen in told for s in seen} == {0, 1, 2}
+    assert np.median(errors) < 0.3
+    assert max(errors) < 1.2
+    assert tracker.take_bad_frames() == []
+
+
+def test_headings_point_to_the_head_and_metres_run_up(drawn, tracker):
+    """The circle turns clockwise in the image: in metres, y up, the other way."""
+    paths = drawn.circling(130)
+
+    *_, (_, seen) = follow(tracker, drawn.frames(paths))
+
+    for s in seen:
+        nearest = min(paths[-1], key=lambda b: math.hypot(b[0] - s.x_px, b[1] - s.y_px))
+        assert math.cos(s.heading_rad + nearest[2]) > 0.98
+        assert s.x_m == pytest.approx(s.x_px * drawn.M_PER_PX)
+        assert s.y_m == pytest.approx((drawn.SIZE - s.y_px) * drawn.M_PER_PX)
+
+
+def test_the_same_frames_give_the_same_tracks(drawn):
+    """Nothing is drawn at random."""
+    paths = drawn.circling(120, radius=14)
+
+    runs = [
+        [
+            [(s.agent, s.x_m, s.y_m, s.heading_rad, s.confidence) for s in seen]
+            for _, seen in follow(
+                FishTracker(TrackerOptions(), drawn.PROJECTION), drawn.frames(paths)
+            )
+        ]
+        for _ in range(2)
+    ]
+
+    assert runs[0] == runs[1]
+
+
+def test_no_frame_is_lost_while_the_background_is_learnt(drawn, tracker):
+    """`follow` holds the first hundred back, `step` alone says that there is none yet."""
+    paths = drawn.circling(101)
+    alone = FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION)
+
+    numbers = [frame.number for frame, seen in follow(tracker, drawn.frames(paths)) if seen]
+    told = [alone.step(frame) for frame in drawn.frames(paths)]
+
+    assert numbers == list(range(101))
+    assert [len(seen) for seen in told] == [0] * 100 + [3]
+    assert {bad.reason for bad in alone.take_bad_frames()} == {"no background"}
+
+
+def test_a_clip_shorter_than_the_learning_is_tracked(drawn, tracker):
+    """Forty frames: the background is what they show."""
+    told = [seen for _, seen in follow(tracker, drawn.frames(drawn.circling(40)))]
+
+    assert [len(seen) for seen in told] == [3] * 40
+
+
+def test_a_camera_that_shows_nothing_gives_every_frame_and_no_fish(tracker):
+    """Black throughout: each frame is given back, empty, with the reason."""
+    told = list(follow(tracker, map(black, range(20))))
+
+    assert [(frame.number, seen) for frame, seen in told] == [(k, []) for k in range(20)]
+    assert [bad.reason for bad in tracker.take_bad_frames()] == ["no background"] * 20
+
+
+def test_black_frames_and_other_sizes_are_named_and_ids_outlast_them(drawn, tracker):
+    """Three black frames and one of another size: no rows, reasons, the same ids after."""
+    frames = list(drawn.frames(drawn.circling(130, turn=0.02)))
+    frames[110:113] = [black(k) for k in range(110, 113)]
+    frames[120] = black(120, size=64)
+
+    told = [seen for _, seen in follow(tracker, frames)]
+
+    bad = tracker.take_bad_frames()
+    assert [(b.number, b.reason) for b in bad] == [
+        (110, "black"),
+        (111, "black"),
+        (112, "black"),
+        (120, "size"),
+    ]
+    assert bad[-1].says == "the image is 64 x 64 px, the background 200 x 200 px"
+    assert tracker.take_bad_frames() == []
+    assert told[110] == told[120] == []
+    assert {s.agent for s in told[-1]} == {0, 1, 2}
+
+
+def test_light_that_fades_by_a_quarter_changes_nothing(drawn, tracker):
+    """The lamp dims after the background was learnt: as many fish, at the same places."""
+    paths = drawn.circling(140)
+    dimmed = [
+        Frame(number=f.number, time_s=f.time_s, image=(f.image * 0.75).astype(np.uint8))
+        if f.number >= 120
+        else f
+        for f in drawn.frames(paths)
+    ]
+
+    told = [seen for _, seen in follow(tracker, dimmed)]
+
+    assert [len(seen) for seen in told[115:]] == [3] * 25
+    assert max(errors_px(told[-1], paths[-1])) < 0.8
+
+
+def test_light_fish_in_a_dark_tank_are_tracked_where_that_is_said(drawn):
+    """The negative of a film, with light=True."""
+    paths = drawn.circling(110)
+    tracker = FishTracker(TrackerOptions(n_agents=3, light=True), drawn.PROJECTION)
+
+    told = [seen for _, seen in follow(tracker, drawn.frames(paths, tank=60.0, fish=160.0))]
+
+    assert [len(seen) for seen in told] == [3] * 110
+    assert max(errors_px(told[-1], paths[-1])) < 0.8
+
+
+def test_with_a_loaded_background_the_first_frame_is_tracked_at_once(drawn):
+    """An image of the empty tank makes learning needless."""
+    empty = background_of(drawn.image([], noise=0.0))
+    tracker = FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION, background=empty)
+    paths = drawn.circling(5)
+
+    told = [tracker.step(frame) for frame in drawn.frames(paths)]
+
+    assert [len(seen) for seen in told] == [3] * 5
+
+
+def test_what_lies_outside_the_region_is_not_seen(drawn):
+    """The right half is masked out: only fish in the left half have rows."""
+    region = np.zeros((drawn.SIZE, drawn.SIZE), bool)
+    region[:, :100] = True
+    tracker = FishTracker(TrackerOptions(), drawn.PROJECTION, region=region)
+
+    told = [seen for _, seen in follow(tracker, drawn.frames(drawn.circling(60)))]
+
+    assert max(s.x_px for seen in told for s in seen) < 101
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"method": "hough"}, "A method must be shi-tomasi or silhouette, got 'hough'."),
+        ({"n_agents": 0}, "A tracker's n_agents must be at least 1, got 0."),
+        ({"min_blob_px": math.nan}, "A tracker's min_blob_px must be positive, got nan."),
+        ({"learn_rate": 0.0}, "A tracker's learn_rate must be in (0, 1], got 0.0."),
+        ({"coast_s": -1.0}, "A tracker's coast_s must be 0 or more seconds, got -1.0."),
+    ],
+)
+def test_wrong_options_are_named(wrong, says):
+    """One clear line each."""
+    with pytest.raises(InputError) as caught:
+        TrackerOptions(**wrong)
+    assert str(caught.value) == says

@@ -1,0 +1,251 @@
+"""The empty tank: learnt from frames or loaded, and what of a frame is not it.
+
+Fish are darker than the tank, or, where a tracker is told so, lighter: only one sign counts
+as foreground, so that the bright ghost left where a fish sat while the tank was learnt is
+none. The mixture of Gaussians is OpenCV's (Zivkovic 2004); once frozen, what it calls
+background is a range of greys per pixel, which is read off it by probing and costs a
+two-hundredth of asking it again. Blobs are the business of others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.errors import InputError
+from zfcal.vision.frames import Image
+
+Grey = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+LEARN_FRAMES = 100
+LEARN_RATE = 0.05
+"""The published values."""
+
+_BLACK = 12
+"""A frame whose brightest hundredth is darker than this grey shows nothing."""
+
+_UNIFORM = 2.0
+"""A frame whose greys spread less than this shows nothing either."""
+
+_SAMPLES = 25
+_SAT = 0.9
+"""Quantile of a pixel's greys over time that is tank wherever fish sat for most of the time."""
+
+_SIGMAS = 4.0
+_LEAST_SD = 2.0
+_GRID_PX = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Background:
+    """The empty tank as one camera sees it.
+
+    Parameters
+    ----------
+    level : ndarray of uint8, shape (height, width)
+        The grey of the empty tank.
+    low, high : ndarray of uint8, shape (height, width)
+        What is darker than ``low`` or lighter than ``high`` is not the tank.
+    """
+
+    level: Grey
+    low: Grey
+    high: Grey
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.level.shape[1], self.level.shape[0]
+
+    def inverted(self) -> Background:
+        """Return the negative, in which light fish are dark."""
+        return Background(
+            level=~self.level,
+            low=~self.high,
+            high=~self.low,
+        )
+
+    def gain(self, grey: Grey) -> float:
+        """Return how much brighter than the empty tank an image is; 1 for equally bright.
+
+        The median ratio over a coarse grid: fish cover less than half of a tank.
+        """
+        grid = np.s_[_GRID_PX // 2 :: _GRID_PX, _GRID_PX // 2 :: _GRID_PX]
+        level = self.level[grid].astype(np.float32)
+        return float(np.median((grey[grid] + 1.0) / (level + 1.0)))
+
+
+def grey_of(image: Image) -> Grey:
+    """Return an image in grey, shape (height, width)."""
+    if image.ndim == 2:
+        return image
+    if image.shape[2] == 1:
+        return image[:, :, 0]
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def shows_nothing(grey: Grey) -> bool:
+    """Tell whether an image is black or of one grey: a lens cap, a lost signal."""
+    some = grey[::8, ::8]
+    return bool(np.quantile(some, 0.99) < _BLACK or some.std() < _UNIFORM)
+
+
+class BackgroundLearner:
+    """Learns the empty tank from the first frames, then freezes it.
+
+    Frames that show nothing are left out. A mixture that forgets at the published rate takes
+    a fish that rests for its last second for tank; where it is much darker than the tank was
+    over the whole time, the whole time counts.
+
+    Parameters
+    ----------
+    n_frames
+        Frames to learn from.
+    rate
+        Weight of a new frame in the mixture.
+    """
+
+    def __init__(self, n_frames: int = LEARN_FRAMES, rate: float = LEARN_RATE) -> None:
+        self.n_frames = n_frames
+        self._rate = rate
+        self._count = 0
+        self._mixture = cv2.createBackgroundSubtractorMOG2(
+            history=n_frames, varThreshold=_SIGMAS**2, detectShadows=False
+        )
+        # The most frequent grey alone: beside it the mixture would count a fish that rests.
+        self._mixture.setBackgroundRatio(0.5)
+        self.samples: list[Grey] = []
+
+    @property
+    def count(self) -> int:
+        """Frames learnt from so far."""
+        return self._count
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether as many frames have been seen as were asked for."""
+        return self._count >= self.n_frames
+
+    def add(self, grey: Grey) -> bool:
+        """Learn from a frame; return whether it was of use.
+
+        Raises
+        ------
+        InputError
+            Its size differs from that of the frames before.
+        """
+        if shows_nothing(grey):
+            return False
+        if self.samples and self.samples[0].shape != grey.shape:
+            raise InputError(
+                f"The background is learnt from frames of {_size(self.samples[0])} px, "
+                f"got one of {_size(grey)} px."
+            )
+        self._mixture.apply(grey, None, self._rate if self._count else 1.0)
+        if self._count % max(1, self.n_frames // _SAMPLES) == 0:
+            self.samples.append(grey.copy())
+        self._count += 1
+        return True
+
+    def freeze(self, *, light: bool = False) -> Background:
+        """Return what has been learnt.
+
+        Parameters
+        ----------
+        light
+            Whether fish are lighter than the tank.
+
+        Raises
+        ------
+        InputError
+            No frame was of use.
+        """
+        if not self.samples:
+            raise InputError(
+                "No frame shows a tank to learn the background from.",
+                hint="All were black or of one grey; give an image with --background.",
+            )
+        learnt = _probed(self._mixture, np.asarray(self._mixture.getBackgroundImage(), np.uint8))
+        return _without_sitters(learnt, self.samples, light=light)
+
+
+def background_of(image: Image, *, sd: float = _LEAST_SD) -> Background:
+    """Return the background that an image of the empty tank is.
+
+    Parameters
+    ----------
+    image
+        Grey or colour.
+    sd
+        Noise of the camera, in greys.
+    """
+    level = grey_of(image)
+    return _within(level, np.full(level.shape, max(sd, _LEAST_SD), np.float32))
+
+
+def background_of_many(images: list[Grey]) -> Background:
+    """Return the median of frames as the background; its noise is their median deviation.
+
+    Parameters
+    ----------
+    images : list of ndarray of uint8, each of shape (height, width)
+        Fish in them should not rest.
+    """
+    stack = np.stack(images)
+    level = np.median(stack, axis=0).astype(np.uint8)
+    deviation = np.median(cv2.absdiff(stack, np.broadcast_to(level, stack.shape)), axis=0)
+    sd = np.maximum(1.4826 * deviation, _LEAST_SD).astype(np.float32)
+    return _within(level, sd)
+
+
+def _within(level: Grey, sd: Floats) -> Background:
+    width = _SIGMAS * sd
+    return Background(
+        level=level,
+        low=np.clip(level - width, 0, 255).astype(np.uint8),
+        high=np.clip(level + width, 0, 255).astype(np.uint8),
+    )
+
+
+def _probed(mixture: cv2.BackgroundSubtractorMOG2, level: Grey) -> Background:
+    """Return the range of greys about the level that a frozen mixture calls background."""
+    limits = []
+    for step in (-1, 1):
+        limit, inside = level.copy(), np.ones(level.shape, bool)
+        for away in range(256):
+            probe = np.clip(level.astype(np.int16) + step * away, 0, 255).astype(np.uint8)
+            inside &= mixture.apply(probe, None, 0.0) == 0
+            moved = inside & (probe != limit)
+            if away and not moved.any():
+                break
+            limit[inside] = probe[inside]
+        limits.append(limit)
+    return Background(level=level, low=limits[0], high=limits[1])
+
+
+def _without_sitters(learnt: Background, samples: list[Grey], *, light: bool) -> Background:
+    """Return the background with resting fish taken out, where they moved at some time."""
+    usual = np.quantile(np.stack(samples), 1 - _SAT if light else _SAT, axis=0, method="nearest")
+    usual = usual.astype(np.int16)
+    away = (learnt.level - usual) if light else (usual - learnt.level)
+    width = learnt.high.astype(np.int16) - learnt.low
+    # Opened, so that a flickering edge, a pixel wide, stays what it was learnt as.
+    square = np.ones((3, 3), np.uint8)
+    core = cv2.morphologyEx((away > width).astype(np.uint8), cv2.MORPH_OPEN, square)
+    sat = (cv2.dilate(core, square, iterations=2) > 0) & (away > 0)
+    level = np.where(sat, usual, learnt.level)
+    below = learnt.level.astype(np.int16) - learnt.low
+    above = learnt.high.astype(np.int16) - learnt.level
+    return Background(
+        level=level.astype(np.uint8),
+        low=np.clip(level - below, 0, 255).astype(np.uint8),
+        high=np.clip(level + above, 0, 255).astype(np.uint8),
+    )
+
+
+def _size(grey: Grey) -> str:
+    return f"{grey.shape[1]} x {grey.shape[0]}"

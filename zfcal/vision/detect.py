@@ -1,0 +1,275 @@
+"""Blobs of a frame: what is darker than the empty tank and has corners.
+
+The published way: foreground opened and closed, contours that hold a Shi-Tomasi corner are
+animals, the corner end is the head. Which blob is whom, and blobs of several fish, are the
+business of others. Pixels here have their origin in the centre of the top left pixel and y
+down; angles turn from x towards y, as the eye sees them: clockwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.vision.background import Background, Grey
+
+Floats = NDArray[np.float64]
+
+_QUALITY = 0.01
+_CORNERS_APART_PX = 5
+_BLOCK_PX = 3
+_HARRIS_K = 0.04
+_MOST_CORNERS = 16
+
+_KERNEL = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+_MARGIN_PX = 2
+
+_FLOOR = 0.2
+"""Share of an animal's own darkness up to which a pixel is none of it: shadows are fainter.
+As much is taken off the top, so that an edge stays where it is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Corners:
+    """How corners are sought.
+
+    Parameters
+    ----------
+    harris
+        Harris' measure in place of Shi and Tomasi's.
+    needed
+        Whether a contour without a corner is dropped.
+    """
+
+    harris: bool = False
+    needed: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Blob:
+    """A piece of foreground.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (pixel, 2)
+        Its pixels, x and y.
+    weights : ndarray, shape (pixel,)
+        How much of each pixel is body, in (0, 1]: less along the edge.
+    darkness
+        How much darker than the empty tank its body is, as a share of the tank's grey.
+    contour : ndarray of int32, shape (point, 2)
+    corners : ndarray, shape (corner, 2)
+        The strongest first.
+    """
+
+    pixels: Floats
+    weights: Floats
+    darkness: float
+    contour: NDArray[np.int32]
+    corners: Floats
+
+    @property
+    def area_px(self) -> float:
+        """Pixels that it covers, those along the edge in part."""
+        return float(self.weights.sum())
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """The least and the largest x and y of its pixels."""
+        return self.pixels.min(axis=0), self.pixels.max(axis=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """Where a body is, how long, and which way it lies.
+
+    Parameters
+    ----------
+    x_px, y_px
+        Centroid of the silhouette.
+    axis_rad
+        Direction of the long axis, towards the likelier head.
+    head
+        How much speaks for that end, in [0, 1].
+    length_px, width_px
+        Of the ellipse with the same second moments: four standard deviations.
+    area_px
+        Pixels covered.
+    """
+
+    x_px: float
+    y_px: float
+    axis_rad: float
+    head: float
+    length_px: float
+    width_px: float
+    area_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Look:
+    """A frame compared with the empty tank.
+
+    Parameters
+    ----------
+    grey : ndarray of uint8, shape (height, width)
+        As bright as the background, its negative where fish are light.
+    background
+        The empty tank.
+    foreground : ndarray of uint8, shape (height, width)
+        255 where it is not the tank, opened and closed.
+    """
+
+    grey: Grey
+    background: Background
+    foreground: Grey
+
+
+def look_at(grey: Grey, background: Background, limit: Grey, region: Grey | None = None) -> Look:
+    """Return what of an image is darker than a limit, opened and closed by a 3 x 3 ellipse.
+
+    Parameters
+    ----------
+    limit : ndarray of uint8, shape (height, width)
+        What is darker is foreground.
+    region : ndarray of uint8, shape (height, width), optional
+        255 where animals can be.
+    """
+    mask = cv2.compare(grey, limit, cv2.CMP_LT)
+    if region is not None:
+        mask = cv2.bitwise_and(mask, region)
+    opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _KERNEL)
+    closed = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, _KERNEL)
+    return Look(grey=grey, background=background, foreground=np.asarray(closed, np.uint8))
+
+
+def find_blobs(look: Look, *, min_blob_px: float, corners: Corners | None = None) -> list[Blob]:
+    """Return the blobs of a frame, those with a corner where corners are asked for.
+
+    Parameters
+    ----------
+    min_blob_px
+        Smaller ones are dropped.
+    corners
+        How corners are sought; None for not at all.
+    """
+    contours, _ = cv2.findContours(look.foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = [_blob(look, np.asarray(each, np.int32)) for each in contours if len(each) >= 4]
+    blobs = [blob for blob in found if blob is not None and blob.area_px >= min_blob_px]
+    # OpenCV lists contours from the bottom of the image up; any fixed order would do.
+    return blobs if corners is None else _with_corners(look, blobs, corners)
+
+
+def _blob(look: Look, contour: NDArray[np.int32]) -> Blob | None:
+    """Return what lies within a contour; None where nothing of it is dark."""
+    x0, y0, width, height = cv2.boundingRect(contour)
+    # A pixel wider: the edge of a body is a share of the pixels around its mask.
+    left, top = max(x0 - 1, 0), max(y0 - 1, 0)
+    crop = np.s_[top : y0 + height + 1, left : x0 + width + 1]
+    inside = np.zeros(look.grey[crop].shape, np.uint8)
+    cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-left, -top))
+    wider = cv2.dilate(inside, _KERNEL)
+    level = look.background.level[crop].astype(np.float32)
+    darker = (level - look.grey[crop]) / np.maximum(level, 1.0)
+    rows, columns = np.nonzero(wider)
+    share = darker[rows, columns]
+    # The darkest part is body whatever the shadow around it.
+    darkness = float(np.quantile(share, 0.85))
+    if not darkness > 0:
+        return None
+    weights = np.clip((share / darkness - _FLOOR) / (1 - 2 * _FLOOR), 0.0, 1.0)
+    weights = weights.astype(np.float64)
+    kept = weights > 0
+    pixels = np.column_stack([columns + left, rows + top]).astype(np.float64)
+    return Blob(
+        pixels=pixels[kept],
+        weights=weights[kept],
+        darkness=darkness,
+        contour=contour.reshape(-1, 2),
+        corners=np.empty((0, 2)),
+    )
+
+
+def _with_corners(look: Look, blobs: list[Blob], how: Corners) -> list[Blob]:
+    """Return the blobs with their corners; the best corner of all sets the threshold."""
+    found = [_corners_of(look, blob, how) for blob in blobs]
+    best = max((quality[0] for _, quality in found if len(quality)), default=0.0)
+    held = []
+    for blob, (points, quality) in zip(blobs, found, strict=True):
+        good = points[quality >= _QUALITY * best]
+        if len(good) or not how.needed:
+            held.append(
+                Blob(
+                    pixels=blob.pixels,
+                    weights=blob.weights,
+                    darkness=blob.darkness,
+                    contour=blob.contour,
+                    corners=good,
+                )
+            )
+    return held
+
+
+def _corners_of(look: Look, blob: Blob, how: Corners) -> tuple[Floats, Floats]:
+    """Return corners within a blob, the strongest first, and their measures."""
+    x0, y0, width, height = cv2.boundingRect(blob.contour)
+    left, top = max(x0 - _MARGIN_PX, 0), max(y0 - _MARGIN_PX, 0)
+    crop = np.s_[top : y0 + height + _MARGIN_PX, left : x0 + width + _MARGIN_PX]
+    inside = np.zeros(look.grey[crop].shape, np.uint8)
+    cv2.drawContours(inside, [blob.contour], -1, 255, cv2.FILLED, offset=(-left, -top))
+    corners, quality = cv2.goodFeaturesToTrackWithQuality(
+        np.ascontiguousarray(look.grey[crop]),
+        _MOST_CORNERS,
+        _QUALITY,
+        _CORNERS_APART_PX,
+        inside,
+        blockSize=_BLOCK_PX,
+        useHarrisDetector=how.harris,
+        k=_HARRIS_K,
+    )
+    if corners is None or not len(corners):
+        return np.empty((0, 2)), np.empty(0)
+    points = corners.reshape(-1, 2).astype(np.float64) + np.array([left, top])
+    return points, np.asarray(quality, np.float64).ravel()
+
+
+def shape_of(pixels: Floats, weights: Floats, corners: Floats | None = None) -> Shape:
+    """Return where a body is and which way it lies.
+
+    The head is at the end of the strongest corner, where corners are given; without, at the
+    end where the silhouette is thick: it tapers towards the tail, so the third moment along
+    the axis points there.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (pixel, 2)
+    weights : ndarray, shape (pixel,)
+    corners : ndarray, shape (corner, 2), optional
+        The strongest first.
+    """
+    total = float(weights.sum())
+    centre = weights @ pixels / total
+    away = pixels - centre
+    spread = (away * weights[:, None]).T @ away / total
+    angle = 0.5 * math.atan2(2 * spread[0, 1], spread[0, 0] - spread[1, 1])
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    along = away @ axis
+    # A pixel is a twelfth of a square pixel wide by itself.
+    long = float(weights @ along**2) / total + 1 / 12
+    wide = max(float(spread[0, 0] + spread[1, 1]) + 1 / 6 - long, 1 / 12)
+    skew = float(weights @ along**3) / total / long**1.5
+    lean = -skew if corners is None or not len(corners) else float((corners[0] - centre) @ axis)
+    scale = 0.3 if corners is None or not len(corners) else 2 * math.sqrt(long)
+    return Shape(
+        x_px=float(centre[0]),
+        y_px=float(centre[1]),
+        axis_rad=angle if lean >= 0 else math.remainder(angle + math.pi, 2 * math.pi),
+        head=min(abs(lean) / scale, 1.0),
+        length_px=4 * math.sqrt(long),
+        width_px=4 * math.sqrt(wide),
+        area_px=total,
+    )

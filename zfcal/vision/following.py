@@ -1,0 +1,138 @@
+"""Who is who from frame to frame: tracks matched with detections, begun and ended."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.vision.assign import Match, assign
+from zfcal.vision.detect import Blob
+from zfcal.vision.trail import Detection, Trail
+from zfcal.vision.usual import Bodies
+
+Floats = NDArray[np.float64]
+
+_REACH = 0.6
+_REACH_PER_S = 12.0
+_FARTHEST = 4.0
+"""Body lengths that an animal may be from where it is expected: at once, per second, at most."""
+
+_NEAR = 0.35
+"""Body lengths from a blob within which an animal is thought to be in it."""
+
+_CERTAIN = 0.35
+"""Body lengths by which another assignment must be worse for a track to be itself again."""
+
+_HIDDEN = 5
+"""Frames without a sighting after which an animal is no longer thought to be in a blob."""
+
+_PROVEN = 3
+"""Frames after which a new blob is an animal."""
+
+_SMALL, _FAINT = 0.35, 0.6
+"""Shares of the usual area and darkness below which a blob begins no track."""
+
+
+class Trails:
+    """The tracks of one camera.
+
+    Parameters
+    ----------
+    bodies
+        What an animal looks like; learns from every one that is alone in its blob.
+    coast_s
+        How long a track that is not seen keeps its id, in seconds.
+    """
+
+    def __init__(self, bodies: Bodies, *, coast_s: float) -> None:
+        self._bodies = bodies
+        self._coast_s = coast_s
+        self._trails: list[Trail] = []
+        self._next_id = 0
+
+    def thought_in(self, blobs: list[Blob], time_s: float) -> list[list[Trail]]:
+        """Return which tracks should be in each blob: each in the one nearest to it."""
+        thought: list[list[Trail]] = [[] for _ in blobs]
+        near = _NEAR * self._bodies.length_px
+        for trail in self._trails:
+            if not blobs or trail.hits < _PROVEN or trail.missed > _HIDDEN or trail.is_ghost:
+                continue
+            at = trail.predicted(time_s)
+            away = [_distance(blob, at, near) for blob in blobs]
+            nearest = int(np.argmin(away))
+            if away[nearest] < near:
+                thought[nearest].append(trail)
+        return thought
+
+    def match(self, detections: list[Detection], time_s: float) -> None:
+        """Give detections to tracks, begin tracks for the others, and end the lost ones."""
+        at = np.array([t.predicted(time_s) for t in self._trails]).reshape(-1, 2)
+        to = np.array([(d.shape.x_px, d.shape.y_px) for d in detections]).reshape(-1, 2)
+        away = np.hypot(*np.moveaxis(at[:, None] - to[None], -1, 0)) / self._bodies.length_px
+        ages_s = np.array([time_s - trail.time_s for trail in self._trails])
+        matches = assign(away, np.minimum(_REACH + _REACH_PER_S * ages_s, _FARTHEST))
+        for match in matches:
+            self._extend(match, detections[match.detection], time_s)
+        found = {match.track for match in matches}
+        for index, trail in enumerate(self._trails):
+            trail.missed = 0 if index in found else trail.missed + 1
+        opening = self._next_id == 0
+        taken = {match.detection for match in matches}
+        for index, detection in enumerate(detections):
+            if index not in taken and self._is_animal(detection):
+                self._trails.append(Trail(self._new_id(), detection, time_s, opening=opening))
+                self._trails[-1].likeness = self._likeness(detection)
+        self.forget(time_s)
+
+    def _extend(self, match: Match, detection: Detection, time_s: float) -> None:
+        trail = self._trails[match.track]
+        unsure = match.margin < _CERTAIN and (trail.missed > 0 or trail.shared > 1)
+        if unsure and detection.shared == 1:
+            # Who comes out of a crowd is not known: a new id says so.
+            trail.agent = self._new_id()
+        trail.update(detection, time_s, unsure=unsure)
+        trail.likeness += 0.1 * (self._likeness(detection) - trail.likeness)
+        if detection.shared == 1 and trail.hits > _PROVEN:
+            self._bodies.add(detection.shape, detection.blob.darkness)
+
+    def _likeness(self, detection: Detection) -> float:
+        """Return how much of a usual animal's area and darkness it has, in [0, 1]."""
+        usual = self._bodies.usual
+        area = min(detection.shape.area_px / usual.area_px, 1.0)
+        return area * min(detection.blob.darkness / usual.darkness, 1.0)
+
+    def _is_animal(self, detection: Detection) -> bool:
+        usual = self._bodies.usual
+        small = detection.shape.area_px < _SMALL * usual.area_px
+        return not small and not detection.blob.darkness < _FAINT * usual.darkness
+
+    def _new_id(self) -> int:
+        self._next_id += 1
+        return self._next_id - 1
+
+    def forget(self, time_s: float) -> None:
+        """End tracks that were not seen for long, and at once those that never were proven."""
+        self._trails = [
+            trail
+            for trail in self._trails
+            if time_s - trail.time_s <= self._coast_s
+            and not (trail.missed and trail.hits < _PROVEN)
+        ]
+
+    def told(self, n_agents: int | None) -> list[Trail]:
+        """Return the tracks seen just now, ascending by id; the likeliest if they are too many.
+
+        A new track counts after three frames, or at once in the first frame of all.
+        """
+        seen = [t for t in self._trails if not t.missed and (t.hits >= _PROVEN or t.opening)]
+        if n_agents is not None and len(seen) > n_agents:
+            seen = sorted(seen, key=lambda trail: (-trail.likeness, trail.agent))[:n_agents]
+        return sorted(seen, key=lambda trail: trail.agent)
+
+
+def _distance(blob: Blob, at: Floats, near: float) -> float:
+    """Return how far a point is from a blob, infinite where it is farther than near."""
+    least, most = blob.bounds
+    if (at < least - near).any() or (at > most + near).any():
+        return float("inf")
+    return float(np.sqrt(((blob.pixels - at) ** 2).sum(axis=1).min()))

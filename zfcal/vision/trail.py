@@ -1,0 +1,174 @@
+"""One track: where it was, where it should be next, and which end is the head."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.vision.detect import Blob, Shape
+from zfcal.vision.usual import Body
+
+Floats = NDArray[np.float64]
+
+_TRUST = 0.7
+"""Weight of the newest step in the velocity."""
+
+_GLIDE_S = 0.2
+"""An unseen fish is taken to stop after this long."""
+
+_MEMORY = 0.9
+_FLIP = 1.0
+"""Evidence, in frames of plain view, from which head and tail change places."""
+
+_FADING = 0.8
+"""What is left of a doubt after a frame."""
+
+_KNOWN = 15
+"""Frames after which a measure of one animal is its own."""
+
+_YOUNG = 5
+"""Frames for which a track is young."""
+
+_MOVING = 0.05
+"""Body lengths per frame from which motion tells the head."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Detection:
+    """An animal as one frame shows it.
+
+    Parameters
+    ----------
+    shape
+        Where it is and how it lies.
+    blob
+        The foreground that it is part of.
+    shared
+        How many animals are in that.
+    """
+
+    shape: Shape
+    blob: Blob
+    shared: int = 1
+
+
+class Trail:
+    """A track as it grows.
+
+    Parameters
+    ----------
+    agent
+        Its id.
+    detection
+        As first seen.
+    time_s
+        When.
+    opening
+        Whether that was in the first frame of all.
+    """
+
+    __slots__ = (
+        "_alone",
+        "_crowded",
+        "_evidence",
+        "agent",
+        "area_px",
+        "blob",
+        "doubt",
+        "heading_rad",
+        "hits",
+        "likeness",
+        "missed",
+        "opening",
+        "shape",
+        "shared",
+        "time_s",
+        "velocity",
+        "xy",
+    )
+
+    def __init__(
+        self, agent: int, detection: Detection, time_s: float, *, opening: bool = False
+    ) -> None:
+        shape = detection.shape
+        self.agent = agent
+        self.xy: Floats = np.array([shape.x_px, shape.y_px])
+        self.velocity: Floats = np.zeros(2)
+        self.time_s = time_s
+        self.shape = shape
+        self.blob: Blob = detection.blob
+        self.area_px = shape.area_px
+        self.heading_rad = shape.axis_rad
+        self.hits = 1
+        self.likeness = 0.0
+        self.missed = 0
+        self.shared = detection.shared
+        self.opening = opening
+        self.doubt = 0.0
+        self._alone = 1 if detection.shared == 1 else 0
+        self._crowded = 0
+        self._evidence = shape.head
+
+    def predicted(self, time_s: float) -> Floats:
+        """Return where the animal should be at a time, in pixels, shape (2,)."""
+        return self.xy + self.velocity * min(time_s - self.time_s, _GLIDE_S)
+
+    def own_area_px(self, usual_px: float) -> float:
+        """Return what this animal covers; the usual where it was hardly seen alone."""
+        return self.area_px if self._alone >= _KNOWN else usual_px
+
+    def crowd(self, doubtful: bool) -> None:  # noqa: FBT001 - a condition
+        """Count a frame in a blob that may be too small for all who are thought to be in it."""
+        self._crowded = self._crowded + 1 if doubtful else 0
+
+    @property
+    def is_ghost(self) -> bool:
+        """Whether it has been in too small a blob for too long to be an animal of its own."""
+        return self._crowded > _KNOWN
+
+    def update(self, detection: Detection, time_s: float, *, unsure: bool = False) -> None:
+        """Add a sighting; unsure where it might be that of another animal."""
+        shape = detection.shape
+        to = np.array([shape.x_px, shape.y_px])
+        step = (to - self.xy) / max(time_s - self.time_s, 1e-3)
+        trust = _TRUST if detection.shared == 1 else _TRUST / 2
+        self.velocity = step if self.hits == 1 else trust * step + (1 - trust) * self.velocity
+        self._turn(shape, to - self.xy, shared=detection.shared)
+        self.xy, self.time_s, self.shape, self.blob = to, time_s, shape, detection.blob
+        self.shared = detection.shared
+        self.hits += 1
+        self.doubt = max(_FADING * self.doubt, 0.5 if unsure else 0.0)
+        if detection.shared == 1:
+            self._alone += 1
+            self.area_px += max(0.1, 1 / self._alone) * (shape.area_px - self.area_px)
+
+    def confidence(self, usual: Body) -> float:
+        """Return how sure the last sighting is, in [0, 1]; below 0.5 it is a guess.
+
+        Whole for an animal alone in its blob; less for one cut out of a crowd, for one of odd
+        size or new, and after an assignment that might have been another.
+        """
+        sure = 1.0 if self.shared == 1 else 0.7
+        if usual.area_px > 0:
+            odd = abs(math.log(max(self.shape.area_px, 1.0) / usual.area_px))
+            sure -= min(0.3 * max(odd - 0.3, 0.0), 0.4)
+        if self.hits < _YOUNG:
+            sure -= 0.1
+        return max(sure - self.doubt, 0.1)
+
+    def _turn(self, shape: Shape, moved: Floats, *, shared: int) -> None:
+        """Follow the long axis by its nearer end, and change ends when enough speaks for it."""
+        near = math.cos(shape.axis_rad - self.heading_rad) >= 0
+        heading = shape.axis_rad if near else math.remainder(shape.axis_rad + math.pi, math.tau)
+        told = (1.0 if near else -1.0) * shape.head if shared == 1 else 0.0
+        ahead = float(moved @ (math.cos(heading), math.sin(heading))) / shape.length_px
+        if abs(ahead) > _MOVING:
+            told += math.copysign(min(4 * abs(ahead), 1.0), ahead)
+        self._evidence = _MEMORY * self._evidence + (1 - _MEMORY) * 4 * told
+        if self._evidence < -_FLIP / 4:
+            heading = math.remainder(heading + math.pi, math.tau)
+            self._evidence = -self._evidence
+        self.heading_rad = heading

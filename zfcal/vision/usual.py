@@ -1,0 +1,94 @@
+"""What an animal looks like here: area, length and darkness, from those seen so far."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from zfcal.vision.detect import Blob, Shape, shape_of
+
+_REMEMBERED = 400
+_REFRESHED = 25
+"""Sightings after which the measures are taken anew."""
+
+_GUESSED_PX = 20.0
+
+_FAINT = 0.5
+"""A blob less than this share as dark as an animal is a shadow or a reflection."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """A usual animal; NaN throughout before one was seen.
+
+    Parameters
+    ----------
+    area_px
+        Pixels covered.
+    length_px
+        Of the ellipse with the same second moments.
+    darkness
+        Share of the tank's grey by which it is darker.
+    """
+
+    area_px: float = math.nan
+    length_px: float = math.nan
+    darkness: float = math.nan
+
+
+class Bodies:
+    """Keeps what the last animals seen one by one looked like."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, float, float]] = deque(maxlen=_REMEMBERED)
+        self._fresh = 0
+        self.usual = Body()
+
+    @property
+    def length_px(self) -> float:
+        """Length of a usual animal; a guess before one was seen."""
+        return self.usual.length_px if self.usual.length_px > 0 else _GUESSED_PX
+
+    def start(self, frames: Sequence[Sequence[Blob]], n_agents: int | None) -> None:
+        """Take the usual body from the blobs of some frames.
+
+        Where the number of animals is known, only frames with as many blobs count; otherwise
+        all blobs do that are not much fainter or smaller than the others.
+        """
+        darkness = _usual_darkness([blob for blobs in frames for blob in blobs])
+        dark = [[b for b in blobs if b.darkness > _FAINT * darkness] for blobs in frames]
+        whole = [blobs for blobs in dark if len(blobs) == n_agents] or dark
+        kept = [blob for blobs in whole for blob in blobs]
+        if not kept:
+            return
+        least = 0.3 * float(np.quantile([blob.area_px for blob in kept], 0.75))
+        for blob in kept:
+            if blob.area_px >= least:
+                self.add(shape_of(blob.pixels, blob.weights), blob.darkness)
+        self._refresh()
+
+    def add(self, shape: Shape, darkness: float) -> None:
+        """Remember an animal that is alone in its blob."""
+        self._seen.append((shape.area_px, shape.length_px, darkness))
+        self._fresh += 1
+        if self._fresh >= _REFRESHED:
+            self._refresh()
+
+    def _refresh(self) -> None:
+        area, length, darkness = np.median(np.array(self._seen), axis=0)
+        self.usual = Body(area_px=float(area), length_px=float(length), darkness=float(darkness))
+        self._fresh = 0
+
+
+def _usual_darkness(blobs: Sequence[Blob]) -> float:
+    """Return the darkness that half of what is dark lies above, by area."""
+    if not blobs:
+        return math.nan
+    darkness = np.array([blob.darkness for blob in blobs])
+    order = np.argsort(darkness)
+    mass = np.cumsum(np.array([blob.area_px for blob in blobs])[order] * darkness[order])
+    return float(darkness[order][np.searchsorted(mass, mass[-1] / 2)])
