@@ -46,11 +46,7 @@ def repository():
 @pytest.fixture(scope="session")
 def examine():
     """Return what lists the problems of an MCAP file, as `mcap doctor` would."""
-    place = REPOSITORY / "tests" / "artifacts" / "doctor.py"
-    spec = importlib.util.spec_from_file_location("doctor", place)
-    doctor = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(doctor)
-    return doctor.examine
+    return _module("artifacts/doctor").examine
 
 
 @pytest.fixture(scope="session")
@@ -76,6 +72,19 @@ def recording():
         return pytest.skip(f"no recording {name!r} in {', '.join(map(str, folders))}")
 
     return find
+
+
+@pytest.fixture(scope="session")
+def streaming():
+    """Return the module whose `Camera` serves images over HTTP in real time."""
+    return _module("streaming")
+
+
+def _module(name):
+    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def _trace(arena, rng, *, n=4000, minutes=10.0):
