@@ -6,6 +6,7 @@ The two shapes in which every other part sees a trial. Files are read in
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -73,6 +74,56 @@ def concatenate(parts: list[Tracks]) -> Tracks:
         }
     )
     return joined.take(np.lexsort((joined.agent, joined.frame)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgentPose:
+    """Where one agent is.
+
+    Parameters
+    ----------
+    agent
+        Track id, unique in the trial.
+    kind
+        Index into `KINDS`.
+    x_m, y_m
+        In metres.
+    heading_rad
+        Counter-clockwise from x; NaN where unknown.
+    confidence
+        In [0, 1].
+    """
+
+    agent: int
+    kind: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FramePoses:
+    """Where everybody is in one frame, by ascending id."""
+
+    time_s: float
+    frame: int
+    agents: tuple[AgentPose, ...]
+
+
+def tracks_of(frames: Iterable[FramePoses]) -> Tracks:
+    """Return the rows of frames, which come in order."""
+    rows = [(poses, agent) for poses in frames for agent in poses.agents]
+    return Tracks(
+        time_s=np.array([poses.time_s for poses, _ in rows], np.float64),
+        frame=np.array([poses.frame for poses, _ in rows], np.int64),
+        agent=np.array([agent.agent for _, agent in rows], np.int32),
+        kind=np.array([agent.kind for _, agent in rows], np.int8),
+        x_m=np.array([agent.x_m for _, agent in rows], np.float64),
+        y_m=np.array([agent.y_m for _, agent in rows], np.float64),
+        heading_rad=np.array([agent.heading_rad for _, agent in rows], np.float32),
+        confidence=np.array([agent.confidence for _, agent in rows], np.float32),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,120 @@
+"""Who is the robot, and which ids agents keep."""
+
+import math
+from dataclasses import dataclass
+
+import pytest
+
+from zfcal.tracks import FISH, ROBOT
+from zfcal.vision.fusing import ALONE, GUESSED, Fuser
+from zfcal.vision.robot import RobotSeen
+
+
+@dataclass(frozen=True)
+class Blob:
+    """What a tracker overhead says."""
+
+    agent: int
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.5
+    confidence: float = 0.9
+
+
+def robot(x_m=math.nan, y_m=math.nan, heading_rad=1.0):
+    """Return a robot seen there at 0 s; without a place it is lost."""
+    leds = () if math.isnan(x_m) else ((0.0, 0.0), (9.0, 0.0))
+    return RobotSeen(time_s=0.0, x_m=x_m, y_m=y_m, heading_rad=heading_rad, leds_px=leds)
+
+
+def kinds(agents):
+    """Return the kind of each agent by its id."""
+    return {agent.agent: agent.kind for agent in agents}
+
+
+FOUR = [Blob(7, 0.1, 0.1), Blob(8, 0.5, 0.5), Blob(9, 0.9, 0.9)]
+
+
+def test_without_a_camera_below_everybody_is_a_fish():
+    """Ids count from nought, in the order in which the tracker names them."""
+    agents = Fuser().step(FOUR, None, 0.0)
+    assert kinds(agents) == {0: FISH, 1: FISH, 2: FISH}
+    assert [agent.x_m for agent in agents] == [0.1, 0.5, 0.9]
+
+
+def test_the_blob_nearest_to_the_leds_is_the_robot():
+    """Its place is that of the blob, its heading that of the LEDs; the others are fish."""
+    agents = Fuser().step(FOUR, robot(0.51, 0.49), 0.0)
+    (found,) = [agent for agent in agents if agent.kind == ROBOT]
+    assert (found.x_m, found.y_m, found.heading_rad, found.confidence) == (0.5, 0.5, 1.0, 0.9)
+    assert sum(agent.kind == FISH for agent in agents) == 2
+
+
+def test_an_id_has_one_kind_for_ever():
+    """Though the tracker swaps a fish and the robot, back and forth."""
+    fuser = Fuser()
+    seen = {}
+    for k in range(40):
+        at = FOUR[k // 5 % 3]
+        for agent in fuser.step(FOUR, robot(at.x_m, at.y_m), 0.0):
+            assert seen.setdefault(agent.agent, agent.kind) == agent.kind
+    assert sum(kind == ROBOT for kind in seen.values()) == 1
+
+
+def test_a_track_that_was_the_robot_s_gets_a_new_name_as_a_fish():
+    """Nobody is sure that it is the fish that it was before."""
+    fuser = Fuser()
+    before = {a.x_m: a.agent for a in fuser.step(FOUR, robot(0.9, 0.9), 0.0)}
+    fuser.step(FOUR, robot(0.1, 0.1), 0.0)
+    after = {a.x_m: a.agent for a in fuser.step(FOUR, robot(0.9, 0.9), 0.0)}
+    assert after[0.5] == before[0.5]
+    assert after[0.9] == before[0.9]
+    assert after[0.1] != before[0.1]
+
+
+def test_a_fish_that_is_not_seen_for_a_while_keeps_its_name():
+    """As long as the tracker keeps it."""
+    fuser = Fuser()
+    first = fuser.step(FOUR, None, 0.0)
+    fuser.step(FOUR[:2], None, 0.1)
+    assert fuser.step(FOUR, None, 0.9) == first
+
+
+def test_names_that_are_long_gone_are_forgotten():
+    """Memory does not grow with the hours."""
+    fuser = Fuser()
+    for k in range(100_000):
+        fuser.step([Blob(k, 0.5, 0.5)], None, k / 15)
+    assert len(fuser._fish) < 3000
+
+
+def test_a_robot_that_is_seen_from_below_alone_is_there_all_the_same():
+    """With its own place, and less sure."""
+    agents = Fuser().step(FOUR, robot(0.3, 0.7), 0.0)
+    (found,) = [agent for agent in agents if agent.kind == ROBOT]
+    assert (found.x_m, found.y_m, found.confidence) == (0.3, 0.7, ALONE)
+    assert len(agents) == 4
+
+
+def test_a_robot_without_leds_stays_the_robot_as_a_guess():
+    """By the track that it had, without a heading; not a fish more."""
+    fuser = Fuser()
+    fuser.step(FOUR, robot(0.5, 0.5), 0.0)
+    agents = fuser.step(FOUR, robot(), 0.1)
+    (found,) = [agent for agent in agents if agent.kind == ROBOT]
+    assert (found.x_m, found.confidence) == (0.5, GUESSED)
+    assert math.isnan(found.heading_rad)
+    assert sum(agent.kind == FISH for agent in agents) == 2
+
+
+def test_a_robot_that_was_never_seen_cannot_be_told():
+    """Everybody is a fish, and there is no robot."""
+    assert {agent.kind for agent in Fuser().step(FOUR, robot(), 0.0)} == {FISH}
+
+
+@pytest.mark.parametrize("first", [0, 17])
+def test_ids_begin_with_the_first_that_is_free(first):
+    """A recording that goes on gives no id twice."""
+    fuser = Fuser(first)
+    assert [agent.agent for agent in fuser.step(FOUR, None, 0.0)] == [first, first + 1, first + 2]
+    assert fuser.next_agent == first + 3

@@ -1,0 +1,159 @@
+"""One frame's agents out of what both cameras saw: who is the robot, and the ids that stay.
+
+The tracker overhead follows everybody alike. Here the robot is told from the fish, and
+gets an id of its own: an id belongs to one agent, of one kind.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol, final
+
+import numpy as np
+
+from zfcal.tracks import FISH, ROBOT, AgentPose
+from zfcal.vision.robot import RobotSeen, nearest_blob
+
+ALONE = 0.6
+"""Confidence of a robot that the camera below alone sees."""
+
+GUESSED = 0.4
+"""Confidence of a robot without LEDs, known by having been the robot before."""
+
+_FORGET_S = 60.0
+"""Far longer than any tracker keeps the id of an animal that it does not see."""
+
+
+class Blob(Protocol):
+    """What the tracker overhead says of one agent."""
+
+    @property
+    def agent(self) -> int:
+        """The tracker's id."""
+        ...
+
+    @property
+    def x_m(self) -> float:
+        """Metres."""
+        ...
+
+    @property
+    def y_m(self) -> float:
+        """Metres."""
+        ...
+
+    @property
+    def heading_rad(self) -> float:
+        """Counter-clockwise from x; NaN where unknown."""
+        ...
+
+    @property
+    def confidence(self) -> float:
+        """In [0, 1]."""
+        ...
+
+
+@final
+class Fuser:
+    """Names the agents of one frame after the other.
+
+    Parameters
+    ----------
+    first_agent
+        The first id that is free.
+
+    Attributes
+    ----------
+    next_agent
+        The next id that is free.
+    """
+
+    def __init__(self, first_agent: int = 0) -> None:
+        self.next_agent = first_agent
+        self._fish: dict[int, tuple[int, float]] = {}
+        self._tidied_s = 0.0
+        self._robot: int | None = None
+        self._robot_blob: int | None = None
+
+    def step(
+        self, blobs: Sequence[Blob], robot: RobotSeen | None, time_s: float
+    ) -> tuple[AgentPose, ...]:
+        """Return who is where, by ascending id.
+
+        Parameters
+        ----------
+        blobs
+            From the camera overhead.
+        robot
+            From the camera below; None where there is none, or no image that belongs.
+        time_s
+            Of the overhead image.
+        """
+        which = None if robot is None else self._which(blobs, robot, time_s)
+        self._robot_blob = None if which is None else blobs[which].agent
+        if self._robot_blob is not None:
+            # Should the track be told to be a fish again, nobody is sure that it is the same one.
+            self._fish.pop(self._robot_blob, None)
+        self._forget(time_s)
+        agents = [self._fish_pose(blob, time_s) for k, blob in enumerate(blobs) if k != which]
+        if robot is not None:
+            agents += self._robot_pose(None if which is None else blobs[which], robot)
+        return tuple(sorted(agents, key=lambda agent: agent.agent))
+
+    def _which(self, blobs: Sequence[Blob], robot: RobotSeen, time_s: float) -> int | None:
+        xy_m = np.array([(blob.x_m, blob.y_m) for blob in blobs], np.float64).reshape(-1, 2)
+        which = nearest_blob(robot, xy_m, time_s)
+        if which is not None or not robot.is_lost:
+            return which
+        before = [k for k, blob in enumerate(blobs) if blob.agent == self._robot_blob]
+        return before[0] if before else None
+
+    def _new(self) -> int:
+        self.next_agent += 1
+        return self.next_agent - 1
+
+    def _forget(self, time_s: float) -> None:
+        """Drop the names of tracks that the tracker has dropped long ago."""
+        if time_s >= self._tidied_s + _FORGET_S:
+            self._fish = {
+                old: (new, last_s)
+                for old, (new, last_s) in self._fish.items()
+                if last_s >= self._tidied_s
+            }
+            self._tidied_s = time_s
+
+    def _fish_pose(self, blob: Blob, time_s: float) -> AgentPose:
+        known = self._fish.get(blob.agent)
+        agent = self._new() if known is None else known[0]
+        self._fish[blob.agent] = (agent, time_s)
+        return AgentPose(
+            agent=agent,
+            kind=FISH,
+            x_m=blob.x_m,
+            y_m=blob.y_m,
+            heading_rad=blob.heading_rad,
+            confidence=blob.confidence,
+        )
+
+    def _robot_pose(self, blob: Blob | None, robot: RobotSeen) -> list[AgentPose]:
+        """Return the robot where it was seen: above if it can be, in the fish's own measure."""
+        if blob is None and robot.is_lost:
+            return []
+        if self._robot is None:
+            self._robot = self._new()
+        if blob is None:
+            x_m, y_m, confidence = robot.x_m, robot.y_m, ALONE
+        else:
+            confidence = min(blob.confidence, GUESSED) if robot.is_lost else blob.confidence
+            x_m, y_m = blob.x_m, blob.y_m
+        return [
+            AgentPose(
+                agent=self._robot,
+                kind=ROBOT,
+                x_m=x_m,
+                y_m=y_m,
+                heading_rad=math.nan if robot.is_lost else robot.heading_rad,
+                confidence=confidence,
+            )
+        ]

@@ -1,0 +1,322 @@
+"""The robot, by its two LEDs in the image of the camera below.
+
+Both LEDs shine in one colour, so their axis tells the heading but for half a turn.
+Which end is the front is told by motion: the robot drives forwards more than backwards.
+Once told it is kept, since from one frame to the next the robot turns by less than a
+quarter; only a long drive backwards overrules it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.errors import InputError
+from zfcal.vision.camera import Projection
+from zfcal.vision.frames import Frame, Image
+
+Floats = NDArray[np.float64]
+
+NEAR_M = 0.05
+"""The overhead blob nearest to the LEDs is the robot, if it is no farther than this."""
+
+NEAR_S = 0.05
+"""Two images of different cameras belong together if no more lies between them."""
+
+_FIRST_M = 0.01
+"""Net way along the axis that tells the front for the first time."""
+
+_OVERRULE_M = 0.08
+"""Net way backwards that overrules what was told: a robot may back off a wall."""
+
+_FORGET_S = 2.0
+"""Time in which half of the way that speaks for one end is forgotten."""
+
+_LOST_S = 1.0
+"""A robot that was lost for so long may have turned: its front is told anew."""
+
+_MOST_BLOBS = 5
+_KERNEL = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LedOptions:
+    """What the LEDs look like.
+
+    Parameters
+    ----------
+    hue_deg
+        Their hue, in degrees (0 red, 120 green, 240 blue); None for any colour.
+    hue_width_deg
+        How far from it a pixel's hue may be.
+    least_saturation, least_value
+        Of a pixel, 0 to 255.
+    blur_px
+        Side of the Gaussian kernel, odd.
+    least_px
+        Area of the smallest blob that may be an LED.
+    apart_m
+        Least and greatest distance between the two.
+    """
+
+    hue_deg: float | None = None
+    hue_width_deg: float = 25.0
+    least_saturation: int = 70
+    least_value: int = 140
+    blur_px: int = 3
+    least_px: int = 3
+    apart_m: tuple[float, float] = (0.005, 0.06)
+
+    def __post_init__(self) -> None:
+        if self.hue_deg is not None and not 0 <= self.hue_deg <= 360:
+            raise InputError(f"A hue is an angle from 0 to 360 degrees, got {self.hue_deg!r}.")
+        if self.blur_px < 1 or self.blur_px % 2 == 0:
+            raise InputError(f"The kernel of a blur has an odd side, got {self.blur_px!r} px.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSeen:
+    """Where the robot was in one image of the camera below.
+
+    Parameters
+    ----------
+    time_s
+        Of the image.
+    x_m, y_m
+        Middle of the LEDs, in metres; NaN where none was seen.
+    heading_rad
+        Counter-clockwise from x; NaN with one LED, or where the front is not told yet.
+    leds_px : tuple of (x, y)
+        Two, one or none.
+    """
+
+    time_s: float
+    x_m: float
+    y_m: float
+    heading_rad: float
+    leds_px: tuple[tuple[float, float], ...]
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether no LED was seen."""
+        return not self.leds_px
+
+
+@final
+class RobotFinder:
+    """Finds the robot in one image after the other.
+
+    Parameters
+    ----------
+    options
+        What its LEDs look like.
+    projection
+        Of the camera below.
+    mask : ndarray of uint8, shape (height, width), optional
+        Where the robot can be; zero elsewhere.
+    """
+
+    def __init__(
+        self, options: LedOptions, projection: Projection, *, mask: Image | None = None
+    ) -> None:
+        self._options = options
+        self._projection = projection
+        self._mask = mask
+        self._front = Front()
+        self._last_m: Floats | None = None
+
+    def step(self, frame: Frame) -> RobotSeen:
+        """Return where the robot is in the next image."""
+        blobs_px = led_blobs(frame.image, self._options, mask=self._mask)
+        blobs_m = self._projection.to_metres(blobs_px)
+        known = np.isfinite(blobs_m).all(axis=1)
+        blobs_px, blobs_m = blobs_px[known], blobs_m[known]
+        chosen = self._choose(blobs_m)
+        leds_m = blobs_m[chosen]
+        middle = leds_m.mean(axis=0) if len(leds_m) else np.full(2, np.nan)
+        heading = self._front.step(frame.time_s, middle, _axis(leds_m))
+        if len(leds_m):
+            self._last_m = middle
+        return RobotSeen(
+            time_s=frame.time_s,
+            x_m=float(middle[0]),
+            y_m=float(middle[1]),
+            heading_rad=heading,
+            leds_px=tuple((float(x), float(y)) for x, y in blobs_px[chosen]),
+        )
+
+    def _choose(self, blobs_m: Floats) -> list[int]:
+        """Return the first pair, by size, as far apart as the LEDs are; else one blob."""
+        low, high = self._options.apart_m
+        pairs = [
+            (one, other)
+            for one, other in itertools.combinations(range(len(blobs_m)), 2)
+            if low <= math.dist(blobs_m[one], blobs_m[other]) <= high
+        ]
+        if pairs:
+            return list(min(pairs, key=lambda pair: (sum(pair), pair)))
+        if not len(blobs_m):
+            return []
+        if self._last_m is None:
+            return [0]
+        return [int(np.argmin(np.linalg.norm(blobs_m - self._last_m, axis=1)))]
+
+
+def led_blobs(image: Image, options: LedOptions, *, mask: Image | None = None) -> Floats:
+    """Return the centres of blobs in the LEDs' colour, the largest first.
+
+    Parameters
+    ----------
+    image
+        Colour, or grey: then brightness alone counts.
+    options
+        What the LEDs look like.
+    mask : ndarray of uint8, shape (height, width), optional
+        Zero where nothing is looked for.
+
+    Returns
+    -------
+    ndarray, shape (blob, 2)
+        In pixels, five at most.
+    """
+    bright = _in_colour(image, options)
+    if mask is not None:
+        bright = np.asarray(cv2.bitwise_and(bright, mask), np.uint8)
+    # An LED that dazzles is a ring with a white middle. What opening would take away are
+    # specks, and LEDs at the rim of a fish-eye, which are hardly larger: those go by area.
+    closed = cv2.morphologyEx(bright, cv2.MORPH_CLOSE, _KERNEL)
+    contours, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = [
+        (area, *_centre(contour))
+        for contour in contours
+        if (area := max(cv2.contourArea(contour), float(len(contour)))) >= options.least_px
+    ]
+    found.sort(key=lambda blob: (-blob[0], blob[1], blob[2]))
+    return np.array([blob[1:] for blob in found[:_MOST_BLOBS]], np.float64).reshape(-1, 2)
+
+
+def _centre(contour: cv2.typing.MatLike) -> tuple[float, float]:
+    moments = cv2.moments(contour)
+    if moments["m00"] > 0:
+        return moments["m10"] / moments["m00"], moments["m01"] / moments["m00"]
+    x, y = contour[:, 0].mean(axis=0)
+    return float(x), float(y)
+
+
+def _in_colour(image: Image, options: LedOptions) -> Image:
+    blurred = cv2.GaussianBlur(image, (options.blur_px, options.blur_px), 0)
+    if blurred.ndim == 2:
+        return np.asarray(cv2.inRange(blurred, options.least_value, 255), np.uint8)
+    hsv = cv2.cvtColor(blurred, cv2.COLOR_BGR2HSV)
+    saturation, value = options.least_saturation, options.least_value
+    if options.hue_deg is None:
+        return np.asarray(cv2.inRange(hsv, (0, saturation, value), (180, 255, 255)), np.uint8)
+    # OpenCV's hues are half degrees, and red lies on both sides of 0.
+    middle, width = options.hue_deg / 2, options.hue_width_deg / 2
+    parts = [
+        cv2.inRange(hsv, (low, saturation, value), (high, 255, 255))
+        for low, high in _hues(middle, width)
+    ]
+    return np.asarray(np.bitwise_or.reduce(parts), np.uint8)
+
+
+def _hues(middle: float, width: float) -> list[tuple[float, float]]:
+    return [
+        (max(0.0, middle - width + turn), min(180.0, middle + width + turn))
+        for turn in (-180, 0, 180)
+        if middle + width + turn >= 0 and middle - width + turn <= 180
+    ]
+
+
+def _axis(leds_m: Floats) -> float:
+    """Return the angle of the line through both LEDs, or NaN."""
+    if len(leds_m) < 2:
+        return math.nan
+    x, y = leds_m[1] - leds_m[0]
+    return math.atan2(y, x)
+
+
+@final
+class Front:
+    """Tells which way along its axis the robot looks, and keeps to it."""
+
+    def __init__(self) -> None:
+        self._heading_rad = math.nan
+        self._forward_m = 0.0
+        self._is_told = False
+        self._time_s = -math.inf
+        self._middle_m: Floats = np.full(2, np.nan)
+
+    def step(self, time_s: float, middle_m: Floats, axis_rad: float) -> float:
+        """Return the heading; NaN while it is not told.
+
+        Parameters
+        ----------
+        time_s
+            Of the image.
+        middle_m : ndarray, shape (2,)
+            Middle of the LEDs; NaN where none was seen.
+        axis_rad
+            Angle of their axis, either way; NaN where it is not known.
+        """
+        if not math.isfinite(axis_rad):
+            return math.nan
+        passed_s = time_s - self._time_s
+        if not passed_s <= _LOST_S:
+            self._begin(axis_rad)
+        else:
+            self._turn(axis_rad)
+            self._drive(middle_m - self._middle_m, passed_s)
+        self._time_s, self._middle_m = time_s, middle_m
+        return self._heading_rad if self._is_told else math.nan
+
+    def _begin(self, axis_rad: float) -> None:
+        self._heading_rad, self._forward_m, self._is_told = _wrapped(axis_rad), 0.0, False
+
+    def _turn(self, axis_rad: float) -> None:
+        """Follow the axis by less than a quarter turn."""
+        away = _wrapped(axis_rad - self._heading_rad)
+        self._heading_rad = _wrapped(axis_rad + (math.pi if abs(away) > math.pi / 2 else 0.0))
+
+    def _drive(self, step_m: Floats, passed_s: float) -> None:
+        along_m = float(
+            step_m[0] * math.cos(self._heading_rad) + step_m[1] * math.sin(self._heading_rad)
+        )
+        self._forward_m = self._forward_m * 0.5 ** (passed_s / _FORGET_S) + along_m
+        needed_m = _OVERRULE_M if self._is_told else _FIRST_M
+        if self._forward_m <= -needed_m:
+            self._heading_rad = _wrapped(self._heading_rad + math.pi)
+            self._forward_m = -self._forward_m
+            self._is_told = True
+        elif self._forward_m >= _FIRST_M:
+            self._is_told = True
+
+
+def _wrapped(angle_rad: float) -> float:
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+
+def nearest_blob(robot: RobotSeen, blobs_m: Floats, time_s: float) -> int | None:
+    """Return which overhead blob is the robot; None if none is near enough.
+
+    Parameters
+    ----------
+    robot
+        As the camera below saw it.
+    blobs_m : ndarray, shape (blob, 2)
+        As the camera overhead saw everybody.
+    time_s
+        Of the overhead image.
+    """
+    # A microsecond over is rounding of time stamps.
+    if robot.is_lost or not abs(robot.time_s - time_s) <= NEAR_S + 1e-6 or not len(blobs_m):
+        return None
+    away_m = np.hypot(blobs_m[:, 0] - robot.x_m, blobs_m[:, 1] - robot.y_m)
+    nearest = int(np.argmin(away_m))
+    return nearest if away_m[nearest] <= NEAR_M else None
