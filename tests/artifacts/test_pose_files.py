@@ -1,0 +1,252 @@
+"""Poses: a message per frame, there at once, read back to the last digit."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from zfcal.artifacts.arenas import load_arena
+from zfcal.artifacts.lineage import Lineage, read_lineage
+from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.pose_files import POSES, PoseFollower, PoseWriter, read_clock, read_poses
+from zfcal.artifacts.validation import read_json
+from zfcal.errors import DamagedError, InputError, StorageError
+from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses, tracks_of
+
+LINEAGE = Lineage(schema=POSES, command="track", options={"method": "shi-tomasi"})
+
+
+def frame(number, *, n=3, seed=0):
+    """Return a frame of n agents at random places; the last is a robot without heading."""
+    rng = np.random.default_rng([seed, number])
+    agents = tuple(
+        AgentPose(
+            agent=k,
+            kind=ROBOT if k == n - 1 else FISH,
+            x_m=float(rng.uniform(0, 1)),
+            y_m=float(rng.uniform(0, 1)),
+            heading_rad=math.nan if k == n - 1 else float(rng.uniform(-3, 3)),
+            confidence=float(rng.uniform(0, 1)),
+        )
+        for k in range(n)
+    )
+    return FramePoses(time_s=number / 15, frame=number, agents=agents)
+
+
+def write(path, numbers=range(20), **how):
+    """Write frames of these numbers, and return them."""
+    frames = [frame(number) for number in numbers]
+    with PoseWriter(path, LINEAGE, **how) as writer:
+        for poses in frames:
+            writer.add(poses)
+    return frames
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Return where poses of the first minute go."""
+    return tmp_path / "poses" / "000000.mcap"
+
+
+def test_what_was_written_is_read_back(path):
+    """Every digit of every number; NaN has no word in JSON and comes back."""
+    frames = write(path)
+    assert repr(list(read_poses(path))) == repr(frames)
+
+
+def test_the_same_poses_make_the_same_bytes(path, tmp_path):
+    """Whenever they are written."""
+    write(path)
+    write(tmp_path / "again.mcap")
+    assert path.read_bytes() == (tmp_path / "again.mcap").read_bytes()
+
+
+def test_the_doctor_finds_nothing(path, examine):
+    """Library, profile, times, chunks, indexes, statistics; with the arena or without."""
+    write(path, arena=load_arena("two-rooms", Path()), clock={"started_unix_s": "1.5"})
+    assert examine(path) == []
+
+
+def test_viewers_know_every_channel_by_its_schema(path):
+    """Foxglove's well-known names; what is said in one is said in the others."""
+    (poses,) = write(path, [3], arena=load_arena("two-rooms", Path()))
+    found = overview(path)
+    assert found.schemas == {
+        "/poses": "foxglove.PosesInFrame",
+        "/agents": "zfcal.poses/1",
+        "/scene": "foxglove.SceneUpdate",
+    }
+    assert (found.profile, found.library) == ("", "zfcal")
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        protobuf = [topic for topic in found.schemas if topic != "/agents"]
+        said = {c.topic: m for _, c, _, m in reader.iter_decoded_messages(topics=protobuf)}
+    places = [(pose.position.x, pose.position.y) for pose in said["/poses"].poses]
+    assert places == [(agent.x_m, agent.y_m) for agent in poses.agents]
+    turned = said["/poses"].poses[0].orientation
+    assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(poses.agents[0].heading_rad)
+    assert said["/poses"].timestamp.ToNanoseconds() == 200_000_000
+    walls, agents = said["/scene"].entities
+    assert walls.id == "arena"
+    assert len(walls.lines[0].points) > 4
+    assert len(agents.arrows) == 3
+
+
+def test_messages_of_agents_are_of_their_schema(path, repository):
+    """As `schemas/poses.schema.json` has it, which the file carries."""
+    write(path)
+    schema = read_json(repository / "schemas" / "poses.schema.json")
+    with path.open("rb") as file:
+        for carried, _, message in make_reader(file).iter_messages(topics=["/agents"]):
+            Draft202012Validator(schema).validate(json.loads(message.data))
+            assert json.loads(carried.data) == schema
+
+
+def test_lineage_and_clock_stand_at_the_head(path):
+    """Also in a file that still grows."""
+    writer = PoseWriter(path, LINEAGE, clock={"started_unix_s": "1700000000.5"})
+    assert read_lineage(path) == LINEAGE
+    assert read_clock(path) == {"started_unix_s": "1700000000.5"}
+    writer.close()
+    write(path)
+    assert read_clock(path) is None
+
+
+def test_every_frame_can_be_read_as_soon_as_it_is_written(path, tmp_path):
+    """By one who follows the trial, from minute to minute; nothing comes twice."""
+    follower = PoseFollower(tmp_path)
+    assert follower.poll() == []
+    for minute in (0, 60, 180):
+        writer = PoseWriter(path.with_name(f"{minute:06d}.mcap"), LINEAGE)
+        for number in range(15 * minute, 15 * minute + 5):
+            writer.add(frame(number))
+            assert repr(follower.poll()) == repr([frame(number)])
+        writer.close()
+    assert follower.poll() == []
+
+
+def test_a_follower_that_sleeps_misses_nothing(path, tmp_path):
+    """Three minutes later it gets all of them, in order."""
+    follower = PoseFollower(tmp_path)
+    for minute in (0, 60, 120):
+        write(path.with_name(f"{minute:06d}.mcap"), range(15 * minute, 15 * minute + 3))
+    assert [poses.frame for poses in follower.poll()] == [0, 1, 2, 900, 901, 902, 1800, 1801, 1802]
+
+
+def test_a_follower_goes_on_behind_a_file_that_was_never_closed(path, tmp_path):
+    """Whoever wrote it was killed."""
+    abandoned = PoseWriter(path, LINEAGE)
+    abandoned.add(frame(0))
+    abandoned.abandon()
+    follower = PoseFollower(tmp_path)
+    assert [poses.frame for poses in follower.poll()] == [0]
+    write(path.with_name("000060.mcap"), [900])
+    assert [poses.frame for poses in follower.poll()] == [900]
+
+
+def test_a_file_that_is_written_anew_is_read_anew(path, tmp_path):
+    """A second run of the tracker begins at the start."""
+    follower = PoseFollower(tmp_path)
+    writer = PoseWriter(path, LINEAGE)
+    for number in range(9):
+        writer.add(frame(number))
+    writer.abandon()
+    assert len(follower.poll()) == 9
+    writer = PoseWriter(path, LINEAGE)
+    writer.add(frame(0))
+    assert [poses.frame for poses in follower.poll()] == [0]
+    writer.close()
+
+
+def test_every_cut_loses_only_what_lies_behind_it(path):
+    """At each place: a file that was cut gives the frames before, to the last whole one."""
+    frames = write(path)
+    content = path.read_bytes()
+    counts = []
+    for size in range(8, len(content), 211):
+        path.write_bytes(content[:size])
+        found = list(read_poses(path))
+        assert repr(found) == repr(frames[: len(found)])
+        counts.append(len(found))
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (0, 20)
+
+
+def test_no_flipped_byte_makes_a_traceback(path):
+    """Frames are lost, and none is wrong."""
+    known = {repr(poses) for poses in write(path, range(4))}
+    content = path.read_bytes()
+    for place in range(0, len(content), 17):
+        broken = bytearray(content)
+        broken[place] ^= 0xFF
+        path.write_bytes(broken)
+        found = []
+        try:
+            for poses in read_poses(path):
+                found.append(poses)  # noqa: PERF402 - those before the damage count
+        except DamagedError:
+            pass
+        assert {repr(poses) for poses in found} <= known
+
+
+def test_a_killed_writer_leaves_all_that_it_had_written(tmp_path):
+    """The process ends by a signal that nobody can catch."""
+    script = (
+        "import os, signal, sys\n"
+        "from pathlib import Path\n"
+        "from zfcal.artifacts.lineage import Lineage\n"
+        "from zfcal.artifacts.pose_files import POSES, PoseWriter\n"
+        "from zfcal.tracks import FramePoses\n"
+        "w = PoseWriter(Path(sys.argv[1]), Lineage(schema=POSES, command='track'))\n"
+        "for k in range(50):\n"
+        "    w.add(FramePoses(time_s=k / 15, frame=k, agents=()))\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    path = tmp_path / "000000.mcap"
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)], check=False, env=os.environ, timeout=60
+    )
+    assert done.returncode == -9
+    assert [poses.frame for poses in read_poses(path)] == list(range(50))
+
+
+def test_what_is_no_file_of_poses_is_named(tmp_path):
+    """A missing one, one of another kind, and one whose messages are of another form."""
+    with pytest.raises(InputError, match="no such file"):
+        list(read_poses(tmp_path / "x.mcap"))
+    (tmp_path / "x.mcap").write_bytes(b"\x89PNG\r\n\x1a\n and more")
+    with pytest.raises(DamagedError, match="is not an MCAP file"):
+        list(read_poses(tmp_path / "x.mcap"))
+
+
+def test_messages_of_another_form_are_named(path, write_mcap):
+    """Its time is missing."""
+    write_mcap(path)
+    with pytest.raises(DamagedError, match=r"a message of /agents is not of zfcal.poses/1"):
+        list(read_poses(path))
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    """A file stands where the folder is to be."""
+    (tmp_path / "poses").write_text("")
+    with pytest.raises(StorageError, match="cannot be written"):
+        PoseWriter(tmp_path / "poses" / "000000.mcap", LINEAGE)
+
+
+def test_rows_of_tracks_are_those_of_the_poses():
+    """In order of frame and agent; a frame without agents has none."""
+    empty = FramePoses(time_s=0.1, frame=1, agents=())
+    tracks = tracks_of([frame(0), empty, frame(2)])
+    assert tracks.frame.tolist() == [0, 0, 0, 2, 2, 2]
+    assert tracks.kind.tolist() == [0, 0, 1, 0, 0, 1]
+    assert tracks.x_m[0] == frame(0).agents[0].x_m
+    assert math.isnan(tracks.heading_rad[2])
+    assert len(tracks_of([])) == 0

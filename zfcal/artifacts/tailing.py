@@ -1,0 +1,140 @@
+"""MCAP files that grow: what was added since the last look, record by whole record.
+
+A file that was cut short gives all that lies before the cut.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import final
+
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import Channel, Message, Metadata
+from mcap.stream_reader import StreamReader
+
+from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.mcap_files import BROKEN
+from zfcal.errors import DamagedError
+
+_MAGIC = b"\x89MCAP0\r\n"
+_HEAD = struct.Struct("<BQ")
+_RECORD_LIMIT = 2**28
+"""Bytes of the longest record that is believed: a damaged length asks for more."""
+
+
+@final
+class Tail:
+    """Follows one MCAP file while it grows.
+
+    Parameters
+    ----------
+    path
+        It need not be there yet.
+    topic
+        The channel that is read.
+
+    Attributes
+    ----------
+    metadata
+        The metadata records by name, as far as they were read.
+    is_closed
+        Whether the footer was reached: nothing more will come.
+    lost_bytes
+        Bytes behind the last whole record, at the last look.
+    """
+
+    def __init__(self, path: Path, topic: str) -> None:
+        self.path = path
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.is_closed = False
+        self.lost_bytes = 0
+        self._topic = topic
+        self._offset = 0
+        self._channels: set[int] = set()
+
+    def poll(self) -> list[tuple[int, bytes]]:
+        """Return what was added: the log time in nanoseconds, and the data of each message.
+
+        Raises
+        ------
+        InputError
+            The file cannot be opened; one that is not there has nothing to give.
+        DamagedError
+            It is no MCAP file, or a record is damaged.
+        """
+        return list(self.messages())
+
+    def messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield what `poll` returns: what lies before a damaged record, and then the error."""
+        if self.is_closed:
+            return
+        whole = self._take()
+        try:
+            yield from self._messages(whole)
+        except BROKEN as error:
+            raise DamagedError(
+                f"{self.path}: a record is damaged ({error}).",
+                hint=f"See how much of it can be read with: zfcal inspect {self.path}",
+            ) from error
+
+    def _take(self) -> bytes:
+        """Read the whole records that were added."""
+        try:
+            with self.path.open("rb") as file:
+                if file.seek(0, io.SEEK_END) < self._offset:
+                    # Written anew: the one that was read is gone.
+                    self._offset = 0
+                    self._channels.clear()
+                file.seek(self._offset)
+                added = file.read()
+        except FileNotFoundError:
+            return b""
+        except OSError as error:
+            raise unreadable(self.path, error) from error
+        skipped = 0
+        if self._offset == 0:
+            if not _MAGIC.startswith(added[:8]):
+                raise DamagedError(
+                    f"{self.path}: is not an MCAP file (it starts with {added[:8]!r}).",
+                    hint="Move it out of the trial, or copy the right file there.",
+                )
+            skipped = min(8, len(added))
+        end = self._end_of_records(added, skipped)
+        self.lost_bytes = 0 if self.is_closed else len(added) - end
+        if end > 8 or self._offset:
+            self._offset += end
+            return added[skipped:end]
+        return b""
+
+    def _end_of_records(self, added: bytes, place: int) -> int:
+        while place + _HEAD.size <= len(added):
+            opcode, length = _HEAD.unpack_from(added, place)
+            if length > _RECORD_LIMIT:
+                raise DamagedError(
+                    f"{self.path}: a record is damaged (it claims {length} bytes).",
+                    hint=f"See how much of it can be read with: zfcal inspect {self.path}",
+                )
+            if opcode == Opcode.FOOTER:
+                self.is_closed = True
+                return place
+            if place + _HEAD.size + length > len(added):
+                break
+            place += _HEAD.size + length
+        return place
+
+    def _messages(self, whole: bytes) -> Iterator[tuple[int, bytes]]:
+        reader = StreamReader(io.BytesIO(whole), skip_magic=True, validate_crcs=True)
+        try:
+            for record in reader.records:
+                if isinstance(record, Channel) and record.topic == self._topic:
+                    self._channels.add(record.id)
+                elif isinstance(record, Metadata):
+                    self.metadata[record.name] = dict(record.metadata)
+                elif isinstance(record, Message) and record.channel_id in self._channels:
+                    yield record.log_time, record.data
+        except EndOfFile:
+            return
