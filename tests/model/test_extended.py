@@ -90,12 +90,12 @@ def nats_of(x, turns, view):
 
 
 def test_the_maximum_is_that_of_the_base_models_likelihood(walk, scene, two_rooms, model):
-    """Both climb the same hill: 0.05 nats at most lie between their tops, of some 9,000."""
+    """Both climb the same hill: 0.1 nats at most lie between their tops, of some 9,000."""
     base = fit(steps_of(walk, two_rooms, fov_rad=model.fov_rad), two_rooms, model)
     fitted = maximise(scene, model)
 
     assert fitted.used.sum() == base.n_steps
-    assert fitted.nats == pytest.approx(base.nats_per_step * base.n_steps, abs=0.05)
+    assert fitted.nats == pytest.approx(base.nats_per_step * base.n_steps, abs=0.1)
     for own, other in zip(fitted.parameters.zones, base.parameters.zones, strict=True):
         assert own.kappa_0 == pytest.approx(other.kappa_0, rel=0.03)
         assert own.alpha == pytest.approx(other.alpha, rel=0.05)

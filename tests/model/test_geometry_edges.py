@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from zfcal.arena import Bins, Zone, make_arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.compiled import kernel
-from zfcal.model.geometry import clearance, make_tank, nearest_wall, zone_exact, zone_of
+from zfcal.model.geometry import best_within, clearance, nearest_wall, zone_exact, zone_of
+from zfcal.model.tank import make_tank
 
 EPS = 2e-7
 
@@ -34,6 +35,14 @@ def _look_up(xy, tank):
             found[k, 0], found[k, 1], found[k, 2] = nearest_wall(x, y, tank)
             found[k, 3] = clearance(x, y, tank)
     return zones, found
+
+
+@kernel
+def _best(xy, reach_m, gain, tank):
+    best = np.empty(len(xy))
+    for k in range(len(xy)):
+        best[k] = best_within(xy[k, 0], xy[k, 1], reach_m[k], gain, tank)
+    return best
 
 
 def _box_with(name, polygon, **changes):
@@ -172,6 +181,7 @@ def test_any_tank_is_the_same_by_grid_by_exact_test_and_by_shapely(radii, seed):
     assert found[inside, 0] == pytest.approx(arena.wall_distance(xy[inside]), abs=1e-12)
     assert np.hypot(found[inside, 1], found[inside, 2]) == pytest.approx(1.0)
     _check_clearance(arena, xy[inside], found[inside, 3], rng)
+    _check_reach(arena, xy[inside], tank, rng)
 
 
 def _star(radii):
@@ -190,6 +200,39 @@ def _check_clearance(arena, xy, clear_m, rng):
     moved = clear_m > 0
     np.testing.assert_array_equal(arena.zone_of(xy[moved] + step[moved]), arena.zone_of(xy[moved]))
     assert (clear_m <= _away_from_borders(arena, xy)).all()
+
+
+def _check_reach(arena, xy, tank, rng):
+    """No step gains more than the best that is said to be within its reach."""
+    reach_m, theta = rng.uniform(0, 0.3, len(xy)), rng.uniform(0, 2 * np.pi, len(xy))
+    landing = arena.zone_of(xy + reach_m[:, None] * np.column_stack([np.cos(theta), np.sin(theta)]))
+    for _ in range(4):
+        gain = np.append(0.0, rng.uniform(0, 1, len(arena.zones)))
+        assert (gain[landing] <= _best(xy, reach_m, gain, tank)).all()
+        assert (gain[arena.zone_of(xy)] <= _best(xy, 0 * reach_m, gain, tank)).all()
+
+
+@pytest.mark.parametrize("name", _cracked())
+def test_what_a_step_gains_is_within_its_reach_beside_cracks_too(name):
+    """Points on either side of a crack, and in it."""
+    arena, xy, _ = _cracked()[name]
+    _check_reach(arena, xy, make_tank(arena), np.random.default_rng(2))
+
+
+def test_a_zone_counts_as_within_reach_only_where_it_nearly_is(two_rooms):
+    """The corridor from any place of a room: at its distance, two diagonals before at most."""
+    tank = make_tank(two_rooms)
+    corridor = two_rooms.zones[0].polygon
+    rng = np.random.default_rng(4)
+    xy = rng.uniform((0.051, 0.599), (0.401, 0.949), (5000, 2))
+    away_m = shapely.distance(corridor, shapely.points(xy))
+    gain = np.array([0.0, 1.0, 0.0, 0.0])
+    slack_m = 4 * math.sqrt(0.5) / tank.per_m + 2e-6
+
+    assert (_best(xy, away_m, gain, tank) == 1.0).all()
+    far = away_m > slack_m
+    assert far.mean() > 0.9
+    assert (_best(xy[far], away_m[far] - slack_m, gain, tank) == 0.0).all()
 
 
 def test_the_clearance_is_all_but_a_cell_of_the_distance_to_a_border(two_rooms):

@@ -10,9 +10,9 @@ import sys
 import numpy as np
 import pytest
 
-from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.run import record_run
 from zfcal.model.simulate import individuals, pack
+from zfcal.model.tank import make_tank
 
 _PLAIN = """
 import json, sys, warnings
@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 warnings.simplefilter("ignore", RuntimeWarning)  # words of 64 bits are meant to overflow
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.geometry import make_tank
+from zfcal.model.tank import make_tank
 from zfcal.model.kernels.run import record_run
 from zfcal.model.simulate import individuals, pack
 from zfcal.parameters import natural

@@ -9,7 +9,6 @@ import pytest
 import shapely
 
 from zfcal.arena import make_arena
-from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.world import (
     LEFT_AT_S,
     LEFT_S,
@@ -27,6 +26,7 @@ from zfcal.model.kernels.world import (
 )
 from zfcal.model.rooms import find_rooms
 from zfcal.model.simulate import tank_of
+from zfcal.model.tank import make_tank
 
 CORRIDOR, CENTRE = 1, 3
 

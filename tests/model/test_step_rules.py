@@ -15,7 +15,6 @@ from scipy import stats
 from zfcal.arena import Bins, make_arena
 from zfcal.errors import InputError
 from zfcal.model.compiled import kernel
-from zfcal.model.geometry import make_tank
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.random import next_word, seeded
 from zfcal.model.kernels.run import advance, record_run
@@ -29,6 +28,7 @@ from zfcal.model.simulate import (
     simulate_tracks,
     tank_of,
 )
+from zfcal.model.tank import make_tank
 from zfcal.parameters import to_genes
 
 SAMPLERS = pytest.mark.parametrize("sampler", ["exact", "grid"])

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.geometry import Tank, make_tank
+from zfcal.model.geometry import Tank
 from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
 from zfcal.model.kernels.run import Counts, count_runs, record_run
 from zfcal.model.kernels.world import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
+from zfcal.model.tank import make_tank
 from zfcal.parameters import Parameters
 from zfcal.units import BURN_IN_S
 

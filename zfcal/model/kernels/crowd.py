@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel, lean
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.heading import (
     REDRAWS,
     REJECTIONS,
@@ -443,15 +443,18 @@ def _draw_heading(
     zone = int(state[ZONE, i])
     reach = speed * packed.dt_s
     sure = reach < state[CLEAR, i]
-    if sure and packed.gamma[model, zone, zone] == 0.0:
+    best = packed.gamma[model, zone, zone]
+    if not sure:
+        best = best_within(state[X, i], state[Y, i], reach, packed.gamma[model, zone], tank)
+    if best == 0.0:
         return False
     for _ in range(REJECTIONS):
         ux, uy = _draw_turn(i, cell, state, model, packed, tank, random, crowd, found, sums_sr)
-        landing, accept = zone, 1.0
+        landing, accept = zone, best
         if not sure:
             landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
             accept = packed.gamma[model, zone, landing]
-        if accept >= 1.0 or uniform(random) < accept:
+        if accept >= best or uniform(random) * best < accept:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
     return _draw_by_grid(i, speed, state, model, packed, tank, random, work, crowd)

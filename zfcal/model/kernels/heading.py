@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_component, call_factor, call_speed
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
@@ -266,24 +266,29 @@ def draw_exact(
     """Draw a heading by rejection; after 200 rejections the grid decides.
 
     A component of the mixture, then its von Mises law, then the attraction of
-    the landing zone (zero outside) and the effects' factors as acceptance.
+    the landing zone (zero outside) and the effects' factors as acceptance. The
+    attraction counts against the largest among the zones within reach: the others
+    only would cost rejections.
     """
     zone = int(state[ZONE, i])
     reach = speed * packed.dt_s
     x, y = state[X, i], state[Y, i]
     # Where no border is within reach there is nothing to choose, be the attraction ever so small.
     sure = reach < state[CLEAR, i]
-    if sure and packed.gamma[model, zone, zone] == 0.0:
+    best = packed.gamma[model, zone, zone]
+    if not sure:
+        best = best_within(x, y, reach, packed.gamma[model, zone], tank)
+    if best == 0.0:
         return False
     for _ in range(REJECTIONS):
         ux, uy = _draw_mixture(i, state, model, packed, tank, random, work, count, total)
-        landing, accept = zone, 1.0
+        landing, accept = zone, best
         if not sure:
             landing = zone_of(x + reach * ux, y + reach * uy, tank)
             accept = packed.gamma[model, zone, landing]
         if packed.factors.shape[0] > 0 and accept > 0.0:
             accept *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
-        if accept >= 1.0 or uniform(random) < accept:
+        if accept >= best or uniform(random) * best < accept:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
     return draw_from_grid(i, speed, state, model, packed, tank, sight, random, work)
