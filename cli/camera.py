@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from .camera_corners import corners
+from .camera_points import older, points
 from .options import laid_out
 
 
@@ -25,4 +26,5 @@ def command() -> None:
     """
 
 
-command.add_command(corners)
+for part in (points, corners, older):
+    command.add_command(part)

@@ -117,8 +117,95 @@ def test_wrong_use_is_one_line_with_a_hint(zfcal, tmp_path, words, code, says):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["corners"])
+@pytest.mark.parametrize("name", ["points", "corners", "import"])
 def test_every_camera_command_has_help_with_an_example(zfcal, name):
     """And the group too."""
     assert "Example:" in zfcal("camera", "--help").out
     assert "Example:\n      zfcal camera " + name in zfcal("camera", name, "--help").out
+
+
+MARKS = """x_px,y_px,x_cm,y_cm
+50,450,0,0
+250,450,50,0
+450,450,100,0
+50,250,0,50
+250,250,50,50
+450,250,100,50
+50,50,0,100
+250,50,50,100
+450,50,100,100
+"""
+
+OLD = """<?xml version="1.0"?>
+<opencv_storage>
+<worldUnits>cm</worldUnits>
+<imageSize><width>500</width><height>500</height></imageSize>
+<calibrationPoints><numberOfPoints>9</numberOfPoints>
+{points}
+</calibrationPoints>
+</opencv_storage>
+"""
+
+
+def test_points_make_a_camera_with_its_errors(zfcal, tmp_path):
+    """In centimetres here; where it lies is right, and the file says how well."""
+    (tmp_path / "marks.csv").write_text(MARKS)
+    done = zfcal("camera", "points", "marks.csv", "--size", "500x500", "-o", "c.toml", "--json")
+    assert done.code == 0
+    (result,) = json.loads(done.out)["results"]
+    assert result["n_points"] == 9
+    assert result["left_out_mm"]["max"] < 0.1
+    camera = read_camera(tmp_path / "c.toml")
+    np.testing.assert_allclose(camera.to_metres(np.array([150.0, 350.0])), 0.25, atol=1e-4)
+    assert "error_mm" in zfcal("inspect", "c.toml").out
+
+
+def test_points_with_a_known_lens_give_the_pose(zfcal, tmp_path):
+    """The lens of the first file, the size of its images."""
+    (tmp_path / "marks.csv").write_text(MARKS)
+    words = ["camera", "points", "marks.csv", "--model", "pinhole", "--size", "500x500"]
+    assert zfcal(*words, "-o", "lens.toml").code == 0
+    assert zfcal("camera", "points", "marks.csv", "--lens", "lens.toml", "-o", "c.toml").code == 0
+    camera = read_camera(tmp_path / "c.toml")
+    assert camera.size_px == (500, 500)
+    np.testing.assert_allclose(camera.to_metres(np.array([250.0, 250.0])), 0.5, atol=1e-4)
+    marks = tmp_path / "marks.csv"
+    marks.write_text(MARKS.replace("50,450,0,0", "51,450,0,0"))
+    again = zfcal(
+        "camera", "points", "marks.csv", "--lens", "lens.toml", "-o", "c.toml", "--dry-run"
+    )
+    assert "input marks.csv changed" in again.err
+
+
+def test_a_camera_of_the_older_rig_is_read(zfcal, tmp_path):
+    """A file with points alone."""
+    rows = [line.split(",") for line in MARKS.splitlines()[1:]]
+    points = "\n".join(
+        f"<point_{i}><xWorld>{X}</xWorld><yWorld>{Y}</yWorld>"
+        f"<xImage>{x}</xImage><yImage>{y}</yImage></point_{i}>"
+        for i, (x, y, X, Y) in enumerate(rows)
+    )
+    (tmp_path / "old.xml").write_text(OLD.format(points=points))
+    assert zfcal("camera", "import", "old.xml", "-o", "c.toml").code == 0
+    camera = read_camera(tmp_path / "c.toml")
+    np.testing.assert_allclose(camera.to_metres(np.array([450.0, 50.0])), 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (MARKS.replace("50,450,0,0", "50,850,0,0"), "Point 1 lies outside the image: 50, 850 px"),
+        ("\n".join(MARKS.splitlines()[:4]), "needs 4 points or more, got 3"),
+        (MARKS.replace("x_cm,y_cm", "x_m,y_m"), "span 100 m, expected 0.01 to 20 m"),
+        (MARKS.replace("250,250,50", "250,?,50"), "line 6, column y_px"),
+    ],
+)
+def test_points_that_cannot_be_are_one_line(zfcal, tmp_path, text, says):
+    """With the file's name, a hint, and no camera."""
+    (tmp_path / "marks.csv").write_text(text)
+    done = zfcal("camera", "points", "marks.csv", "--size", "500x500", "-o", "c.toml")
+    assert done.code == 1
+    assert "marks.csv" in done.err
+    assert says in done.err
+    assert "hint:" in done.err
+    assert not (tmp_path / "c.toml").exists()

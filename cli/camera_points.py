@@ -1,0 +1,107 @@
+"""`zfcal camera points` and `import`: a camera from points of the tank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from .camera_options import image_options, place_of, place_options
+from .options import EXISTING, makes_artifacts, speaks
+from .output import Output
+
+Command = Callable[..., None]
+
+
+def fit_options(command: Command) -> Command:
+    """Add --model and --robust."""
+    command = click.option(
+        "--robust", is_flag=True, help="Let points that are far off weigh less."
+    )(command)
+    return click.option(
+        "--model",
+        type=click.Choice(["pinhole", "fisheye"]),
+        help="Of the lens; default: what foretells points left out best.",
+    )(command)
+
+
+@click.command("points")
+@click.argument("file", metavar="POINTS.csv", type=EXISTING)
+@click.option("--lens", type=EXISTING, help="A camera file with this camera's lens.")
+@fit_options
+@image_options
+@place_options
+@makes_artifacts
+@speaks
+def points(
+    out: Output,
+    file: Path,
+    *,
+    lens: Path | None,
+    model: str | None,
+    robust: bool,
+    size: tuple[int, int] | None,
+    image: Path | None,
+    place: Path | None,
+    trial: Path | None,
+    name: str | None,
+    dry_run: bool,
+    force: bool,
+) -> None:
+    r"""Take points of the tank whose place is known.
+
+    The file has the columns x_px, y_px (pixels, y down) and x_m, y_m (metres
+    of the arena; x_cm or x_mm will do). With --lens four points give the pose;
+    without, the lens is fitted too, as rich a one as the points support.
+
+    \b
+    Example:
+        zfcal camera points marks.csv --size 500x500 --trial trial --camera overhead
+        zfcal camera points marks.csv --lens below-lens.toml -o below.toml
+    """
+    from zfcal.online.camera_points import Points, make_from_points
+    from zfcal.online.opening import Task
+
+    if lens is not None and model is not None:
+        raise click.UsageError("--lens has its model already: leave --model out.")
+    given = Points(path=file, size_px=size, image=image, lens=lens, model=model, robust=robust)
+    where = place_of(place, trial, name)
+    task = Task(dry_run=dry_run, force=force)
+    out.attempt(lambda: make_from_points(where, given, out.tell, task=task))
+
+
+@click.command("import")
+@click.argument("file", metavar="OLD.xml", type=EXISTING)
+@fit_options
+@place_options
+@makes_artifacts
+@speaks
+def older(
+    out: Output,
+    file: Path,
+    *,
+    model: str | None,
+    robust: bool,
+    place: Path | None,
+    trial: Path | None,
+    name: str | None,
+    dry_run: bool,
+    force: bool,
+) -> None:
+    r"""Read a camera of the older rig: OpenCV's XML with calibrationPoints.
+
+    The pose is found from the file's points. Files without a cameraMatrix
+    hold points alone; then the lens is fitted too, as by camera points.
+
+    \b
+    Example:
+        zfcal camera import cats2-below-camera.xml --trial trial --camera below
+    """
+    from zfcal.online.camera_points import Points, make_from_older
+    from zfcal.online.opening import Task
+
+    given = Points(path=file, model=model, robust=robust)
+    where = place_of(place, trial, name)
+    task = Task(dry_run=dry_run, force=force)
+    out.attempt(lambda: make_from_older(where, given, out.tell, task=task))
