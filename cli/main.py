@@ -30,6 +30,7 @@ COMMANDS = {
     "camera": "camera",
     "import": "import_",
     "simulate": "simulate",
+    "track": "track",
     "analyse": "analyse",
     "calibrate": "calibrate",
     "diagnose": "diagnose",

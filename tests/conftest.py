@@ -80,6 +80,12 @@ def streaming():
     return _module("streaming")
 
 
+@pytest.fixture(scope="session")
+def drawn_tank():
+    """Return the module that draws frames of fish whose positions are known."""
+    return _module("vision/drawn_tank")
+
+
 def _module(name):
     spec = importlib.util.spec_from_file_location(name, REPOSITORY / "tests" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)

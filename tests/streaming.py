@@ -43,7 +43,7 @@ class Camera:
             def log_message(self, *_):
                 pass
 
-            def do_GET(self):  # noqa: N802 - the library's name
+            def do_GET(self):
                 if camera.gone.is_set():
                     self.send_error(503)
                     return

@@ -37,6 +37,12 @@ def test_any_other_path_bears_on_all_windows(trial, name):
     assert work_of(trial / name) == Work(root=Path("day"))
 
 
+@pytest.mark.parametrize("name", ["poses/000060.mcap", "frames/overhead/000060.mcap"])
+def test_poses_and_images_bear_on_no_window(trial, name):
+    """The segment of their minute does, whose path comes as well."""
+    assert work_of(trial / name) == Work(root=Path("day"), ends_s=frozenset())
+
+
 def test_a_relative_path_gives_a_relative_trial(trial):
     """So that the paths that come out of a pipe look like those that go in."""
     assert not work_of(trial / "tracks" / "000000.parquet").root.is_absolute()

@@ -46,7 +46,8 @@ def work_of(path: Path) -> Work:
     ----------
     path
         A trial, or any file of one. A track segment bears on the two windows
-        that hold it, statistics on their own window, anything else on all.
+        that hold it, statistics on their own window, poses and camera images on
+        none, anything else on all.
 
     Raises
     ------
@@ -54,6 +55,9 @@ def work_of(path: Path) -> Work:
         The path lies in no trial.
     """
     root = _root_of(path)
+    if path.suffix == ".mcap":
+        # What is counted comes from the segments, whose paths come as well.
+        return Work(root=root, ends_s=frozenset())
     second = second_of(path)
     after_s = _ENDS_AFTER_S.get(path.parent.name)
     if second is None or after_s is None:

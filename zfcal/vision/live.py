@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
@@ -13,6 +14,10 @@ import numpy as np
 
 from zfcal.errors import InputError
 from zfcal.vision.stamps import Problem, Shot
+
+# FFmpeg and OpenCV talk to standard error by themselves; what is wrong is told in one line.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 QUEUE = 45
 """Images that wait at most: three seconds at 15 Hz; then the oldest go."""

@@ -6,7 +6,6 @@ segments are artifacts: `zfcal.online.sources` makes a source of them.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,9 +19,6 @@ from zfcal.vision.frames import Image
 from zfcal.vision.live import ArrivalClock, LiveCamera
 from zfcal.vision.sequence import ImageSequence, images_of
 from zfcal.vision.stamps import Problem, Shot, Source
-
-# FFmpeg talks to standard error by itself; what is wrong is told in one line here.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 _ADDRESS = re.compile(r"\d+|/dev/video\d+|[a-z][a-z0-9+.-]*://.+")
 

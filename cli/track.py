@@ -1,0 +1,38 @@
+"""`zfcal track`: from camera images to tracks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import PLACE, makes_artifacts, speaks
+from .output import Output
+from .tracking import track_options, tracking_options
+
+
+@click.command("track")
+@click.argument("trial", type=PLACE)
+@tracking_options
+@makes_artifacts
+@speaks
+def command(out: Output, trial: Path, *, dry_run: bool, force: bool, **options: Any) -> None:
+    r"""Track a recording, or a live camera, into poses and tracks.
+
+    SRC is a video file, a folder or pattern of images, MCAP image segments (a
+    file, or a trial's frames/overhead), or a live camera: its number, device or
+    address. Poses are written frame by frame, tracks as soon as a minute has
+    passed. Cameras and their calibration come from trial.toml unless given.
+
+    \b
+    Example:
+        zfcal track trial --overhead day3.mp4 --below day3-below.mp4
+        zfcal track trial --overhead 'images/*.png' --corners 20,480,480,480,480,20,20,20
+        zfcal track trial --overhead 0 --below 1 --record jpeg | zfcal analyse -
+    """
+    from zfcal.online.opening import Task
+    from zfcal.online.track import track
+
+    task = Task(dry_run=dry_run, force=force)
+    out.attempt(lambda: track(trial, track_options(options), out.tell, task=task))

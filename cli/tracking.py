@@ -1,0 +1,100 @@
+"""The options of `zfcal track`."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .durations import seconds
+from .options import EXISTING, PLACE, Command
+
+if TYPE_CHECKING:
+    from zfcal.online.track_plan import TrackOptions
+
+METHODS = ("shi-tomasi", "silhouette")
+
+_OPTIONS = (
+    click.option("--overhead", metavar="SRC", help="The camera that sees the fish."),
+    click.option("--below", metavar="SRC", help="The camera that sees the robot's LEDs."),
+    click.option("--camera", type=EXISTING, help="Calibration of the camera overhead."),
+    click.option("--below-camera", type=EXISTING, help="Calibration of the camera below."),
+    click.option(
+        "--corners",
+        metavar="X,Y,...",
+        help="Instead of --camera: pixels of the arena's lower left, lower right, upper right "
+        "and upper left corner.",
+    ),
+    click.option("--background", type=EXISTING, help="Image of the empty tank; default: learnt."),
+    click.option(
+        "--method",
+        type=click.Choice(METHODS),
+        default=METHODS[0],
+        show_default=True,
+        help="shi-tomasi is the published one.",
+    ),
+    click.option("--harris", is_flag=True, help="Harris' corner measure."),
+    click.option("--light", is_flag=True, help="Fish are lighter than the tank."),
+    click.option(
+        "--min-blob-px", type=click.FloatRange(min=0, min_open=True), help="Smallest blob."
+    ),
+    click.option("--led-hue", type=click.FloatRange(0, 360), help="Hue of the LEDs, in degrees."),
+    click.option("--robot-as-fish", is_flag=True, help="No camera below: the robot is one more."),
+    click.option("--start", "start_s", type=seconds, metavar="TIME", help="Skip so much."),
+    click.option("--duration", "duration_s", type=seconds, metavar="TIME", help="Such as 30min."),
+    click.option(
+        "--record", type=click.Choice(["jpeg", "png"]), help="Keep a live camera's images."
+    ),
+    click.option("--overlay", type=PLACE, help="Draw what was found into this video (.mp4)."),
+    click.option("--contact-sheet", type=PLACE, help="Draw the worst frames into this PNG."),
+)
+
+
+def tracking_options(command: Command) -> Command:
+    """Add the options by which a recording or a camera is tracked."""
+    return functools.reduce(lambda made, option: option(made), reversed(_OPTIONS), command)
+
+
+def track_options(given: dict[str, Any]) -> TrackOptions:
+    """Return what the options ask for."""
+    from zfcal.online.rig import CameraChoice
+    from zfcal.online.track_plan import Pictures, TrackOptions
+    from zfcal.vision.robot import LedOptions
+    from zfcal.vision.seen import TrackerOptions
+
+    smallest = {} if given["min_blob_px"] is None else {"min_blob_px": given["min_blob_px"]}
+    return TrackOptions(
+        overhead=CameraChoice(
+            source=given["overhead"],
+            file=given["camera"],
+            corners_px=_corners(given["corners"]),
+        ),
+        below=CameraChoice(source=given["below"], file=given["below_camera"]),
+        tracker=TrackerOptions(
+            method=given["method"], harris=given["harris"], light=given["light"], **smallest
+        ),
+        leds=LedOptions(hue_deg=given["led_hue"]),
+        background=given["background"],
+        robot_as_fish=given["robot_as_fish"],
+        start_s=given["start_s"],
+        duration_s=given["duration_s"],
+        record=given["record"],
+        pictures=Pictures(overlay=given["overlay"], contact_sheet=given["contact_sheet"]),
+    )
+
+
+def _corners(text: str | None) -> tuple[tuple[float, float], ...] | None:
+    """Return the pixels of four corners, typed as eight numbers."""
+    if text is None:
+        return None
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 8:
+        raise click.BadParameter(
+            f"{text!r} are no four points: expected eight numbers X,Y,X,Y,X,Y,X,Y.",
+            param_hint="--corners",
+        )
+    return tuple(zip(numbers[::2], numbers[1::2], strict=True))

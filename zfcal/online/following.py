@@ -1,0 +1,214 @@
+"""One run of the tracker over the images of a trial, frame by frame, into its files."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import time
+from collections.abc import Iterator
+from typing import final
+
+from zfcal.artifacts.frame_files import FRAMES
+from zfcal.artifacts.images import read_image
+from zfcal.artifacts.validation import written_by_people
+from zfcal.errors import InputError
+from zfcal.online.below import Below
+from zfcal.online.drawing import Drawing
+from zfcal.online.events import Made, Progress, Tell
+from zfcal.online.minutes import Minutes, Origins
+from zfcal.online.opening import Task
+from zfcal.online.outcome import Outcome, measured
+from zfcal.online.resuming import STARTED, Resumed, take_up
+from zfcal.online.rig import BELOW, OVERHEAD, Feed, open_feed, region_of
+from zfcal.online.sources import Recorder
+from zfcal.online.track_plan import Plan
+from zfcal.tracks import FramePoses
+from zfcal.vision.background import Background, background_of
+from zfcal.vision.frames import Frame
+from zfcal.vision.fusing import Fuser
+from zfcal.vision.live import ArrivalClock
+from zfcal.vision.overlay import Scene
+from zfcal.vision.seen import Seen
+from zfcal.vision.stamps import FrameClock, Shot, number_frames
+from zfcal.vision.tracker import FishTracker, follow
+
+
+@final
+class Following:
+    """Tracks a recording or a camera to its end.
+
+    Parameters
+    ----------
+    plan
+        What to track, and how.
+    origins
+        Where the files come from.
+    tell
+        Hears of everything.
+    task
+        Whether to make everything again.
+    clock
+        Of live cameras.
+    resumed
+        What is there of a live recording.
+    """
+
+    def __init__(  # noqa: PLR0913 - one keyword for each of its surroundings
+        self,
+        plan: Plan,
+        origins: Origins,
+        tell: Tell,
+        *,
+        task: Task,
+        clock: ArrivalClock | None = None,
+        resumed: Resumed | None = None,
+    ) -> None:
+        self._plan = plan
+        self._tell = tell
+        self._clock = clock or ArrivalClock()
+        self._resumed = resumed or Resumed()
+        self._fps = plan.opened.trial.fps
+        self._numbers = FrameClock(self._fps, after=self._resumed.last)
+        self._fuser = Fuser(self._resumed.next_agent)
+        self._outcome = Outcome(plan, self._numbers.tally, tell)
+        if origins.is_live:
+            origins = dataclasses.replace(origins, clock=self._said_clock)
+        self._minutes = Minutes(
+            plan.opened,
+            origins,
+            lambda tracks: measured(plan, tracks),
+            tell,
+            task=task,
+        )
+        self._origins = origins
+        self._recorders: dict[str, Recorder] = {}
+        self._handed = (-1, 0.0)
+        self._end_s = 0.0
+
+    def run(self) -> None:
+        """Track everything, and say how it went.
+
+        Raises
+        ------
+        InputError
+            A camera cannot be opened or does not fit the trial.
+        StorageError
+            A file cannot be written.
+        """
+        plan = self._plan
+        overhead = open_feed(plan.opened, plan.overhead, self._clock)
+        below = self._open_below()
+        tracker = FishTracker(
+            plan.options.tracker,
+            overhead.projection,
+            background=self._background(overhead),
+            region=region_of(plan.opened.arena, overhead),
+        )
+        drawing = Drawing(plan, overhead)
+        self._outcome.begin(overhead, below)
+        take_up(self._resumed, self._minutes)
+        try:
+            for frame, seen in follow(tracker, self._frames(overhead)):
+                bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
+                self._take(frame, seen, bad, below, drawing)
+        except BaseException:
+            self._minutes.interrupt(self._end_s)
+            raise
+        finally:
+            self._close(below)
+        self._minutes.finish(self._end_s)
+        drawing.finish(self._tell)
+        self._outcome.finish()
+
+    def _said_clock(self) -> dict[str, str]:
+        return {STARTED: repr(self._clock.started_unix_s)}
+
+    def _take(
+        self, frame: Frame, seen: list[Seen], bad: list[str], below: Below | None, drawing: Drawing
+    ) -> None:
+        """Write down one frame."""
+        robot = None if below is None else below.at(frame.time_s)
+        poses = FramePoses(
+            time_s=frame.time_s,
+            frame=frame.number,
+            agents=self._fuser.step(seen, robot, frame.time_s),
+        )
+        words = self._outcome.judge(frame, poses, bad)
+        self._minutes.add(poses, next_agent=self._fuser.next_agent, bad=words)
+        self._end_s = frame.time_s + 1 / self._fps
+        self._outcome.written(frame, handed=self._handed, now_s=self._now(frame))
+        outlines = [each.contour_px for each in seen]
+        drawing.add(Scene(frame=frame, poses=poses, outlines=outlines, bad=words))
+
+    def _now(self, frame: Frame) -> float:
+        """Return how long ago a frame was read, in seconds; of a camera, since it arrived."""
+        if self._plan.is_live:
+            return self._clock.now() - frame.time_s
+        return time.perf_counter() - self._handed[1]
+
+    def _frames(self, feed: Feed) -> Iterator[Frame]:
+        """Yield the frames that are asked for, as they are read."""
+        shots: Iterator[Shot] = feed.shots
+        options = self._plan.options
+        first_s = options.start_s or 0.0
+        if options.start_s is not None:
+            shots = itertools.dropwhile(lambda shot: shot.time_s < first_s - 1e-6, shots)
+        if options.duration_s is not None:
+            shots = _for_a_while(shots, options.duration_s)
+        recorder = self._recorder(OVERHEAD)
+        if recorder is not None:
+            shots = map(recorder.keep, shots)
+        length_s = options.duration_s or (feed.source.length_s or 0.0) - first_s
+        for frame in number_frames(shots, self._numbers):
+            self._handed = (frame.number, time.perf_counter())
+            done_s = frame.time_s - first_s
+            if int(done_s) > int(done_s - 1 / self._fps) and length_s > 0:
+                self._tell(Progress(stage="track", done=int(done_s), total=int(length_s) + 1))
+            yield frame
+
+    def _open_below(self) -> Below | None:
+        plan = self._plan
+        if plan.below is None:
+            return None
+        feed = open_feed(plan.opened, plan.below, self._clock)
+        return Below(plan.opened.arena, feed, plan.options.leds, self._recorder(BELOW))
+
+    def _recorder(self, camera: str) -> Recorder | None:
+        form = self._plan.options.record
+        if form is None:
+            return None
+        lineage = dataclasses.replace(self._origins.tracks, schema=FRAMES)
+        root = self._plan.opened.trial.root
+        self._recorders[camera] = Recorder(root, camera, form, lineage)
+        return self._recorders[camera]
+
+    def _background(self, feed: Feed) -> Background | None:
+        path = self._plan.options.background
+        if path is None:
+            return None
+        with written_by_people():
+            background = background_of(read_image(path))
+        if background.size_px != feed.size_px:
+            has, got = (f"{w} x {h} px" for w, h in (background.size_px, feed.size_px))
+            raise InputError(
+                f"{path}: has {has}, the images of {feed.source.name} have {got}.",
+                hint="Give an image of the empty tank that the same camera took.",
+            )
+        return background
+
+    def _close(self, below: Below | None) -> None:
+        if below is not None:
+            below.close()
+        for recorder in self._recorders.values():
+            recorder.close()
+            for path in recorder.paths:
+                self._tell(Made(path=path, reason="recorded"))
+
+
+def _for_a_while(shots: Iterator[Shot], duration_s: float) -> Iterator[Shot]:
+    """Yield the images of so many seconds from the first one on."""
+    first = next(shots, None)
+    if first is not None:
+        end_s = first.time_s + duration_s - 1e-6
+        yield first
+        yield from itertools.takewhile(lambda shot: shot.time_s < end_s, shots)

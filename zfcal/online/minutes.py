@@ -1,0 +1,280 @@
+"""Closes a minute of tracks as soon as it has passed, while the poses grow frame by frame."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import final
+
+from zfcal.artifacts.freshness import stale_reason
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.pose_files import PoseWriter, read_poses
+from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
+from zfcal.errors import DamagedError, InputError
+from zfcal.online.events import LeftOut, Made, Note, Tell, UpToDate
+from zfcal.online.opening import OpenTrial, Task, reason_to_make
+from zfcal.online.recording import STRETCH_KEY
+from zfcal.online.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.tracks import FramePoses, Tracks, tracks_of
+
+BAD_KEY = "bad_frames"
+"""Extra metadata of a segment: frame numbers by what was wrong with them."""
+
+NEXT_KEY = "next_agent"
+"""Extra metadata of a segment: the first agent id that is free after it."""
+
+_SLACK_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origins:
+    """Where the artifacts of a run come from.
+
+    Parameters
+    ----------
+    tracks, poses
+        The lineage of segments and of files of poses.
+    is_live
+        Whether the frames never come again: then nothing is up to date, and a run
+        that is interrupted keeps what it has.
+    clock
+        Tells when a live recording began, for the files of poses.
+    """
+
+    tracks: Lineage
+    poses: Lineage
+    is_live: bool
+    clock: Callable[[], Mapping[str, str]] | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class _Minute:
+    start_s: int
+    writer: PoseWriter | None
+    frames: list[FramePoses] = field(default_factory=list)
+    bad: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+
+
+@final
+class Minutes:
+    """Writes ``poses/`` and ``tracks/`` of a trial from frames in order.
+
+    Parameters
+    ----------
+    opened
+        The trial.
+    origins
+        Where they come from.
+    measure
+        Returns what is to be known of a segment's tracks, such as their noise.
+    tell
+        Hears of every file, when it is closed.
+    task
+        Whether to make everything again.
+    """
+
+    def __init__(
+        self,
+        opened: OpenTrial,
+        origins: Origins,
+        measure: Callable[[Tracks], Mapping[str, JSON]],
+        tell: Tell,
+        *,
+        task: Task,
+    ) -> None:
+        self._opened = opened
+        self._origins = origins
+        self._measure = measure
+        self._tell = tell
+        self._task = task
+        self._minute: _Minute | None = None
+        self._first_s: float | None = None
+        self._seen: set[int] = set()
+        self._next_agent = 0
+
+    def add(self, poses: FramePoses, *, next_agent: int, bad: tuple[str, ...] = ()) -> None:
+        """Take the next frame; of the minute before, all files are closed first.
+
+        Parameters
+        ----------
+        poses
+            Who is where.
+        next_agent
+            The first id that is free.
+        bad
+            What was wrong with the frame, in words such as ``few``.
+        """
+        start_s = int((poses.time_s + _SLACK_S) // STEP_S) * STEP_S
+        if self._minute is not None and self._minute.start_s != start_s:
+            self._close(self._minute.start_s + STEP_S)
+        if self._minute is None:
+            self._minute = _Minute(start_s=start_s, writer=self._pose_writer(start_s))
+        minute = self._minute
+        if minute.writer is not None:
+            minute.writer.add(poses)
+        minute.frames.append(poses)
+        for word in bad:
+            minute.bad[word].append(poses.frame)
+        self._first_s = poses.time_s if self._first_s is None else self._first_s
+        self._next_agent = next_agent
+
+    def take_up(self, start_s: int, frames: list[FramePoses], *, next_agent: int) -> None:
+        """Go on with a minute that was interrupted: its frames are written anew, then more."""
+        if self._minute is not None:
+            self._close(self._minute.start_s + STEP_S)
+        path = _poses_path(self._opened.trial.root, start_s)
+        part = path.with_name(f".{path.name}.taken-up")
+        writer = PoseWriter(
+            part, self._origins.poses, arena=self._opened.arena, clock=self._clock()
+        )
+        for poses in frames:
+            writer.add(poses)
+        writer.move_to(path)
+        self._minute = _Minute(start_s=start_s, writer=writer, frames=list(frames))
+        self._next_agent = next_agent
+
+    def finish(self, end_s: float) -> None:
+        """Close the last minute, which may be a part, and remove what an earlier run left.
+
+        Parameters
+        ----------
+        end_s
+            The second up to which the recording went.
+        """
+        if self._minute is not None:
+            whole = [] if self._first_s is None else [self._first_s, end_s]
+            self._close(end_s, stretch=whole)
+        if not self._origins.is_live:
+            self._remove_others()
+
+    def interrupt(self, end_s: float) -> None:
+        """End early: what a camera gave is kept, what can be read again stays unfinished."""
+        if self._minute is None:
+            return
+        if self._origins.is_live:
+            self._close(end_s)
+        elif self._minute.writer is not None:
+            self._minute.writer.abandon()
+
+    def _close(self, end_s: float, *, stretch: list[float] | None = None) -> None:
+        minute, self._minute = self._minute, None
+        assert minute is not None  # noqa: S101 - for the type checker
+        root = self._opened.trial.root
+        if minute.writer is not None:
+            minute.writer.close()
+        self._seen.add(minute.start_s)
+        path = segment_path(root, minute.start_s)
+        reason = self._reason(path)
+        if reason:
+            tracks = tracks_of(minute.frames)
+            extra: dict[str, JSON] = {
+                **self._measure(tracks),
+                BAD_KEY: dict(minute.bad),
+                NEXT_KEY: self._next_agent,
+                END_KEY: min(float(end_s), float(minute.start_s + STEP_S)),
+            }
+            if stretch:
+                extra[STRETCH_KEY] = list(stretch)
+            write_tracks(path, tracks, self._origins.tracks, extra=extra)
+            self._tell(Made(path=path, reason=reason))
+        # After the tracks: who reads the paths finds the segment when it hears of the poses.
+        if minute.writer is not None:
+            self._tell(Made(path=minute.writer.path, reason="tracked"))
+        else:
+            self._tell(UpToDate(path=_poses_path(root, minute.start_s)))
+
+    def _reason(self, path: Path) -> str | None:
+        if self._origins.is_live:
+            return "tracked"
+        return reason_to_make(path, self._origins.tracks, self._task, self._tell)
+
+    def _pose_writer(self, start_s: int) -> PoseWriter | None:
+        """Return what writes a minute's poses; None if they are there already."""
+        path = _poses_path(self._opened.trial.root, start_s)
+        fresh = (
+            not self._origins.is_live
+            and not self._task.force
+            and poses_reason(path, self._origins.poses) is None
+        )
+        if fresh:
+            return None
+        return PoseWriter(path, self._origins.poses, arena=self._opened.arena, clock=self._clock())
+
+    def _clock(self) -> Mapping[str, str] | None:
+        return None if self._origins.clock is None else self._origins.clock()
+
+    def _remove_others(self) -> None:
+        """Remove what an earlier, longer run of the same recording left."""
+        root = self._opened.trial.root
+        gone = [segment_path(root, s) for s in set(segment_starts(root)) - self._seen]
+        gone += [_poses_path(root, start) for start in set(pose_files(root)) - self._seen]
+        for path in sorted(gone):
+            path.unlink(missing_ok=True)
+            self._tell(Note(text=f"{path}: removed, the recording does not reach there any more."))
+
+
+def poses_reason(path: Path, lineage: Lineage) -> str | None:
+    """Return why a file of poses is to be written; None if it is whole and up to date."""
+    reason = stale_reason([path], lineage)
+    if reason is None and not _has_footer(path):
+        return "was not closed"
+    return reason
+
+
+def _has_footer(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-8, 2)
+        return file.read() == b"\x89MCAP0\r\n"
+
+
+def _poses_path(root: Path, start_s: int) -> Path:
+    return root / "poses" / f"{start_s:06d}.mcap"
+
+
+def pose_files(root: Path) -> dict[int, Path]:
+    """Return the files of poses of a trial by the second at which they start, in order."""
+    found = {int(p.stem): p for p in (root / "poses").glob("*.mcap") if p.stem.isdigit()}
+    return dict(sorted(found.items()))
+
+
+def unfinished(root: Path, tell: Tell, *, also: int) -> dict[int, list[FramePoses]]:
+    """Return the frames of minutes that have poses and no segment yet.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    tell
+        Hears of files that are damaged; what lies before the damage counts.
+    also
+        The minute that is passing, whose segment may be a part.
+    """
+    known = set(segment_starts(root)) - {also}
+    found: dict[int, list[FramePoses]] = {}
+    for start_s, path in pose_files(root).items():
+        if start_s in known:
+            continue
+        frames: list[FramePoses] = []
+        try:
+            for poses in read_poses(path):
+                frames.append(poses)  # noqa: PERF402 - those before the damage are kept
+        except (DamagedError, InputError) as error:
+            tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+        found[start_s] = frames
+    return found
+
+
+def next_agent_of(root: Path, frames: list[FramePoses]) -> int:
+    """Return the first agent id that no segment of a trial, nor any of the frames, uses."""
+    ids = [agent.agent + 1 for poses in frames for agent in poses.agents]
+    for start_s in reversed(segment_starts(root)):
+        path = segment_path(root, start_s)
+        with contextlib.suppress(DamagedError, InputError):
+            said = read_extra(path).get(NEXT_KEY)
+            if isinstance(said, int):
+                return max([said, *ids])
+            ids.append(int(read_tracks(path).agent.max(initial=-1)) + 1)
+    return max(ids, default=0)

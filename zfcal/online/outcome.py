@@ -1,0 +1,178 @@
+"""What a run of the tracker tells: what is wrong, when it happens; how it went, at the end."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter, deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from zfcal.artifacts.lineage import JSON
+from zfcal.diagnose.noise import from_frames
+from zfcal.online.below import Below
+from zfcal.online.events import LeftOut, Note, Result, Tell
+from zfcal.online.rig import Feed
+from zfcal.online.stretch import NOISE_KEY
+from zfcal.online.track_plan import Plan
+from zfcal.tracks import FISH, FramePoses, Tracks
+from zfcal.vision.frames import Frame, Image
+from zfcal.vision.stamps import Tally
+
+_SAYS = {
+    "black": "the image shows nothing (a lens cap, a lost signal, no light)",
+    "size": "the image has another size than the first",
+    "light": "the image is far brighter or darker than the background",
+    "too many": "more blobs than animals; the likeliest are followed",
+    "no LED": "the robot's LEDs have not been seen for five seconds",
+}
+"""What is told when it happens for the first time; what touching fish do is not."""
+
+_HINTS = {
+    "too many": " Check n_fish and n_robots in trial.toml, or raise --min-blob-px.",
+    "no LED": " Check their colour (--led-hue), and that the camera below sees the robot.",
+}
+_NO_LED_S = 5.0
+_LATENCIES = 100_000
+"""Latencies that are kept at most: two hours at 15 Hz."""
+
+
+def measured(plan: Plan, tracks: Tracks) -> Mapping[str, JSON]:
+    """Return what is known of a segment's tracks: their noise, where it can be told."""
+    trial = plan.opened.trial
+    fish = tracks.take(tracks.kind == FISH)
+    if len(fish) < 3:
+        return {}
+    sd_m, _ = from_frames(fish, fps=trial.fps, per_step=max(2, round(trial.fps * trial.dt_s)))
+    return {NOISE_KEY: sd_m} if np.isfinite(sd_m) else {}
+
+
+@final
+class Outcome:
+    """Keeps count during a run.
+
+    Parameters
+    ----------
+    plan
+        What is tracked.
+    tally
+        Gaps and duplicates, counted elsewhere.
+    tell
+        Hears of everything.
+    """
+
+    def __init__(self, plan: Plan, tally: Tally, tell: Tell) -> None:
+        self._plan = plan
+        self._tally = tally
+        self._tell = tell
+        self._feeds: list[Feed] = []
+        self._below: Below | None = None
+        self._bad: Counter[str] = Counter()
+        self._exact = 0
+        self._told = 0
+        self._before: Image | None = None
+        self._last: tuple[int, float] | None = None
+        self._led_s: float | None = None
+        self._took_s: deque[float] = deque(maxlen=_LATENCIES)
+
+    def begin(self, overhead: Feed, below: Below | None) -> None:
+        """Take the cameras, and tell what is worth knowing of them."""
+        self._below = below
+        self._feeds = [overhead] if below is None else [overhead, below.feed]
+        self._tell_notes()
+
+    def judge(self, frame: Frame, poses: FramePoses, bad: list[str]) -> tuple[str, ...]:
+        """Return what was wrong with a frame, in words, and tell what is new."""
+        words = list(dict.fromkeys(bad))
+        if self._before is not None and np.array_equal(self._before, frame.image):
+            words.append("repeated")
+        if self._last is not None and frame.number > self._last[0] + 1:
+            words.append("after a gap")
+        self._before, self._last = frame.image, (frame.number, frame.time_s)
+        self._exact += len(poses.agents) == self._plan.opened.trial.n_agents
+        self._look_for_leds(frame)
+        for word in words:
+            self._count(word, frame)
+        self._tell_notes()
+        return tuple(words)
+
+    def written(self, frame: Frame, *, handed: tuple[int, float], now_s: float) -> None:
+        """Note how long a frame took; those that waited for a background do not count."""
+        if handed[0] == frame.number:
+            self._took_s.append(now_s)
+
+    def finish(self) -> None:
+        """Say how it went."""
+        frames = max(self._tally.frames, 1)
+        name = self._plan.overhead.source
+        self._tell_notes()
+        n_agents = self._plan.opened.trial.n_agents
+        wrong = ", ".join(f"{word} {n}" for word, n in self._bad.most_common())
+        self._tell(
+            Note(
+                text=f"{name}: {self._tally}; {self._exact / frames:.1%} of them with exactly "
+                f"{n_agents} animals{'; ' if wrong else ''}{wrong}."
+            )
+        )
+        if self._bad["no background"]:
+            text = (
+                f"{name}: no background was learnt, since no frame shows a tank: nobody was found. "
+                "Give an image of the empty tank with --background."
+            )
+            self._tell(Note(text=text, warning=True))
+        self._tell(Result(value=self._numbers()))
+        for feed in self._feeds:
+            for problem in feed.source.problems:
+                self._tell(
+                    LeftOut(path=Path(feed.source.name), problem=problem.says, hint=problem.hint)
+                )
+
+    def _numbers(self) -> dict[str, JSON]:
+        took_ms = [1000 * took for took in self._took_s]
+        cuts = statistics.quantiles(took_ms, n=20) if len(took_ms) > 1 else [0.0] * 19
+        return {
+            "source": self._plan.overhead.source,
+            "frames": self._tally.frames,
+            "missing": self._tally.missing,
+            "gaps": self._tally.gaps,
+            "duplicates": self._tally.duplicates,
+            "exact": self._exact,
+            "bad_frames": dict(self._bad),
+            "leds": {} if self._below is None else dict(self._below.counts),
+            "latency_ms": {
+                "median": cuts[9],
+                "p95": cuts[18],
+                "max": max(took_ms, default=0.0),
+            },
+        }
+
+    def _count(self, word: str, frame: Frame) -> None:
+        self._bad[word] += 1
+        if word in _SAYS and self._bad[word] == 1:
+            self._warn(frame, word)
+
+    def _warn(self, frame: Frame, word: str) -> None:
+        text = (
+            f"{self._plan.overhead.source}: frame {frame.number} ({frame.time_s:.2f} s): "
+            f"{_SAYS[word]}; further ones are counted.{_HINTS.get(word, '')}"
+        )
+        self._tell(Note(text=text, warning=True))
+
+    def _look_for_leds(self, frame: Frame) -> None:
+        if self._below is None:
+            return
+        seen = self._below.counts["one LED"] + self._below.counts["two LEDs"]
+        if self._led_s is None or seen != self._leds:
+            self._led_s, self._leds = frame.time_s, seen
+        elif frame.time_s - self._led_s > _NO_LED_S:
+            self._count("no LED", frame)
+
+    _leds = -1
+
+    def _tell_notes(self) -> None:
+        notes = [note for feed in self._feeds for note in feed.source.notes]
+        for note in notes[self._told :]:
+            self._tell(Note(text=note))
+        self._told = len(notes)

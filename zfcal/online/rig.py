@@ -1,0 +1,223 @@
+"""The cameras of a run: which images, and where their pixels lie in the tank."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.errors import InputError
+from zfcal.online.cameras import read_camera
+from zfcal.online.opening import OpenTrial
+from zfcal.online.sources import files_of, source_of
+from zfcal.vision.calibration import homography_from_corners
+from zfcal.vision.camera import Projection
+from zfcal.vision.live import ArrivalClock
+from zfcal.vision.stamps import SAME_RATE, Shot, Source, check_rate, with_rate
+from zfcal.vision.video import is_live
+
+OVERHEAD, BELOW = "overhead", "below"
+
+_LIVE_RATE = 0.1
+"""Arrival times of a dozen images tell a rate no better than that."""
+
+_BESIDE_M = 0.015
+"""Bodies are looked for so far beyond the walls: they have a height, and cameras look aslant."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraChoice:
+    """What a person says of one camera.
+
+    Parameters
+    ----------
+    source
+        A file, a folder, a pattern, a camera; None for that of ``trial.toml``.
+    file
+        Its calibration; None for that of ``trial.toml``.
+    corners_px
+        Pixels of the arena's four corners, in place of a calibration.
+    """
+
+    source: str | None = None
+    file: Path | None = None
+    corners_px: tuple[tuple[float, float], ...] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """One camera of a run, its files not opened yet.
+
+    Parameters
+    ----------
+    name
+        ``overhead`` or ``below``.
+    source
+        As `zfcal.online.sources.source_of` takes it.
+    file
+        Its calibration; None with corners.
+    corners_px
+        In place of a calibration.
+    """
+
+    name: str
+    source: str
+    file: Path | None
+    corners_px: tuple[tuple[float, float], ...] | None
+
+    @property
+    def is_live(self) -> bool:
+        """Whether it is a camera and no recording."""
+        return is_live(self.source)
+
+    def hashes(self, root: Path) -> dict[str, str]:
+        """Return the hashes of its files, as lineage states them."""
+        found = files_of(root, self.source)
+        if self.file is not None:
+            found |= hash_inputs(root, [self.file])
+        return found
+
+    def projection(self, arena: Arena, size_px: tuple[int, int]) -> Projection:
+        """Return where its pixels lie.
+
+        Parameters
+        ----------
+        arena
+            Whose corners the corners are.
+        size_px
+            Of its images.
+
+        Raises
+        ------
+        InputError
+            The calibration is that of images of another size, or the corners make none.
+        """
+        if self.file is None:
+            corners = np.array(self.corners_px, np.float64)
+            return homography_from_corners(corners, arena.outline.bounds, size_px)
+        camera = read_camera(self.file)
+        if camera.size_px != size_px:
+            has, got = (f"{w} x {h} px" for w, h in (camera.size_px, size_px))
+            raise InputError(
+                f"{self.file}: is of a camera with images of {has}, those of {self.source} are "
+                f"{got}: it is the calibration of another camera, or of another setting.",
+                hint=f"Calibrate it with zfcal camera, or give its file with {_option(self)}.",
+            )
+        return camera
+
+
+def _option(view: View) -> str:
+    return "--camera" if view.name == OVERHEAD else "--below-camera"
+
+
+def view_of(opened: OpenTrial, name: str, choice: CameraChoice) -> View | None:
+    """Return a camera as it was asked for, or as ``trial.toml`` has it; None if neither does.
+
+    Raises
+    ------
+    InputError
+        There is a source and nothing that says where its pixels lie, or both a file
+        and corners were given.
+    """
+    trial = opened.trial
+    known = (trial.cameras or {}).get(name, {})
+    source = choice.source or _placed(trial.root, known.get("source"))
+    if source is None:
+        return None
+    if choice.file is not None and choice.corners_px is not None:
+        raise InputError("--camera and --corners both say where pixels lie: give one of them.")
+    file = choice.file
+    if file is None and choice.corners_px is None and known.get("file"):
+        file = trial.root / known["file"]
+    if file is None and choice.corners_px is None:
+        raise InputError(
+            f"{trial.config}: names no calibration of the {name} camera, so its pixels cannot be "
+            "told in metres.",
+            hint=f"Calibrate it with zfcal camera and set [cameras.{name}] file; or give "
+            f"{'--camera FILE or --corners' if name == OVERHEAD else '--below-camera FILE'}.",
+        )
+    return View(name=name, source=source, file=file, corners_px=choice.corners_px)
+
+
+def _placed(root: Path, source: str | None) -> str | None:
+    """Return a source of ``trial.toml``, whose paths are relative to the trial."""
+    if not source:
+        return None
+    return source if is_live(source) else str(root / source)
+
+
+@dataclass(slots=True, kw_only=True)
+class Feed:
+    """An opened camera: its images, their size, and where their pixels lie.
+
+    Parameters
+    ----------
+    source
+        For its notes and problems.
+    shots
+        Every image, from the first.
+    size_px
+        Width and height of the first.
+    projection
+        Where pixels lie.
+    """
+
+    source: Source
+    shots: Iterator[Shot]
+    size_px: tuple[int, int]
+    projection: Projection
+
+
+def open_feed(opened: OpenTrial, view: View, clock: ArrivalClock) -> Feed:
+    """Open a camera and look at its first image.
+
+    Raises
+    ------
+    InputError
+        There is no image, the frame rate is not the trial's, or the calibration is that
+        of another camera.
+    """
+    fps = opened.trial.fps
+    source = source_of(view.source, fps=fps, clock=clock)
+    if source.rate_hz is not None:
+        check_rate(source.rate_hz, fps=fps, name=source.name)
+    tolerance = _LIVE_RATE if source.is_live else SAME_RATE
+    shots = with_rate(source.shots(), fps=fps, name=source.name, tolerance=tolerance)
+    first = next(shots, None)
+    if first is None:
+        raise InputError(f"{source.name}: no image can be read.", hint="See whether it plays.")
+    size_px = first.image.shape[1], first.image.shape[0]
+    return Feed(
+        source=source,
+        shots=itertools.chain([first], shots),
+        size_px=size_px,
+        projection=view.projection(opened.arena, size_px),
+    )
+
+
+def region_of(arena: Arena, feed: Feed) -> NDArray[np.bool_]:
+    """Return where in the image agents can be.
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+    """
+    width, height = feed.size_px
+    inside = np.zeros((height, width), np.uint8)
+    wide = shapely.buffer(arena.outline, _BESIDE_M, join_style="mitre")
+    # Straight walls are curves to a fish-eye.
+    wide = shapely.segmentize(wide, 0.01)
+    for rings, value in (([wide.exterior], 1), (wide.interiors, 0)):
+        for ring in rings:
+            pixels = feed.projection.to_pixels(np.asarray(ring.coords)[:, :2])
+            known = pixels[np.isfinite(pixels).all(axis=1)]
+            cv2.fillPoly(inside, [np.rint(known).astype(np.int32)], [value])
+    return inside > 0

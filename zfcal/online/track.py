@@ -1,0 +1,120 @@
+"""From camera images to tracks: the stage behind ``zfcal track``."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.pose_files import POSES
+from zfcal.artifacts.tables import read_extra
+from zfcal.errors import DamagedError, InputError
+from zfcal.online.events import Planned, Tell, UpToDate
+from zfcal.online.following import Following
+from zfcal.online.minutes import Origins, pose_files, poses_reason
+from zfcal.online.opening import Task, at_work, open_trial, reason_to_make, tell_version
+from zfcal.online.recording import STRETCH_KEY, check_same_source, starts_between
+from zfcal.online.resuming import Resumed, begin_anew, resume
+from zfcal.online.segments import segment_path, segment_starts
+from zfcal.online.sources import source_of
+from zfcal.online.track_plan import Plan, TrackOptions, plan_of
+from zfcal.vision.live import ArrivalClock
+
+
+def track(root: Path, options: TrackOptions, tell: Tell, *, task: Task | None = None) -> None:
+    """Track a recording or a live camera into a trial.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    options
+        What to track, and how.
+    tell
+        Hears of every file as soon as it is closed, and of what is wrong.
+    task
+        How to go about it.
+
+    Raises
+    ------
+    InputError
+        The trial does not exist, or its cameras cannot be opened or do not fit it.
+    DamagedError
+        A video cannot be opened at all.
+    """
+    task = task or Task()
+    plan = plan_of(open_trial(root), options)
+    with at_work(root, "track", task):
+        tracks = plan.lineage()
+        poses = dataclasses.replace(tracks, schema=POSES)
+        check_same_source(plan.opened.trial, tracks, task)
+        if plan.is_live:
+            _follow_live(plan, tracks, poses, tell, task=task)
+            return
+        origins = Origins(tracks=tracks, poses=poses, is_live=False)
+        if is_done(plan, origins, tell, task=task):
+            return
+        if task.dry_run:
+            _tell_plan(plan, origins, tell, task=task)
+            return
+        Following(plan, origins, tell, task=task).run()
+
+
+def is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
+    """Return whether a recording has been tracked to its end; then all its files are told."""
+    trial = plan.opened.trial
+    starts = segment_starts(trial.root)
+    if task.force or not starts or plan.options.pictures.missing:
+        return False
+    told: list[object] = []
+    paths = [segment_path(trial.root, start) for start in starts]
+    if any(reason_to_make(path, origins.tracks, Task(), told.append) for path in paths):
+        return False
+    stretch = _stretch(paths[-1])
+    known = pose_files(trial.root)
+    if stretch is None or starts[-1] != starts_between(*stretch)[-1] or set(known) != set(starts):
+        return False
+    if any(poses_reason(path, origins.poses) for path in known.values()):
+        return False
+    tell_version(paths, origins.tracks, tell)
+    for start, path in zip(starts, paths, strict=True):
+        tell(UpToDate(path=path))
+        tell(UpToDate(path=known[start]))
+    return True
+
+
+def _stretch(path: Path) -> tuple[float, float] | None:
+    """Return from where to where a recording goes, which its last segment alone states."""
+    try:
+        said = read_extra(path).get(STRETCH_KEY)
+    except (DamagedError, InputError):
+        return None
+    if not isinstance(said, list) or len(said) != 2:
+        return None
+    return float(str(said[0])), float(str(said[1]))
+
+
+def _tell_plan(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> None:
+    """Say which segments would be made; how many there are is the source's own word."""
+    options, trial = plan.options, plan.opened.trial
+    source = source_of(plan.overhead.source, fps=trial.fps, clock=ArrivalClock())
+    first_s = options.start_s or 0.0
+    end_s = source.length_s or first_s + 1.0
+    if options.duration_s is not None:
+        end_s = min(end_s, first_s + options.duration_s)
+    for start in starts_between(first_s, max(end_s, first_s)):
+        path = segment_path(trial.root, start)
+        reason_to_make(path, origins.tracks, task, tell)
+
+
+def _follow_live(plan: Plan, tracks: Lineage, poses: Lineage, tell: Tell, *, task: Task) -> None:
+    root = plan.opened.trial.root
+    if task.dry_run:
+        tell(Planned(path=root / "tracks", reason=f"{plan.overhead.source} is live"))
+        return
+    if task.force:
+        begin_anew(root, tell)
+    resumed = Resumed() if task.force else resume(root, tell)
+    clock = ArrivalClock(resumed.started_unix_s)
+    origins = Origins(tracks=tracks, poses=poses, is_live=True)
+    Following(plan, origins, tell, task=task, clock=clock, resumed=resumed).run()
