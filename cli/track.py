@@ -28,7 +28,7 @@ def command(out: Output, trial: Path, *, dry_run: bool, force: bool, **options: 
     \b
     Example:
         zfcal track trial --overhead day3.mp4 --below day3-below.mp4
-        zfcal track trial --overhead 'images/*.png' --corners 20,480,480,480,480,20,20,20
+        zfcal track trial --overhead 'images/*.png' --corners '20,480 480,480 480,20 20,20'
         zfcal track trial --overhead 0 --below 1 --record jpeg | zfcal analyse -
     """
     from zfcal.online.opening import Task

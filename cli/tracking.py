@@ -22,7 +22,7 @@ _OPTIONS = (
     click.option("--below-camera", type=EXISTING, help="Calibration of the camera below."),
     click.option(
         "--corners",
-        metavar="X,Y,...",
+        metavar='"X,Y X,Y X,Y X,Y"',
         help="Instead of --camera: pixels of the arena's lower left, lower right, upper right "
         "and upper left corner.",
     ),
