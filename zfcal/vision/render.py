@@ -6,6 +6,7 @@ whatever was drawn before. Cameras, files and time are the business of others.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import final
 
 import cv2
@@ -40,6 +41,18 @@ _MOST_STEPS = 5
 _ASIDE_RAD = 0.5
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Seen:
+    """A body in pixels."""
+
+    left_px: Floats
+    right_px: Floats
+    fin_px: Floats
+    moved_px: Floats
+    shadow_px: Floats
+    is_robot: bool
+
+
 @final
 class OverheadPainter:
     """Draws what the overhead camera sees.
@@ -72,8 +85,9 @@ class OverheadPainter:
         self._wall = tank.wall
         self._empty = tank.image if photograph is None else photographed(photograph, camera)
         self._noise = Noise(self._empty.shape, look.noise_grey, seed)
-        size_px = look.ripple_m * _px_per_m(arena, camera)
-        self._ripples = Ripples(self._empty.shape, look.ripple_grey, size_px, seed)
+        scale = _px_per_m(arena, camera)
+        self._ripples = Ripples(self._empty.shape, look.ripple_grey, look.ripple_m * scale, seed)
+        self._shadow_blur_px = look.shadow_blur_m * scale
 
     @property
     def empty(self) -> Image:
@@ -100,47 +114,61 @@ class OverheadPainter:
     def _draw_bodies(self, image: Image, moment: Moment) -> None:
         look = self._look
         outlines = outlines_of(moment.bodies)
-        patches = self._patches(outlines, moment)
+        seen = self._seen(outlines, moment)
+        patches = [self._patch(body) for body in seen]
         if look.shadow_opacity > 0:
-            for patch, xy_m in zip(patches, moment.bodies.xy_m, strict=True):
-                darken(image, self._shadow(patch, xy_m), look.shadow_opacity)
+            for body, patch in zip(seen, patches, strict=True):
+                darken(image, self._shadow(patch, body.shadow_px), look.shadow_opacity)
         if look.reflection > 0:
             self._draw_reflections(image, outlines, moment)
-        for patch in patches:
+        # The robots first: fish swim over them.
+        for _, patch in sorted(
+            zip(seen, patches, strict=True), key=lambda pair: not pair[0].is_robot
+        ):
             lay_over(image, patch)
 
-    def _patches(self, outlines: Outlines, moment: Moment) -> list[Patch]:
-        """Return a patch for each body, the robots' first: fish swim over them."""
-        look = self._look
-        left, right, fin = (
-            self._camera.to_pixels(line)
-            for line in (outlines.left_m, outlines.right_m, outlines.fin_m)
-        )
-        moved_m = moment.velocity_m_s * look.exposure_s / 2
-        moved_px = self._camera.to_pixels(moment.bodies.xy_m + moved_m) - self._camera.to_pixels(
-            moment.bodies.xy_m - moved_m
-        )
-        patches = []
-        for body in range(len(moment.bodies)):
-            fills = _fills(
-                left[body],
-                right[body],
-                None if moment.is_robot[body] else fin[body],
-                look,
+    def _seen(self, outlines: Outlines, moment: Moment) -> list[_Seen]:
+        """Return the bodies in pixels; one that the lens cannot see is left out."""
+        look, xy_m = self._look, moment.bodies.xy_m[:, None]
+        moved_m = moment.velocity_m_s[:, None] * look.exposure_s / 2
+        parts = [
+            outlines.left_m,
+            outlines.right_m,
+            outlines.fin_m,
+            np.concatenate(
+                [xy_m - moved_m, xy_m + moved_m, xy_m, xy_m + look.shadow_offset_m], axis=1
+            ),
+        ]
+        # One call for all: it costs more than the points.
+        pixels = self._camera.to_pixels(np.concatenate(parts, axis=1))
+        edges = np.cumsum([part.shape[1] for part in parts])[:-1]
+        return [
+            _Seen(
+                left_px=left,
+                right_px=right,
+                fin_px=fin,
+                moved_px=rest[1] - rest[0],
+                shadow_px=rest[3] - rest[2],
+                is_robot=bool(is_robot),
             )
-            n = 1 + int(np.hypot(*moved_px[body]) / _STEP_PX)
-            patches.append(_blurred(fills, moved_px[body], min(n, _MOST_STEPS), look.defocus_px))
-        return patches
+            for is_robot, *(left, right, fin, rest) in zip(
+                moment.is_robot, *np.split(pixels, edges, axis=1), strict=True
+            )
+            if np.isfinite(left).all() and np.isfinite(right).all() and np.isfinite(fin).all()
+        ]
 
-    def _shadow(self, patch: Patch, xy_m: Floats) -> Patch:
-        look = self._look
-        ends = self._camera.to_pixels(np.array([xy_m, xy_m + look.shadow_offset_m]))
-        x, y = np.rint(ends[1] - ends[0]).astype(int)
-        blur_px = look.shadow_blur_m * _px_per_m(self._arena, self._camera)
+    def _patch(self, body: _Seen) -> Patch:
+        n = 1 + int(np.hypot(*body.moved_px) / _STEP_PX)
+        fills = _fills(body, self._look)
+        return _blurred(fills, body.moved_px, min(n, _MOST_STEPS), self._look.defocus_px)
+
+    def _shadow(self, patch: Patch, offset_px: Floats) -> Patch:
+        blur_px = self._shadow_blur_px
         edge = int(np.ceil(2.5 * blur_px))
         cover = cv2.copyMakeBorder(patch.cover, edge, edge, edge, edge, cv2.BORDER_CONSTANT)
         soft = cv2.GaussianBlur(cover, (0, 0), blur_px) if blur_px > 0 else cover
-        at = patch.corner_px[0] + int(x) - edge, patch.corner_px[1] + int(y) - edge
+        x, y = np.rint(offset_px).astype(int) - edge
+        at = patch.corner_px[0] + int(x), patch.corner_px[1] + int(y)
         return Patch(corner_px=at, cover=np.asarray(soft, np.float32), ink=patch.ink)
 
     def _draw_reflections(self, image: Image, outlines: Outlines, moment: Moment) -> None:
@@ -151,7 +179,10 @@ class OverheadPainter:
             ):
                 ring = outlines.silhouette_m[body]
                 mirrored = ring - 2 * ((ring - origin) @ normal)[:, None] * normal
-                fill = Fill(corners_px=self._camera.to_pixels(mirrored), grey=0.0)
+                corners_px = self._camera.to_pixels(mirrored)
+                if not np.isfinite(corners_px).all():
+                    continue
+                fill = Fill(corners_px=corners_px, grey=0.0)
                 patch = patch_of([fill], blur_px=1.0 + look.defocus_px)
                 near = 1.0 - distance_m / look.reflection_reach_m
                 darken(image, patch, look.reflection * near, self._wall)
@@ -175,25 +206,24 @@ def render_overhead(  # noqa: PLR0913 - one keyword for each thing that an image
     return OverheadPainter(arena, camera, look, seed=seed, photograph=photograph).paint(moment)
 
 
-def _fills(left: Floats, right: Floats, fin: Floats | None, look: Look) -> list[Fill]:
-    """Return the polygons of a body, in pixels: a fish with its fin, or a lure without."""
+def _fills(body: _Seen, look: Look) -> list[Fill]:
+    """Return the polygons of a body: a fish with its fin, or a lure without."""
+    left, right = body.left_px, body.right_px
     ring = np.concatenate([left, right[::-1]])
-    if fin is None:
+    if body.is_robot:
         return [Fill(corners_px=ring, grey=look.lure_grey)]
     shades = np.linspace(look.fish_grey, look.tail_grey, len(_SECTIONS))
     flank = (look.fish_grey + look.tail_grey) / 2 + look.stripe_grey
     middle = (left + right) / 2
-    fills = [] if look.fin_opacity == 0 else [_fin(fin, look)]
+    fills = []
+    if look.fin_opacity > 0:
+        fills.append(Fill(corners_px=body.fin_px, grey=look.tail_grey, opacity=look.fin_opacity))
     fills.append(Fill(corners_px=ring, grey=min(flank, 255.0)))
     sides = (middle + _BACK_SHARE * (left - middle), middle + _BACK_SHARE * (right - middle))
     for (start, end), shade in zip(_SECTIONS, shades, strict=True):
         back = np.concatenate([sides[0][start:end], sides[1][start:end][::-1]])
         fills.append(Fill(corners_px=back, grey=shade))
     return fills
-
-
-def _fin(corners_px: Floats, look: Look) -> Fill:
-    return Fill(corners_px=corners_px, grey=look.tail_grey, opacity=look.fin_opacity)
 
 
 def _blurred(fills: list[Fill], moved_px: Floats, n: int, defocus_px: float) -> Patch:

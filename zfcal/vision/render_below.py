@@ -78,19 +78,18 @@ class BelowPainter:
         robots = np.flatnonzero(moment.is_robot)
         for number, body in enumerate(robots):
             xy_m, heading = moment.bodies.xy_m[body], float(moment.bodies.heading_rad[body])
-            self._draw_hull(image, xy_m, heading)
+            leds_m = led_places(xy_m, heading, self._look.led_distance_m)
+            pixels = self._camera.to_pixels(np.concatenate([leds_m, _hull(xy_m, heading)]))
+            if not np.isfinite(pixels).all():
+                continue
+            self._draw_hull(image, pixels[2:])
             colour = np.roll(self._look.led_colour_bgr, number).astype(np.float32)
-            for place in self._camera.to_pixels(
-                led_places(xy_m, heading, self._look.led_distance_m)
-            ):
+            for place in pixels[:2]:
                 self._light_up(image, place, colour)
         return self._noise.add_to(image, rng)
 
-    def _draw_hull(self, image: Image, xy_m: Floats, heading_rad: float) -> None:
-        long, wide = _ROBOT_HALF_M
-        corners = np.array([(long, wide), (-long, wide), (-long, -wide), (long, -wide)])
-        places = self._camera.to_pixels(xy_m + corners @ _turn(heading_rad).T)
-        patch = patch_of([Fill(corners_px=places, grey=0.0)], blur_px=_SOFT_PX)
+    def _draw_hull(self, image: Image, corners_px: Floats) -> None:
+        patch = patch_of([Fill(corners_px=corners_px, grey=0.0)], blur_px=_SOFT_PX)
         for channel in range(3):
             darken(image[..., channel], patch, _ROBOT_OPACITY)
 
@@ -137,9 +136,12 @@ def render_below(
     return BelowPainter(arena, camera, look, seed=seed).paint(moment)
 
 
-def _turn(angle_rad: float) -> Floats:
-    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
-    return np.array([[cosine, -sine], [sine, cosine]])
+def _hull(xy_m: Floats, heading_rad: float) -> Floats:
+    """Return the corners of a robot, in metres."""
+    long, wide = _ROBOT_HALF_M
+    corners = np.array([(long, wide), (-long, wide), (-long, -wide), (long, -wide)])
+    cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+    return xy_m + corners @ np.array([[cosine, sine], [-sine, cosine]])
 
 
 def _add_light(
