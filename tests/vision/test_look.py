@@ -56,3 +56,17 @@ def test_an_unknown_preset_is_named():
     with pytest.raises(InputError, match="No preset 'ugly'") as error:
         look_of("ugly")
     assert "clean, usual, hard" in error.value.hint
+
+
+def test_the_documentation_states_every_value(repository):
+    """Of each preset, as it is."""
+
+    def shown(value):
+        if value is None:
+            return "none (PNG)"
+        return ", ".join(f"{x:g}" for x in (value if isinstance(value, tuple) else (value,)))
+
+    text = (repository / "docs" / "video.md").read_text("utf-8")
+    for field in dataclasses.fields(Look):
+        values = " | ".join(shown(getattr(look, field.name)) for look in PRESETS.values())
+        assert f"| `{field.name}` | {values} |" in text

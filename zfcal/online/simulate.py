@@ -49,6 +49,9 @@ class SimulateOptions:
     arena, n_fish, n_robots
         Of a trial that does not exist yet; None for those of the trial in which
         the model lies.
+    fps
+        Frame rate of a trial that does not exist yet, in hertz; None for the
+        model's steps.
     """
 
     model: Path
@@ -57,6 +60,7 @@ class SimulateOptions:
     arena: str | None = None
     n_fish: int | None = None
     n_robots: int | None = None
+    fps: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.duration_s < math.inf:
@@ -88,7 +92,7 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
     if new:
         asked = new_trial(root, options)
         # A model that does not fit must not leave half a trial behind.
-        read_model_for(options.model, load_arena(str(asked.arena), Path()), dt_s=1 / asked.fps)
+        read_model_for(options.model, load_arena(str(asked.arena), Path()), dt_s=asked.dt_s or 0.0)
         made = create_trial(root, asked, tell, task=task)
         if task.dry_run:
             for start in starts_between(0.0, options.duration_s):
@@ -141,7 +145,7 @@ def new_trial(root: Path, options: SimulateOptions) -> NewTrial:
     return NewTrial(
         n_fish=n_fish,
         n_robots=n_robots or 0,
-        fps=1 / model.dt_s,
+        fps=1 / model.dt_s if options.fps is None else options.fps,
         dt_s=model.dt_s,
         arena=arena,
         seed=options.seed or 0,
@@ -151,7 +155,7 @@ def new_trial(root: Path, options: SimulateOptions) -> NewTrial:
 
 def _check_existing(opened: OpenTrial, options: SimulateOptions) -> None:
     trial = opened.trial
-    for name in ("arena", "n_fish", "n_robots"):
+    for name in ("arena", "n_fish", "n_robots", "fps"):
         asked, found = getattr(options, name), getattr(trial, name)
         if asked is not None and asked != found:
             raise InputError(
