@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from .camera_align import align
 from .camera_corners import corners
 from .camera_points import older, points
 from .options import laid_out
@@ -26,5 +27,5 @@ def command() -> None:
     """
 
 
-for part in (points, corners, older):
+for part in (points, corners, older, align):
     command.add_command(part)

@@ -117,7 +117,7 @@ def test_wrong_use_is_one_line_with_a_hint(zfcal, tmp_path, words, code, says):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["points", "corners", "import"])
+@pytest.mark.parametrize("name", ["points", "corners", "import", "align"])
 def test_every_camera_command_has_help_with_an_example(zfcal, name):
     """And the group too."""
     assert "Example:" in zfcal("camera", "--help").out
