@@ -22,6 +22,9 @@ FINE = 16
 _SHIFT = 6
 """Bits behind the point in OpenCV's coordinates."""
 
+_SHARPEST = 0.3
+"""One and the cosine of the angle by which an outline turns at a corner, at least."""
+
 _SPARE_PX = 64
 _N_FIELDS = 4
 
@@ -37,11 +40,14 @@ class Fill:
         Its grey level.
     opacity
         From 0 to 1.
+    inner
+        Whether it lies within an earlier one: its edge need not be exact.
     """
 
     corners_px: Floats
     grey: float
     opacity: float = 1.0
+    inner: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +91,8 @@ def patch_of(fills: Sequence[Fill], *, blur_px: float = 0.0) -> Patch:
     fine = np.zeros((high * FINE, wide * FINE, 2), np.uint8)
     for fill in fills:
         # A pixel's centre has whole coordinates, so its left edge lies at -1/2.
-        corners = _inset((fill.corners_px - low + 0.5) * FINE - 0.5)
+        corners = (fill.corners_px - low + 0.5) * FINE - 0.5
+        corners = corners if fill.inner else _inset(corners)
         points = np.round(corners * (1 << _SHIFT)).astype(np.int32)
         cv2.fillPoly(fine, [points], (255 * fill.opacity, fill.grey * fill.opacity), shift=_SHIFT)
     small = cv2.resize(fine, (int(wide), int(high)), interpolation=cv2.INTER_AREA)
@@ -97,12 +104,15 @@ def patch_of(fills: Sequence[Fill], *, blur_px: float = 0.0) -> Patch:
 
 def _inset(corners: Floats) -> Floats:
     """Return a polygon moved inwards by half a pixel: OpenCV also fills those on its edge."""
-    ahead = np.concatenate([corners[1:], corners[:1]])
-    behind = np.concatenate([corners[-1:], corners[:-1]])
-    along = ahead - behind
-    area = float(np.sum(corners[:, 0] * along[:, 1])) / 2
-    along *= 0.5 * np.sign(area) / np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
-    return np.stack([corners[:, 0] - along[:, 1], corners[:, 1] + along[:, 0]], axis=1)
+    along = np.concatenate([corners[1:], corners[:1]]) - corners
+    area = float(corners[:, 0] @ along[:, 1] - corners[:, 1] @ along[:, 0])
+    length = np.hypot(along[:, 0], along[:, 1])
+    after = along / np.maximum(length, 1e-9)[:, None]
+    before = np.concatenate([after[-1:], after[:-1]])
+    # Both edges of a corner move by the half: the corner moves along the mitre, but not far.
+    mitre = 0.5 * np.sign(area) / np.maximum(1 + (after * before).sum(axis=1), _SHARPEST)
+    inwards = (after + before) * mitre[:, None]
+    return np.stack([corners[:, 0] - inwards[:, 1], corners[:, 1] + inwards[:, 0]], axis=1)
 
 
 def mean_patch(patches: Sequence[Patch]) -> Patch:

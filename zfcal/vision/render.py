@@ -6,6 +6,7 @@ whatever was drawn before. Cameras, files and time are the business of others.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import final
 
@@ -28,8 +29,8 @@ Floats = NDArray[np.float64]
 OVERHEAD = 21
 """Tells the random numbers of overhead images from others of the same seed."""
 
-_SECTIONS = ((0, 9), (8, 16), (15, 22))
-"""Stations of head, trunk and tail."""
+_SECTIONS = ((1, 9), (8, 16), (15, 21))
+"""Stations of head, trunk and tail; the ends are left out, so that all lie within the body."""
 
 _BACK_SHARE = 0.55
 """Of the body's width: the back, between the flanks."""
@@ -222,22 +223,20 @@ def _fills(body: _Seen, look: Look) -> list[Fill]:
     sides = (middle + _BACK_SHARE * (left - middle), middle + _BACK_SHARE * (right - middle))
     for (start, end), shade in zip(_SECTIONS, shades, strict=True):
         back = np.concatenate([sides[0][start:end], sides[1][start:end][::-1]])
-        fills.append(Fill(corners_px=back, grey=shade))
+        fills.append(Fill(corners_px=back, grey=shade, inner=True))
     return fills
 
 
 def _blurred(fills: list[Fill], moved_px: Floats, n: int, defocus_px: float) -> Patch:
     """Return the mean of a body's patches along its way, around the middle of the exposure."""
+    if n == 1:
+        return patch_of(fills, blur_px=defocus_px)
     shares = (np.arange(n) + 0.5) / n - 0.5
     return mean_patch(
         [
             patch_of(
                 [
-                    Fill(
-                        corners_px=fill.corners_px + share * moved_px,
-                        grey=fill.grey,
-                        opacity=fill.opacity,
-                    )
+                    dataclasses.replace(fill, corners_px=fill.corners_px + share * moved_px)
                     for fill in fills
                 ],
                 blur_px=defocus_px,
