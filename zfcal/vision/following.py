@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,14 +23,19 @@ _FARTHEST = 4.0
 _NEAR = 0.35
 """Body lengths from a blob within which an animal is thought to be in it."""
 
-_CERTAIN = 0.35
-"""Body lengths by which another assignment must be worse for a track to be itself again."""
+_CERTAIN = 0.1
+"""Squared body lengths by which another assignment must be worse for a track to be itself again."""
 
 _HIDDEN = 5
 """Frames without a sighting after which an animal is no longer thought to be in a blob."""
 
 _PROVEN = 3
 """Frames after which a new blob is an animal."""
+
+_SIZE = 0.3
+"""Squared body lengths that another size by a factor of e is worth."""
+
+_STAY = 0.3
 
 _SMALL, _FAINT = 0.35, 0.6
 """Shares of the usual area and darkness below which a blob begins no track."""
@@ -66,11 +74,46 @@ class Trails:
 
     def match(self, detections: list[Detection], time_s: float) -> None:
         """Give detections to tracks, begin tracks for the others, and end the lost ones."""
+        cost = self._costs(detections, time_s)
+        ages_s = np.array([time_s - trail.time_s for trail in self._trails])
+        gate = np.minimum(_REACH + _REACH_PER_S * ages_s, _FARTHEST)
+        # Who was there a frame ago comes first: else a lost track takes turns with its successor.
+        lost = np.array([t.missed > 0 or t.hits < _PROVEN for t in self._trails], bool)
+        matches: list[Match] = []
+        for late in (False, True):
+            rows = np.flatnonzero(lost == late)
+            taken = {match.detection for match in matches}
+            columns = np.array([k for k in range(len(detections)) if k not in taken], int)
+            matches += [
+                replace(m, track=int(rows[m.track]), detection=int(columns[m.detection]))
+                for m in assign(cost[np.ix_(rows, columns)], gate[rows] ** 2)
+            ]
+        self._take(matches, detections, time_s)
+        self.forget(time_s)
+
+    def _costs(self, detections: list[Detection], time_s: float) -> Floats:
+        """Return how far each detection is from where each track should be, and how unlike it.
+
+        In body lengths, squared: as errors that are normal add up. Plain distances would let
+        animals in a line change places for nothing.
+        """
         at = np.array([t.predicted(time_s) for t in self._trails]).reshape(-1, 2)
         to = np.array([(d.shape.x_px, d.shape.y_px) for d in detections]).reshape(-1, 2)
-        away = np.hypot(*np.moveaxis(at[:, None] - to[None], -1, 0)) / self._bodies.length_px
-        ages_s = np.array([time_s - trail.time_s for trail in self._trails])
-        matches = assign(away, np.minimum(_REACH + _REACH_PER_S * ages_s, _FARTHEST))
+        away = ((at[:, None] - to[None]) ** 2).sum(axis=2) / self._bodies.length_px**2
+        for k, detection in enumerate(detections):
+            if detection.shared == 1:
+                away[:, k] += [
+                    _SIZE * math.log(t.area_px / detection.shape.area_px) ** 2 for t in self._trails
+                ]
+        place = {id(trail): k for k, trail in enumerate(self._trails)}
+        for k, detection in enumerate(detections):
+            if detection.trail is not None:
+                # Found as the body of one track, it is nobody else's.
+                away[:, k] = np.inf
+                away[place[id(detection.trail)], k] = 0.0
+        return away
+
+    def _take(self, matches: list[Match], detections: list[Detection], time_s: float) -> None:
         for match in matches:
             self._extend(match, detections[match.detection], time_s)
         found = {match.track for match in matches}
@@ -82,7 +125,6 @@ class Trails:
             if index not in taken and self._is_animal(detection):
                 self._trails.append(Trail(self._new_id(), detection, time_s, opening=opening))
                 self._trails[-1].likeness = self._likeness(detection)
-        self.forget(time_s)
 
     def _extend(self, match: Match, detection: Detection, time_s: float) -> None:
         trail = self._trails[match.track]
@@ -126,7 +168,11 @@ class Trails:
         """
         seen = [t for t in self._trails if not t.missed and (t.hits >= _PROVEN or t.opening)]
         if n_agents is not None and len(seen) > n_agents:
-            seen = sorted(seen, key=lambda trail: (-trail.likeness, trail.agent))[:n_agents]
+            # Those told a frame ago stay, unless others are clearly likelier.
+            seen.sort(key=lambda t: (-t.likeness - _STAY * t.is_told, t.agent))
+            seen = seen[:n_agents]
+        for trail in self._trails:
+            trail.is_told = trail in seen
         return sorted(seen, key=lambda trail: trail.agent)
 
 

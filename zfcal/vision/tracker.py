@@ -22,27 +22,21 @@ from zfcal.vision.background import (
     shows_nothing,
 )
 from zfcal.vision.camera import Projection
-from zfcal.vision.detect import Blob, Corners, Look, find_blobs, look_at, shape_of
+from zfcal.vision.dividing import divide
+from zfcal.vision.finding import Finder, soften
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
 from zfcal.vision.seen import BadFrame, Reason, Seen, TrackerOptions
-from zfcal.vision.splitting import by_clusters, count_in
-from zfcal.vision.trail import Detection, Trail
+from zfcal.vision.trail import Detection
 from zfcal.vision.usual import Bodies
 
 Floats = NDArray[np.float64]
 
-_SHADOW = 0.4
-"""Share of an animal's darkness up to which a pixel may be shadow."""
-
 _HELD = 500
 """Frames that wait at most for a background; a camera that shows nothing fills no memory."""
 
-_DOUBTED = 0.75
-"""Share of their areas below which not all animals may be where they are thought to be."""
-
-_MOST = 100
-"""Animals that are more than known in a frame at most."""
+_SAME = 0.004
+"""A change of brightness by half a grey is none."""
 
 _DARKEST, _LIGHTEST = 0.3, 3.0
 """Changes of brightness beyond which a frame is not compared with the background."""
@@ -73,49 +67,54 @@ class FishTracker:
     ) -> None:
         self.options = options
         self._projection = projection
-        self._region = None if region is None else (region * np.uint8(255)).astype(np.uint8)
+        self._region = region
         self._learner = BackgroundLearner(options.learn_frames, options.learn_rate)
-        self._background = background
+        self._finder: Finder | None = None
         self._bodies = Bodies()
-        self._limit: tuple[float, Grey] | None = None
         self._trails = Trails(self._bodies, coast_s=options.coast_s)
         self._bad: list[BadFrame] = []
-        if background is not None and options.light:
-            self._background = background.inverted()
+        if background is not None:
+            self._take(background)
 
     @property
     def background(self) -> Background | None:
         """The empty tank, its negative where fish are light; None while it is learnt."""
-        return self._background
+        return None if self._finder is None else self._finder.background
 
     @property
     def is_learning(self) -> bool:
         """Whether the background is still to be learnt."""
-        return self._background is None
+        return self._finder is None
 
     def learn(self, frame: Frame) -> None:
         """Learn the background from a frame, without looking for animals in it."""
-        if self._background is not None:
+        if self._finder is not None:
             return
         grey = grey_of(frame.image)
         if self._learner.samples and self._learner.samples[0].shape != grey.shape:
             return
-        self._learner.add(grey)
+        self._learner.add(soften(grey, self.options.method))
         if self._learner.is_ready:
             self.stop_learning()
 
     def stop_learning(self) -> None:
         """Take the background as it was learnt so far, where any frame was of use."""
-        if self._background is not None or not self._learner.count:
+        if self._finder is not None or not self._learner.count:
             return
         light = self.options.light
-        learnt = self._learner.freeze(light=light)
-        self._background = learnt.inverted() if light else learnt
-        samples = self._learner.samples
+        finder = self._take(self._learner.freeze(light=light))
+        samples = [~grey if light else grey for grey in self._learner.samples]
         # The learner's frames are no longer needed: a second of them is as much as the rest.
         self._learner = BackgroundLearner(self.options.learn_frames, self.options.learn_rate)
-        looks = [self._look(~s if light else s) for s in samples]
-        self._bodies.start([self._blobs(look) for look in looks], self.options.n_agents)
+        for _ in range(2):
+            # Once for how dark animals are, and again with thresholds that fit.
+            found = [finder.find(grey, self._bodies.usual) for grey in samples]
+            self._bodies.start(found, self.options.n_agents)
+
+    def _take(self, background: Background) -> Finder:
+        background = background.inverted() if self.options.light else background
+        self._finder = Finder(self.options, background, self._region)
+        return self._finder
 
     def take_bad_frames(self) -> list[BadFrame]:
         """Return the frames gone wrong since this was last asked, and forget them."""
@@ -124,19 +123,25 @@ class FishTracker:
 
     def step(self, frame: Frame) -> list[Seen]:
         """Return the animals of a frame, ascending by id; none while the background is learnt."""
-        if self._background is None:
+        if self._finder is None:
             self._note(frame, "no background", "the background is still being learnt")
             self.learn(frame)
             return []
-        grey = self._comparable(frame, self._background)
+        grey = self._comparable(frame, self._finder.background)
         if grey is None:
             self._trails.forget(frame.time_s)
             return []
-        blobs = self._blobs(self._look(grey))
+        blobs = self._finder.find(grey, self._bodies.usual)
         if not self._bodies.usual.area_px > 0:
             self._bodies.start([blobs], self.options.n_agents)
-            blobs = self._blobs(self._look(grey))
-        detections = self._divided(blobs, frame.time_s)
+            blobs = self._finder.find(grey, self._bodies.usual)
+        detections = divide(
+            blobs,
+            self._trails.thought_in(blobs, frame.time_s),
+            self._bodies.usual,
+            n_agents=self.options.n_agents,
+            time_s=frame.time_s,
+        )
         self._trails.match(detections, frame.time_s)
         seen = self._told()
         self._judge(frame, detections, seen)
@@ -163,63 +168,9 @@ class FishTracker:
         if not _DARKEST < gain < _LIGHTEST:
             self._note(frame, "light", f"the image is {gain:.2g} times as bright as the background")
             return None
-        if abs(gain - 1) < 0.004:
-            return grey
-        return np.asarray(cv2.convertScaleAbs(grey, alpha=1 / gain), np.uint8)
-
-    def _look(self, grey: Grey) -> Look:
-        assert self._background is not None  # noqa: S101 - callers have asked
-        return look_at(grey, self._background, self._dark(self._background), self._region)
-
-    def _dark(self, background: Background) -> Grey:
-        """Return the grey below which a pixel is animal: tank and shadow are lighter."""
-        darkness = self._bodies.usual.darkness
-        if not darkness > 0:
-            return background.low
-        if self._limit is None or abs(self._limit[0] - darkness) > 0.02:
-            limit = (background.level * (1 - _SHADOW * darkness)).astype(np.uint8)
-            self._limit = darkness, np.minimum(background.low, limit)
-        return self._limit[1]
-
-    def _blobs(self, look: Look) -> list[Blob]:
-        return find_blobs(
-            look,
-            min_blob_px=self.options.min_blob_px,
-            corners=Corners(harris=self.options.harris),
-        )
-
-    def _divided(self, blobs: list[Blob], time_s: float) -> list[Detection]:
-        """Return the animals in blobs: those expected in one, and those that its area tells."""
-        thought = self._trails.thought_in(blobs, time_s)
-        spare: float = _MOST
-        if self.options.n_agents is not None:
-            spare = self.options.n_agents - sum(max(len(trails), 1) for trails in thought)
-        found: list[Detection] = []
-        for blob, trails in zip(blobs, thought, strict=True):
-            n = count_in(blob, area_px=self._area(trails), expected=max(len(trails), 1))
-            more = min(max(n - max(len(trails), 1), 0), max(spare, 0))
-            n = min(n, max(len(trails), 1) + int(more))
-            spare -= more
-            for trail in trails:
-                trail.crowd(blob.area_px < _DOUBTED * len(trails) * self._area(trails))
-            found += self._parts(blob, n, trails, time_s)
-        return found
-
-    def _area(self, trails: list[Trail]) -> float:
-        """Return what an animal covers, in the mean of those expected in a blob."""
-        usual = self._bodies.usual.area_px
-        own = [trail.own_area_px(usual) for trail in trails]
-        return float(np.mean(own)) if own else usual
-
-    def _parts(self, blob: Blob, n: int, trails: list[Trail], time_s: float) -> Iterator[Detection]:
-        if n == 1:
-            shape = shape_of(blob.pixels, blob.weights, blob.corners)
-            yield Detection(shape=shape, blob=blob, shared=1)
-            return
-        seeds = np.array([trail.predicted(time_s) for trail in trails]).reshape(-1, 2)
-        for part in by_clusters(blob, n, seeds):
-            shape = shape_of(blob.pixels[part], blob.weights[part])
-            yield Detection(shape=shape, blob=blob, shared=n)
+        if abs(gain - 1) >= _SAME:
+            grey = np.asarray(cv2.convertScaleAbs(grey, alpha=1 / gain), np.uint8)
+        return soften(grey, self.options.method)
 
     def _told(self) -> list[Seen]:
         seen = self._trails.told(self.options.n_agents)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.vision.detect import Blob, Shape
+from zfcal.vision.splitting import Pose, Template, ellipse, template_of
 from zfcal.vision.usual import Body
 
 Floats = NDArray[np.float64]
@@ -16,12 +17,14 @@ Floats = NDArray[np.float64]
 _TRUST = 0.7
 """Weight of the newest step in the velocity."""
 
+_KEPT = 0.7
+"""Share of its velocity that a fish keeps from one frame to the next: it turns often."""
+
 _GLIDE_S = 0.2
 """An unseen fish is taken to stop after this long."""
 
-_MEMORY = 0.9
-_FLIP = 1.0
-"""Evidence, in frames of plain view, from which head and tail change places."""
+_MEMORY = 0.6
+"""What is left after a frame of what spoke for an end to be the head."""
 
 _FADING = 0.8
 """What is left of a doubt after a frame."""
@@ -48,11 +51,14 @@ class Detection:
         The foreground that it is part of.
     shared
         How many animals are in that.
+    trail
+        Whose it is, where it was found as the body of a track.
     """
 
     shape: Shape
     blob: Blob
     shared: int = 1
+    trail: Trail | None = None
 
 
 class Trail:
@@ -72,6 +78,7 @@ class Trail:
 
     __slots__ = (
         "_alone",
+        "_body",
         "_crowded",
         "_evidence",
         "agent",
@@ -80,6 +87,7 @@ class Trail:
         "doubt",
         "heading_rad",
         "hits",
+        "is_told",
         "likeness",
         "missed",
         "opening",
@@ -104,17 +112,33 @@ class Trail:
         self.heading_rad = shape.axis_rad
         self.hits = 1
         self.likeness = 0.0
+        self.is_told = False
         self.missed = 0
         self.shared = detection.shared
         self.opening = opening
         self.doubt = 0.0
         self._alone = 1 if detection.shared == 1 else 0
         self._crowded = 0
+        self._body: Template | None = None
         self._evidence = shape.head
 
     def predicted(self, time_s: float) -> Floats:
         """Return where the animal should be at a time, in pixels, shape (2,)."""
-        return self.xy + self.velocity * min(time_s - self.time_s, _GLIDE_S)
+        return self.xy + _KEPT * self.velocity * min(time_s - self.time_s, _GLIDE_S)
+
+    def pose(self, time_s: float) -> Pose:
+        """Return where the body should be at a time."""
+        x, y = self.predicted(time_s)
+        return Pose(x_px=float(x), y_px=float(y), axis_rad=self.heading_rad)
+
+    def body(self, usual: Body) -> Template:
+        """Return the body as last seen alone, or else the usual one."""
+        if self._body is None and self.shared == 1:
+            self._body = template_of(self.blob.pixels, self.blob.weights, self.heading_rad)
+        if self._body is None:
+            length = usual.length_px
+            self._body = ellipse(length, 4 / math.pi * usual.area_px / length)
+        return self._body
 
     def own_area_px(self, usual_px: float) -> float:
         """Return what this animal covers; the usual where it was hardly seen alone."""
@@ -137,6 +161,8 @@ class Trail:
         trust = _TRUST if detection.shared == 1 else _TRUST / 2
         self.velocity = step if self.hits == 1 else trust * step + (1 - trust) * self.velocity
         self._turn(shape, to - self.xy, shared=detection.shared)
+        if detection.shared == 1:
+            self._body = None
         self.xy, self.time_s, self.shape, self.blob = to, time_s, shape, detection.blob
         self.shared = detection.shared
         self.hits += 1
@@ -161,14 +187,17 @@ class Trail:
 
     def _turn(self, shape: Shape, moved: Floats, *, shared: int) -> None:
         """Follow the long axis by its nearer end, and change ends when enough speaks for it."""
-        near = math.cos(shape.axis_rad - self.heading_rad) >= 0
+        along = math.cos(shape.axis_rad - self.heading_rad)
+        near = along >= 0
         heading = shape.axis_rad if near else math.remainder(shape.axis_rad + math.pi, math.tau)
-        told = (1.0 if near else -1.0) * shape.head if shared == 1 else 0.0
+        # A body that turned by nearly a right angle within a frame has no nearer end.
+        evidence = _MEMORY * abs(along) * self._evidence
+        if shared == 1:
+            evidence += (1.0 if near else -1.0) * shape.head
         ahead = float(moved @ (math.cos(heading), math.sin(heading))) / shape.length_px
         if abs(ahead) > _MOVING:
-            told += math.copysign(min(4 * abs(ahead), 1.0), ahead)
-        self._evidence = _MEMORY * self._evidence + (1 - _MEMORY) * 4 * told
-        if self._evidence < -_FLIP / 4:
+            evidence += math.copysign(min(2 * abs(ahead), 0.5), ahead)
+        if evidence < 0:
             heading = math.remainder(heading + math.pi, math.tau)
-            self._evidence = -self._evidence
+        self._evidence = abs(evidence)
         self.heading_rad = heading
