@@ -2,8 +2,8 @@
 
 Both LEDs shine in one colour, so their axis tells the heading but for half a turn.
 Which end is the front is told by motion: the robot drives forwards more than backwards.
-Once told it is kept, since from one frame to the next the robot turns by less than a
-quarter; only a long drive backwards overrules it.
+Once told it is kept, since from one frame to the next the robot turns little; only a long
+drive backwards overrules it, or a short drive after a turn that may have been either.
 """
 
 from __future__ import annotations
@@ -29,14 +29,18 @@ NEAR_M = 0.05
 NEAR_S = 0.05
 """Two images of different cameras belong together if no more lies between them."""
 
-_FIRST_M = 0.01
-"""Net way along the axis that tells the front for the first time."""
+_NATS_PER_M = 200.0
+"""What a way along the axis tells of the front: the odds rise by e for each half centimetre."""
 
-_OVERRULE_M = 0.08
-"""Net way backwards that overrules what was told: a robot may back off a wall."""
+_TELL, _OVERRULE, _SUREST = 2.0, 2.0, 14.0
+"""Log odds from which the front is told, from which against it it is changed, and at most.
 
-_FORGET_S = 2.0
-"""Time in which half of the way that speaks for one end is forgotten."""
+So a robot that was sure of its front may back off a wall by eight centimetres.
+"""
+
+_TURN_RAD = math.radians(15.0)
+_ANY_TURN = 1e-6
+"""Turns between two images: small ones, and rarely any; near a quarter nobody knows which way."""
 
 _LOST_S = 1.0
 """A robot that was lost for so long may have turned: its front is told anew."""
@@ -244,11 +248,15 @@ def _axis(leds_m: Floats) -> float:
 
 @final
 class Front:
-    """Tells which way along its axis the robot looks, and keeps to it."""
+    """Tells which way along its axis the robot looks.
+
+    A filter with two states, the ends of the axis. A turn mixes them, the less the smaller
+    it is; a way along the axis speaks for the end that is ahead.
+    """
 
     def __init__(self) -> None:
         self._heading_rad = math.nan
-        self._forward_m = 0.0
+        self._odds = 0.0
         self._is_told = False
         self._time_s = -math.inf
         self._middle_m: Floats = np.full(2, np.nan)
@@ -267,35 +275,41 @@ class Front:
         """
         if not math.isfinite(axis_rad):
             return math.nan
-        passed_s = time_s - self._time_s
-        if not passed_s <= _LOST_S:
-            self._begin(axis_rad)
+        if not time_s - self._time_s <= _LOST_S:
+            self._heading_rad, self._odds, self._is_told = _wrapped(axis_rad), 0.0, False
         else:
-            self._turn(axis_rad)
-            self._drive(middle_m - self._middle_m, passed_s)
+            turned_rad = self._turn(axis_rad)
+            self._drive(middle_m - self._middle_m, self._heading_rad - turned_rad / 2)
         self._time_s, self._middle_m = time_s, middle_m
         return self._heading_rad if self._is_told else math.nan
 
-    def _begin(self, axis_rad: float) -> None:
-        self._heading_rad, self._forward_m, self._is_told = _wrapped(axis_rad), 0.0, False
-
-    def _turn(self, axis_rad: float) -> None:
-        """Follow the axis by less than a quarter turn."""
+    def _turn(self, axis_rad: float) -> float:
+        """Follow the axis by less than a quarter turn, and return by how much."""
         away = _wrapped(axis_rad - self._heading_rad)
-        self._heading_rad = _wrapped(axis_rad + (math.pi if abs(away) > math.pi / 2 else 0.0))
+        if abs(away) > math.pi / 2:
+            away = _wrapped(away + math.pi)
+        self._heading_rad = _wrapped(self._heading_rad + away)
+        right = 1 / (1 + math.exp(-self._odds))
+        other = _likely_turn(math.pi - abs(away))
+        mixed = other / (other + _likely_turn(abs(away)))
+        right = right * (1 - mixed) + (1 - right) * mixed
+        self._odds = math.log(right / (1 - right))
+        return away
 
-    def _drive(self, step_m: Floats, passed_s: float) -> None:
-        along_m = float(
-            step_m[0] * math.cos(self._heading_rad) + step_m[1] * math.sin(self._heading_rad)
-        )
-        self._forward_m = self._forward_m * 0.5 ** (passed_s / _FORGET_S) + along_m
-        needed_m = _OVERRULE_M if self._is_told else _FIRST_M
-        if self._forward_m <= -needed_m:
+    def _drive(self, step_m: Floats, heading_rad: float) -> None:
+        """Take what a way says, made with the heading half-way between two images."""
+        along_m = float(step_m[0] * math.cos(heading_rad) + step_m[1] * math.sin(heading_rad))
+        self._odds = min(max(self._odds + _NATS_PER_M * along_m, -_SUREST), _SUREST)
+        if self._odds <= -(_OVERRULE if self._is_told else _TELL):
             self._heading_rad = _wrapped(self._heading_rad + math.pi)
-            self._forward_m = -self._forward_m
+            self._odds = -self._odds
             self._is_told = True
-        elif self._forward_m >= _FIRST_M:
+        elif self._odds >= _TELL:
             self._is_told = True
+
+
+def _likely_turn(angle_rad: float) -> float:
+    return math.exp(-angle_rad / _TURN_RAD) + _ANY_TURN
 
 
 def _wrapped(angle_rad: float) -> float:
