@@ -222,8 +222,10 @@ def test_time_does_not_run_backwards(tmp_path, examine):
 def test_an_existing_file_is_never_overwritten(write, tmp_path):
     """A recording is precious."""
     path = write(3)
-    with pytest.raises(StorageError, match=r"000000\.mcap"):
+    with pytest.raises(InputError, match=r"000000\.mcap: exists already"):
         FrameWriter(path, "overhead")
+    with pytest.raises(StorageError, match="cannot be written"):
+        FrameWriter(path / "000000.mcap", "overhead")
     assert len(list(read_frames(path))) == 3
 
 

@@ -12,6 +12,7 @@ import bisect
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BufferedWriter
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, final
@@ -83,8 +84,10 @@ class FrameWriter:
 
     Raises
     ------
+    InputError
+        The file exists already.
     StorageError
-        The file exists already, or cannot be written.
+        It cannot be written.
     """
 
     def __init__(
@@ -100,7 +103,7 @@ class FrameWriter:
         self._n_frames = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("xb")
+            self._file = self._new(path)
             # A chunk ends as soon as it holds anything; JPEG and PNG are as small as they get.
             self._writer = Writer(self._file, chunk_size=0, compression=CompressionType.NONE)
             self._writer.start(profile="", library=f"zfcal {package_version()}")
@@ -110,6 +113,16 @@ class FrameWriter:
         except OSError as error:
             raise storage_error(path, error) from error
         self._image_channel: int | None = None
+
+    @staticmethod
+    def _new(path: Path) -> BufferedWriter:
+        try:
+            return path.open("xb")
+        except FileExistsError:
+            raise InputError(
+                f"{path}: exists already, and images are not written over others.",
+                hint="Move it away, or record into another trial.",
+            ) from None
 
     @property
     def n_frames(self) -> int:
