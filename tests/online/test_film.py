@@ -23,6 +23,7 @@ from zfcal.online.simulate import SimulateOptions
 from zfcal.tracks import ROBOT
 from zfcal.vision.camera import Camera, Homography
 from zfcal.vision.look import CLEAN, USUAL, look_of
+from zfcal.vision.render import OverheadPainter
 
 PLAIN = look_of(
     CLEAN,
@@ -186,6 +187,29 @@ def test_the_same_again_does_nothing(home, tmp_path, heard, read_all):
         "overhead.toml",
     }
     assert read_all(root) == before
+
+
+def test_an_interrupted_drawing_is_taken_up(home, tmp_path, monkeypatch, read_all):
+    """Nothing half drawn is left, and the end is that of an undisturbed run."""
+    options, filmed = of(home, duration_s=61.0, fps=1.0), FilmOptions(look=look_of(USUAL))
+    simulate_on_film(tmp_path / "whole" / "t", options, filmed, say_nothing)
+    root = tmp_path / "broken" / "t"
+    painted = []
+
+    def interrupt(painter, moment, paint=OverheadPainter.paint):
+        painted.append(moment.number)
+        if len(painted) == 61:
+            raise KeyboardInterrupt
+        return paint(painter, moment)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(OverheadPainter, "paint", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            simulate_on_film(root, options, filmed, say_nothing)
+    folder = root / "frames" / "overhead"
+    assert [path.name for path in folder.iterdir()] == ["000000.mcap"]
+    simulate_on_film(root, options, filmed, say_nothing)
+    assert read_all(root) == read_all(tmp_path / "whole" / "t")
 
 
 def test_another_look_or_seed_draws_anew(home, tmp_path, heard):
