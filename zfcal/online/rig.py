@@ -40,7 +40,8 @@ class CameraChoice:
     Parameters
     ----------
     source
-        A file, a folder, a pattern, a camera; None for that of ``trial.toml``.
+        A file, a folder, a pattern, a camera; None for that of ``trial.toml``, or the
+        images in the trial's own ``frames/``.
     file
         Its calibration; None for that of ``trial.toml``.
     corners_px
@@ -129,7 +130,9 @@ def view_of(opened: OpenTrial, name: str, choice: CameraChoice) -> View | None:
     """
     trial = opened.trial
     known = (trial.cameras or {}).get(name, {})
-    source = choice.source or _placed(trial.root, known.get("source"))
+    source = (
+        choice.source or _placed(trial.root, known.get("source")) or _recorded(trial.root, name)
+    )
     if source is None:
         return None
     if choice.file is not None and choice.corners_px is not None:
@@ -152,6 +155,12 @@ def _placed(root: Path, source: str | None) -> str | None:
     if not source:
         return None
     return source if is_live(source) else str(root / source)
+
+
+def _recorded(root: Path, name: str) -> str | None:
+    """Return the folder of a trial's own camera images; None if there are none."""
+    folder = root / "frames" / name
+    return str(folder) if any(folder.glob("*.mcap")) else None
 
 
 @dataclass(slots=True, kw_only=True)

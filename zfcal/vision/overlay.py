@@ -21,6 +21,8 @@ from zfcal.tracks import ROBOT, AgentPose, FramePoses
 from zfcal.vision.camera import Projection
 from zfcal.vision.frames import Frame, Image
 
+Floats = NDArray[np.float64]
+
 # Okabe and Ito's colours, which most people can tell apart; blue, green, red.
 _FISH_BGR = ((178, 114, 0), (233, 180, 86), (115, 158, 0), (66, 228, 240), (167, 121, 204))
 _ROBOT_BGR = (0, 94, 213)
@@ -35,7 +37,8 @@ SHEET_FRAMES = 12
 _SHEET_COLUMNS = 4
 _TILE_PX = 320
 _ROOM_PX = 40
-_LEAST_PX = 160
+_LEAST_PX = 120
+_SURE, _GUESS = 0.9, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,69 +91,97 @@ class Painter:
         scene
             The frame.
         close
-            Only the square in which agents are.
+            Only the square around what is least sure, enlarged.
 
         Returns
         -------
         ndarray of uint8, shape (height, width, 3)
         """
-        image = scene.frame.image
-        canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+        window = self._window(scene) if close else _Window()
+        canvas = window.cut(scene.frame.image)
         for outline in scene.outlines:
-            cv2.polylines(canvas, [outline.reshape(-1, 1, 2)], True, _INK_BGR, 1, cv2.LINE_AA)
-        self._draw_trails(canvas)
+            points = window.place(outline.reshape(-1, 2).astype(np.float64))
+            cv2.polylines(canvas, [_whole(points)], True, _INK_BGR, 1, cv2.LINE_AA)
+        self._draw_trails(canvas, window)
         for agent in scene.poses.agents:
-            self._draw_agent(canvas, agent)
-        if close:
-            canvas = _tile(np.asarray(canvas, np.uint8)[self._square(scene)])
+            self._draw_agent(canvas, agent, window)
         _draw_caption(canvas, scene)
         return np.asarray(canvas, np.uint8)
 
-    def _square(self, scene: Scene) -> tuple[slice, slice]:
-        """Return rows and columns of the square around everybody, with some room."""
+    def _window(self, scene: Scene) -> _Window:
+        """Return the square around the agent that is least sure, or in which everybody is."""
         height, width = scene.frame.image.shape[:2]
-        side = min(height, width)
-        places = [outline.reshape(-1, 2) for outline in scene.outlines]
-        places += [self._pixels([(a.x_m, a.y_m)]).reshape(-1, 2) for a in scene.poses.agents]
-        middle = np.array([width / 2, height / 2])
-        if places:
-            low, high = np.vstack(places).min(axis=0), np.vstack(places).max(axis=0)
-            side = int(min(side, max((high - low).max() + 2 * _ROOM_PX, _LEAST_PX)))
-            middle = (low + high) / 2
-        x, y = np.clip(middle - side / 2, 0, np.array([width, height]) - side).astype(int)
-        return slice(int(y), int(y) + side), slice(int(x), int(x) + side)
+        agents = scene.poses.agents
+        unsure = [agent for agent in agents if agent.confidence < _SURE]
+        shown = [min(unsure, key=lambda agent: agent.confidence)] if unsure else list(agents)
+        places = self._projection.to_pixels(
+            np.array([(a.x_m, a.y_m) for a in shown]).reshape(-1, 2)
+        )
+        places = places[np.isfinite(places).all(axis=1)]
+        if not len(places):
+            places = np.array([[0.0, 0.0], [width, height]])
+        low, high = places.min(axis=0), places.max(axis=0)
+        side = int(min(height, width, max((high - low).max() + 2 * _ROOM_PX, _LEAST_PX)))
+        left, top = np.clip((low + high - side) / 2, 0, np.array([width, height]) - side)
+        return _Window(left=int(left), top=int(top), side=side)
 
-    def _draw_trails(self, canvas: cv2.typing.MatLike) -> None:
+    def _draw_trails(self, canvas: cv2.typing.MatLike, window: _Window) -> None:
         ways: dict[int, list[AgentPose]] = {}
         for poses in self._trails:
             for agent in poses.agents:
                 ways.setdefault(agent.agent, []).append(agent)
         for way in ways.values():
-            points = self._pixels([(agent.x_m, agent.y_m) for agent in way])
+            xy_m = np.array([(agent.x_m, agent.y_m) for agent in way])
+            points = _whole(window.place(self._projection.to_pixels(xy_m)))
             cv2.polylines(canvas, [points], False, colour_of(way[-1]), 1, cv2.LINE_AA)
 
-    def _draw_agent(self, canvas: cv2.typing.MatLike, agent: AgentPose) -> None:
+    def _draw_agent(self, canvas: cv2.typing.MatLike, agent: AgentPose, window: _Window) -> None:
         colour = colour_of(agent)
         turn = agent.heading_rad if math.isfinite(agent.heading_rad) else 0.0
         ahead = (agent.x_m + _AHEAD_M * math.cos(turn), agent.y_m + _AHEAD_M * math.sin(turn))
-        places = self._projection.to_pixels(np.array([(agent.x_m, agent.y_m), ahead]))
-        if not np.isfinite(places).all():
+        pixels = self._projection.to_pixels(np.array([(agent.x_m, agent.y_m), ahead]))
+        if not np.isfinite(pixels).all():
             return
+        places = window.place(pixels)
         way = (places[1] - places[0]) / max(float(np.hypot(*(places[1] - places[0]))), 1e-9)
         here = [round(value) for value in places[0].tolist()]
         there = [round(value) for value in (places[0] + _AHEAD_PX * way).tolist()]
         if math.isfinite(agent.heading_rad):
             cv2.line(canvas, here, there, colour, 1, cv2.LINE_AA)
         # A guess is a ring, what is known a disc.
-        cv2.circle(canvas, here, 3, colour, 1 if agent.confidence < 0.5 else -1, cv2.LINE_AA)
+        radius, filled = (6, 1) if agent.confidence < _GUESS else (2, -1)
+        cv2.circle(canvas, here, radius, colour, filled, cv2.LINE_AA)
         name = f"R{agent.agent}" if agent.kind == ROBOT else str(agent.agent)
         place = (here[0] + 6, here[1] - 6)
         cv2.putText(canvas, name, place, _FONT, 0.4, (0, 0, 0), 3, cv2.LINE_AA)
         cv2.putText(canvas, name, place, _FONT, 0.4, colour, 1, cv2.LINE_AA)
 
-    def _pixels(self, points_m: list[tuple[float, float]]) -> NDArray[np.int32]:
-        pixels = self._projection.to_pixels(np.array(points_m, np.float64))
-        return np.rint(pixels).astype(np.int32).reshape(-1, 1, 2)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Window:
+    """The part of an image that is shown; all of it where it has no side."""
+
+    left: int = 0
+    top: int = 0
+    side: int = 0
+
+    def place(self, points_px: Floats) -> Floats:
+        """Return where pixels of the image lie in what is shown."""
+        if not self.side:
+            return points_px
+        return (points_px + 0.5 - (self.left, self.top)) * (_TILE_PX / self.side) - 0.5
+
+    def cut(self, image: Image) -> cv2.typing.MatLike:
+        """Return what is shown, in colour, to be drawn on."""
+        if self.side:
+            part = image[self.top : self.top + self.side, self.left : self.left + self.side]
+            image = np.asarray(cv2.resize(part, (_TILE_PX, _TILE_PX)), np.uint8)
+        return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+
+
+def _whole(points_px: Floats) -> NDArray[np.int32]:
+    known = points_px[np.isfinite(points_px).all(axis=1)]
+    return np.rint(known).astype(np.int32).reshape(-1, 1, 2)
 
 
 def colour_of(agent: AgentPose) -> tuple[int, int, int]:
@@ -247,12 +278,6 @@ class WorstFrames:
             np.hstack(tiles[k : k + _SHEET_COLUMNS]) for k in range(0, len(tiles), _SHEET_COLUMNS)
         ]
         return np.asarray(np.vstack(rows), np.uint8)
-
-
-def _tile(image: Image) -> Image:
-    scale = _TILE_PX / image.shape[1]
-    size = (_TILE_PX, max(1, round(image.shape[0] * scale)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def badness(poses: FramePoses, bad: Sequence[str], n_agents: int) -> float:

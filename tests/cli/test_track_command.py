@@ -1,0 +1,148 @@
+"""`zfcal track` as a command: paths, exit codes, pipes, and being killed."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.tables import read_tracks
+from zfcal.vision.seen import METHODS
+from zfcal_cli import tracking
+
+CORNERS = "-0.5,199.5 199.5,199.5 199.5,-0.5 -0.5,-0.5"
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory, drawn_tank):
+    """Return a video of 125 s at 5 Hz: three bodies on a circle, 24 s a round."""
+    path = tmp_path_factory.mktemp("film") / "day3.avi"
+    paths = drawn_tank.circling(120, turn=2 * np.pi / 120)
+    images = [frame.image for frame in drawn_tank.frames(paths)]
+    code = cv2.VideoWriter.fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), code, 5.0, (200, 200), isColor=False)
+    for k in range(625):
+        writer.write(images[k % 120])
+    writer.release()
+    return path
+
+
+@pytest.fixture
+def tank(zfcal, tmp_path):
+    """Return a trial of three fish in a square of 0.4 m, 5 Hz."""
+    assert zfcal("init", "trial", "--side-m", 0.4, "--fish", 3, "--fps", 5, "-q").code == 0
+    return tmp_path / "trial"
+
+
+def words(film):
+    """Return the command's words."""
+    return ["track", "trial", "--overhead", str(film), "--corners", CORNERS]
+
+
+def files(root):
+    """Return the bytes of poses and tracks by their name."""
+    found = [*root.glob("tracks/*.parquet"), *root.glob("poses/*.mcap")]
+    return {path.relative_to(root).as_posix(): path.read_bytes() for path in found}
+
+
+def test_paths_go_out_and_talk_goes_to_the_other_stream(zfcal, tank, film):
+    """Tracks and poses of each minute; the second time they are up to date."""
+    names = [
+        f"trial/{folder}/{second:06d}.{ending}"
+        for second in (0, 60, 120)
+        for folder, ending in (("tracks", "parquet"), ("poses", "mcap"))
+    ]
+    first = zfcal(*words(film))
+    assert (first.code, first.lines) == (0, names)
+    assert "625 frames; 100.0% of them with exactly 3 animals" in first.err
+    second = zfcal(*words(film))
+    assert (second.code, second.lines) == (0, names)
+    assert "nothing to do, 6 up to date" in second.err
+
+
+def test_numbers_go_out_as_json(zfcal, tank, film):
+    """Frames, gaps, bad frames and latency, beside the artifacts."""
+    document = json.loads(zfcal(*words(film), "--duration", "30s", "--json").out)
+    (numbers,) = document["results"]
+    assert numbers["frames"] == 150
+    assert numbers["gaps"] == 0
+    assert numbers["latency_ms"]["p95"] > 0
+    assert [a["state"] for a in document["artifacts"]] == ["made", "made"]
+
+
+def test_a_killed_run_goes_on_and_ends_in_the_same_bytes(zfcal, tank, film, command, tmp_path):
+    """kill -9 in the second minute."""
+    running = subprocess.Popen(
+        [*command, *words(film)], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    growing, until = tank / "poses" / "000060.mcap", time.monotonic() + 60
+    while not (growing.exists() and growing.stat().st_size > 9000) and time.monotonic() < until:
+        time.sleep(0.005)
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    assert not overview(growing).whole
+    again = zfcal(*words(film))
+    assert again.code == 0
+    assert "2 up to date" in again.err
+    went_on = files(tank)
+    assert len(went_on) == 6
+    assert zfcal(*words(film), "--force").code == 0
+    assert files(tank) == went_on
+
+
+def test_paths_go_through_a_pipe(zfcal, tank, film, process):
+    """`zfcal track trial ... | zfcal analyse -`."""
+    paths = zfcal(*words(film)).out
+    analysed = process("analyse", "-", stdin=paths)
+    assert analysed.code == 0
+    assert analysed.lines[:1] == ["trial/stats/000120.parquet"]
+
+
+def test_a_video_that_was_cut_ends_with_three(zfcal, tank, film, tmp_path):
+    """What could be read is tracked."""
+    content = film.read_bytes()
+    (tmp_path / "cut.avi").write_bytes(content[: len(content) // 4])
+    done = zfcal(*words("cut.avi"))
+    assert done.code == 3
+    assert done.lines[0] == "trial/tracks/000000.parquet"
+    assert "cut.avi: was cut short or is damaged" in done.err
+    assert len(read_tracks(tank / "tracks" / "000000.parquet")) > 300
+
+
+@pytest.mark.parametrize(
+    ("source", "code", "says"),
+    [
+        ("nowhere.mp4", 1, "nowhere.mp4: no such file"),
+        ("trial/trial.toml", 3, "no video that can be opened"),
+        ("trial", 1, "is a folder without images"),
+        ("*.png", 1, "no file answers to this pattern"),
+        ("http://127.0.0.1:9/x.mjpg", 1, "no camera answers there"),
+        ("/dev/video99", 1, "no camera answers there"),
+    ],
+)
+def test_a_source_that_is_none_is_named_in_one_line(zfcal, tank, source, code, says):
+    """With a hint, without a traceback, and nothing is written."""
+    done = zfcal(*words(source))
+    assert done.code == code
+    assert says in done.err
+    assert "hint:" in done.err
+    assert "Traceback" not in done.err
+    assert not (tank / "poses").exists()
+
+
+@pytest.mark.parametrize("corners", ["1,2,3", "a,b,c,d,e,f,g,h", "1,2 3,4 5,6 7,8 9,9"])
+def test_corners_are_eight_numbers(zfcal, tank, film, corners):
+    """Anything else is wrong usage."""
+    done = zfcal("track", "trial", "--overhead", film, "--corners", corners)
+    assert done.code == 2
+    assert "eight numbers" in done.err
+
+
+def test_the_methods_are_those_of_the_tracker():
+    """The command line knows them without loading it."""
+    assert tracking.METHODS == METHODS
