@@ -92,9 +92,9 @@ def test_one_suspect_is_itself(suspect):
 
 
 def test_what_is_no_smooth_matter_is_not_fitted(candidate):
-    """Of alignment the weight and the concentration; of a delay nothing."""
+    """Of alignment the weight and the concentration; of a late response its share."""
     assert free_of(candidate("alignment")) == (("alignment", "weight"), ("alignment", "kappa"))
-    assert free_of(candidate("reaction-delay")) == ()
+    assert free_of(candidate("reaction-delay")) == (("reaction-delay", "share"),)
 
 
 def test_a_gain_belongs_to_its_sample(screen):
@@ -135,13 +135,17 @@ def test_a_refit_of_a_speed_leaves_headings_alone(screen, candidate):
     assert made.gain.sum() > 20
 
 
-def test_a_delay_is_added_as_it_was_asked_for(screen, candidate):
-    """0.6 s gains much; its parameter is no smooth matter and has no interval."""
-    own = screen(37, {"reaction-delay": {"delay_s": 0.6}}, minutes=6.0)
-    made = refit(own, own.ask(candidate("reaction-delay", delay_s=0.6)))
-    assert made.values == {"delay_s": 0.6}
-    assert made.interval == {}
-    assert made.nats > 30
+@pytest.mark.parametrize(("share", "whole"), [(1.0, 1.0), (0.4, 1.0), (0.4, 0.0)])
+def test_the_share_of_a_late_response_is_found(screen, candidate, share, whole):
+    """At the age that was asked for, which is no smooth matter and has no interval."""
+    values = {"share": share, "delay_s": 0.6, "whole": whole, "felt_m": 0.05 * (1 - whole)}
+    own = screen(37, {"reaction-delay": values}, minutes=6.0)
+    shape = {key: value for key, value in values.items() if key != "share"}
+    made = refit(own, own.ask(candidate("reaction-delay", **shape)))
+    assert made.values["share"] == pytest.approx(share, abs=0.15)
+    assert made.values["delay_s"] == 0.6
+    assert set(made.interval) == {"share"}
+    assert made.nats > 20
 
 
 def test_traits_are_those_of_the_individuals(screen, candidate):

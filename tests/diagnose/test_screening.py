@@ -12,6 +12,7 @@ from zfcal.diagnose.screening import (
     ask_all,
     by_track,
     centred,
+    excess_deviate,
     normal_deviate,
     summed,
     tame,
@@ -62,7 +63,7 @@ EFFECTS = {
     "rear-blind-zone": ({"ignored": 0.5}, 1),
     "interaction-range": ({"ignored": 0.6, "range_m": 0.12}, 1),
     "leader-following": ({"strength": -0.5}, -1),
-    "reaction-delay": ({"delay_s": 0.4}, 1),
+    "reaction-delay": ({"share": 0.4, "delay_s": 0.4}, 1),
     "burst-and-coast": ({"exponent": 0.2}, 1),
     "speed-matching": ({"exponent": 0.25}, 1),
     "crowding": ({"per_neighbour": -0.12}, -1),
@@ -214,3 +215,23 @@ def test_each_zone_has_its_own_mean():
     kept = np.array([True, True, True, True, False])
     rest = centred(np.array([1.0, 3.0, 10.0, 20.0, 99.0]), zone, kept)
     assert rest.tolist() == [-1.0, 1.0, -5.0, 5.0, 0.0]
+
+
+def test_rests_count_however_few_there_are():
+    """Twelve where 0.6 were to be expected are clear; thirty where there were to be 30 are not.
+
+    Too few of them are negative, and next to nothing expected is no proof of anything.
+    """
+    assert excess_deviate(12.0, 0.6) > 6.0
+    assert excess_deviate(30.0, 30.0) == 0.0
+    assert excess_deviate(10.0, 30.0) < -3.0
+    assert excess_deviate(0.0, 2.0) == pytest.approx(-2.0)
+    assert excess_deviate(3.0, 0.0) == 0.0
+    assert excess_deviate(5000.0, 10.0) > 30.0
+
+
+def test_a_surplus_of_rests_is_no_more_frequent_than_it_says():
+    """Poisson counts of mean 3: beyond 2 standard errors at most as often as in a normal law."""
+    counts = np.random.default_rng(5).poisson(3.0, 20_000)
+    z = np.array([excess_deviate(float(n), 3.0) for n in range(counts.max() + 1)])[counts]
+    assert (z > 2.0).mean() < 0.023

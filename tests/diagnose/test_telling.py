@@ -23,10 +23,10 @@ def test_a_negative_strength_has_the_opposite_sentence(candidate):
 
 
 def test_without_an_interval_none_is_told(candidate):
-    """As for a delay, which is asked for at a few values."""
-    text = says(candidate("reaction-delay"), {"delay_s": 0.6}, {})
+    """The value stands alone."""
+    text = says(candidate("reaction-delay"), {"share": 0.6, "delay_s": 0.4}, {})
     assert "interval" not in text
-    assert "Fitted delay s: 0.6." in text
+    assert "Fitted share: 0.6." in text
 
 
 def test_an_interval_of_a_shape_is_not_that_of_the_strength(candidate):

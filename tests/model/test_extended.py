@@ -43,7 +43,10 @@ HOOKS = {
     "component": {"alignment": {"weight": 20.0, "kappa": 6.0}},
     "factor": {"turning-bias": {"strength": 0.5}},
     "sight": {"rear-blind-zone": {"ignored": 0.7}},
+    "rotation": {"alignment": {"weight": 20.0, "turning": 1.0}},
     "lag": {"reaction-delay": {"delay_s": 0.4}},
+    "some of it late": {"reaction-delay": {"delay_s": 0.4, "share": 0.3}},
+    "late directions": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "whole": 0.0}},
     "all": {
         "alignment": {"weight": 20.0, "kappa": 6.0},
         "turning-bias": {"strength": 0.5},
@@ -167,7 +170,7 @@ def expected(model, two_rooms, xy, heading, taken_rad, speed_m_s):
 MIDDLE = [(0.22, 0.77), (0.26, 0.80), (0.17, 0.74)], [0.4, 2.0, -2.5]
 
 
-@pytest.mark.parametrize("name", ["none", "component", "factor", "sight"])
+@pytest.mark.parametrize("name", ["none", "component", "factor", "sight", "rotation"])
 @pytest.mark.parametrize("degrees", [-100, -20, 25, 60, 150])
 def test_the_log_density_is_that_of_a_simulated_step(two_rooms, model, name, degrees):
     """In the middle of a room, to 1e-3: kinds of effects and headings on all sides."""
@@ -177,7 +180,7 @@ def test_the_log_density_is_that_of_a_simulated_step(two_rooms, model, name, deg
     assert found == pytest.approx(expected(own, two_rooms, *MIDDLE, taken, speed), abs=1e-3)
 
 
-@pytest.mark.parametrize("name", ["none", "component", "factor", "sight"])
+@pytest.mark.parametrize("name", ["none", "component", "factor", "sight", "rotation"])
 def test_the_log_density_near_walls_and_borders(two_rooms, model, name):
     """12 mm from a wall and from a zone's border: cells that straddle them cost 0.02 nats."""
     own, taken, speed = having(model, HOOKS[name]), math.radians(80), 0.12
@@ -185,6 +188,21 @@ def test_the_log_density_near_walls_and_borders(two_rooms, model, name):
     scene = one_step(two_rooms, *state, taken, speed)
     found = log_density(scene, own, 3)
     assert found == pytest.approx(expected(own, two_rooms, *state, taken, speed), abs=0.02)
+
+
+@pytest.mark.parametrize("whole", [1.0, 0.0])
+def test_a_share_that_is_late_lies_between(two_rooms, model, whole):
+    """With no share of it the density is that of a prompt fish, and it moves with the share."""
+    scene = one_step(two_rooms, *MIDDLE, 0.7, 0.06)
+
+    def at(share):
+        given = {"delay_s": 0.4, "share": share, "whole": whole}
+        return log_density(scene, having(model, {"reaction-delay": given}), 3)
+
+    assert at(0.0) == log_density(scene, model, 3)
+    prompt, some, all_ = math.exp(at(0.0)), math.exp(at(0.5)), math.exp(at(1.0))
+    assert prompt != all_
+    assert some == pytest.approx((prompt + all_) / 2, rel=2e-3)
 
 
 def test_a_late_response_is_that_to_former_places(two_rooms, model):

@@ -34,7 +34,7 @@ from zfcal.diagnose.kernels import (
     heading_moments,
 )
 from zfcal.diagnose.surroundings import Surroundings, probabilities, signed_angle, surroundings
-from zfcal.model.extended import Fitted
+from zfcal.model.extended import Fitted, sees_late
 from zfcal.model.kernels.scene import ask_speeds, perceive
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
@@ -263,7 +263,7 @@ def speed_factor(scene: Scene, fitted: Fitted) -> Floats:
     packed = pack([fitted.parameters], scene.arena)
     if len(packed.speeds):
         cos_fov = cos_of(fitted.parameters.fov_rad)
-        _, angle = perceive(scene.states, moves.at, moves.who, int(packed.lags[0]), cos_fov)
+        _, angle = perceive(scene.states, moves.at, moves.who, sees_late(packed), cos_fov)
         ask_speeds(scene.states, moves.at, moves.who, packed, angle, factor)
     return factor
 

@@ -70,8 +70,6 @@ def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
     effect = find_effect(name)
     known = {p.name: values.get(p.name, p.default) for p in effect.parameters}
     shape = {key: value for key, value in known.items() if key != effect.strength}
-    if effect.lag is not None:
-        shape = known
     return Candidate(effect=effect, shape=shape)
 
 

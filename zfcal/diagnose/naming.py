@@ -133,8 +133,6 @@ def _start(scene: Scene, fitted: Fitted, score: Score) -> dict[str, float]:
     slope there says where the maximum is.
     """
     candidate = score.candidate
-    if candidate.effect.lag is not None:
-        return dict(candidate.shape)
     low, high = bounds_of(candidate.name, candidate.effect.strength)
     best, most = candidate.values(0.0), -np.inf
     for share in _SHARES:

@@ -29,9 +29,11 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.model.extended import (
     SCALES,
     Fitted,
+    attended,
     components_of,
     constants,
     factors_of,
+    spin_of,
     view_of,
     with_effect,
     without_effects,
@@ -42,7 +44,7 @@ from zfcal.model.kernels.extended import (
     mixture_score,
     social_score,
 )
-from zfcal.model.kernels.scene import ask_speeds, attend, perceive
+from zfcal.model.kernels.scene import ask_speeds, perceive
 from zfcal.model.kernels.world import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
@@ -56,9 +58,15 @@ _FLOOR = 0.01
 _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""
 
+_LATE_SHARE = 0.3
+"""Share of a late response that is asked for: all fish that respond late are seldom seen."""
+
 _FAST_QUANTILE = 0.995
 _SEVERAL = 60.0
 """Steps of one size that a score must be made of, to be as good as normal."""
+
+_LONG_RESTS_S = (1.0, 2.0)
+"""Rests that last longer are asked for after one step at rest more."""
 
 _STEEPEST = 8.0
 """What a speed responds to counts for no more than so many standard deviations: one
@@ -225,7 +233,7 @@ class Screen:
             return pack([replace(base, effects=asked)], scene.arena)
 
         # Mixtures are compared at a strength worth noticing, tilts next to none.
-        tables, angle, strong = self._tables, fitted.view.angle_sr, candidate.notable
+        tables, angle, strong = self._tables, fitted.view.seen_sr, candidate.notable
         total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
         if effect.component is not None:
             parts = components_of(scene, at(strong), angle)
@@ -233,6 +241,8 @@ class Screen:
             total += some / strong
         if effect.sight is not None:
             total += self._sight_scores(scene, at(strong)) / strong
+        if effect.rotation is not None:
+            total += self._turned_scores(scene, at(effect.probe)) / effect.probe
         if effect.factor is not None:
             tilt, tilt_taken = factors_of(scene, at(effect.probe), angle, tables.probability)
             factor_score(tilt, tilt_taken, tables.probability, some)
@@ -242,8 +252,7 @@ class Screen:
     def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
         fitted, turns = self.fitted, scene.turns
         tables = self._tables
-        changed = np.empty_like(fitted.view.angle_sr)
-        attend(scene.states, turns.at, turns.who, packed, fitted.view.angle_sr, changed)
+        changed = attended(scene, packed, fitted.view.angle_sr)
         total = np.zeros(len(turns))
         for x, zone in zip(fitted.x, fitted.turns, strict=True):
             rows, own = zone.rows, x[:3] * SCALES
@@ -256,15 +265,36 @@ class Screen:
             total[rows] = some
         return total
 
+    def _turned_scores(self, scene: Scene, packed: Packed) -> Floats:
+        """Return the scores of a mixture whose base directions are turned."""
+        fitted = self.fitted
+        spin = spin_of(scene, packed, fitted.view.seen_sr)
+        scores = np.zeros(len(scene.turns))
+        if not spin[:, 1].any():
+            return scores
+        if len(fitted.view.spin):
+            old = fitted.view.spin
+            spin = np.stack(
+                [
+                    spin[:, 0] * old[:, 0] - spin[:, 1] * old[:, 1],
+                    spin[:, 1] * old[:, 0] + spin[:, 0] * old[:, 1],
+                ],
+                axis=1,
+            )
+        other, _, other_taken = replace(fitted, view=replace(fitted.view, spin=spin)).tables()
+        mixture_score(other, other_taken, *self._tables.mixtures(), scores)
+        return scores
+
     def _late_scores(self, candidate: Candidate) -> Floats:
         """Return the scores of a mixture with the model that responds late."""
         fitted, turns = self.fitted, self.scene.turns
-        values = candidate.values(candidate.notable) | candidate.shape
-        late = with_effect(fitted.parameters, candidate.name, values)
-        other, _, other_taken = replace(fitted, view=view_of(self.scene, late)).tables()
+        late = with_effect(fitted.parameters, candidate.name, candidate.values(_LATE_SHARE))
+        other, _, other_taken = replace(
+            fitted, view=view_of(self.scene, late, fitted.view)
+        ).tables()
         scores = np.empty(len(turns))
         mixture_score(other, other_taken, *self._tables.mixtures(), scores)
-        return scores
+        return scores / _LATE_SHARE
 
     def _scatter(self, candidate: Candidate, steps: Floats) -> Score:
         """Return the scatter of individuals as a normal deviate (Q of Cochran 1954)."""
@@ -321,31 +351,57 @@ class Screen:
         before = self.scene.states[moves.at, SPEED, moves.who]
         return moves.speed_m_s < least, before < least
 
+    def still_for(self, steps: int) -> NDArray[np.bool_]:
+        """Return whether each move was preceded by so many that were none, shape (move,)."""
+        moves, least = self.scene.moves, HEADING_MIN_STEP_M / self.scene.dt_s
+        still = moves.at >= steps - 1
+        for back in range(steps):
+            at = np.maximum(moves.at - back, 0)
+            still &= self.scene.states[at, SPEED, moves.who] < least
+        return np.asarray(still)
+
     def _ask_speed(self, candidate: Candidate) -> Score:
         effect, moves = candidate.effect, self.scene.moves
         stopping = any(name == "freezing" for name in self.fitted.parameters.effects)
         if effect.stops:
-            now, before = self.still
-            cue, response = before.astype(np.float64), now.astype(np.float64)
-            kept = np.ones(len(moves), dtype=bool)
-        else:
-            probe = replace(
-                without_effects(self.fitted.parameters),
-                effects={effect.name: candidate.values(effect.probe)},
-            )
-            factor = self.speed_factor(pack([probe], self.scene.arena))
-            cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
-            response = self.own_speeds
-            response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
-            kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
+            return self._ask_rests(candidate)
+        probe = replace(
+            without_effects(self.fitted.parameters),
+            effects={effect.name: candidate.values(effect.probe)},
+        )
+        factor = self.speed_factor(pack([probe], self.scene.arena))
+        cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
+        response = self.own_speeds
+        response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
+        kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
         cue, response = centred(cue, moves.zone, kept), centred(response, moves.zone, kept)
         cue = tame(cue)
         score, squares = summed(candidate, cue * response), float((cue**2).sum())
         # A factor exp(s cue) changes the speed by s cue times its mean.
-        unit = 1.0 if effect.stops or not kept.any() else float(self.own_speeds[kept].mean())
+        unit = float(self.own_speeds[kept].mean()) if kept.any() else 1.0
         return replace(
             score, strength=score.strength * score.information / max(squares * unit, 1e-300)
         )
+
+    def _ask_rests(self, candidate: Candidate) -> Score:
+        """Return how many more steps at rest follow on steps at rest than short draws make."""
+        moves, now = self.scene.moves, self.still[0]
+        # A short draw looks like a rest of one step: after several of them few are left.
+        rested = self.still_for(_rested_steps(candidate))
+        share = np.bincount(moves.zone, weights=now) / np.maximum(np.bincount(moves.zone), 1)
+        expected = np.where(rested, share[moves.zone], 0.0)
+        steps = np.where(rested, now, 0.0) - expected
+        return replace(
+            summed(candidate, steps),
+            z=excess_deviate(float((rested & now).sum()), float(expected.sum())),
+            strength=float(steps.sum() / max(rested.sum(), 1)),
+        )
+
+
+def _rested_steps(candidate: Candidate) -> int:
+    """Return after how many steps at rest it is asked whether one more follows."""
+    duration_s = candidate.shape.get("duration_s", 0.0)
+    return 1 + sum(duration_s > limit_s for limit_s in _LONG_RESTS_S)
 
 
 def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
@@ -363,6 +419,20 @@ def normal_deviate(chi2: float, df: int) -> float:
         half = chi2 / 2
         tail = (df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)
     return float(stats.norm.isf(np.exp(tail))) if tail > -600 else float(np.sqrt(-2 * tail))
+
+
+def excess_deviate(count: float, expected: float) -> float:
+    r"""Return a count as a normal deviate, where it was to be so large; however small both are.
+
+    By the inequality of Freedman (1975, Annals of Probability 3: 100-118) no such count has a
+    tail above :math:`\exp(-n \log(n / m) + n - m)`, whatever the dependence along the way.
+    """
+    if not expected > 0.0:
+        return 0.0
+    away = expected - count + (count * math.log(count / expected) if count > 0.0 else 0.0)
+    if count <= expected:
+        return -math.sqrt(2 * max(away, 0.0))
+    return max(0.0, float(stats.norm.isf(math.exp(-away)))) if away < 700 else math.sqrt(2 * away)
 
 
 def summed(candidate: Candidate, steps: Floats) -> Score:

@@ -143,23 +143,30 @@ class _alone:  # noqa: N801 - a function of two steps
 
 
 def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
-    """Return the chain of moving and staying that fits best; beside it draws by zone alone."""
+    """Return the chain of moving and staying that fits best; beside it draws by zone alone.
+
+    Its chance of staying differs after one step at rest, which may be a short draw, and after
+    two, which hardly are.
+    """
     now, before = screen.still
     zone, dt_s = screen.scene.moves.zone, screen.scene.dt_s
     gain = np.zeros(len(now))
     stays = float(now[before].mean()) if before.any() else 0.0
+    twice = screen.still_for(2)
+    again = float(now[twice].mean()) if twice.any() else stays
+    once = before & ~twice
+    once_more = float(now[once].mean()) if once.any() else stays
     for number in np.unique(zone):
         rows = zone == number
         alike = np.clip(now[rows].mean(), 1e-6, 1 - 1e-6)
         moving = rows & ~before
         stopping = np.clip(now[moving].mean() if moving.any() else alike, 1e-6, 1 - 1e-6)
-        chance = np.where(before[rows], np.clip(stays, 1e-6, 1 - 1e-6), stopping)
+        chance = np.where(before[rows], np.where(twice[rows], again, once_more), stopping)
+        chance = np.clip(chance, 1e-6, 1 - 1e-6)
         gain[rows] = np.where(now[rows], np.log(chance / alike), np.log((1 - chance) / (1 - alike)))
     # What stays without the effect: the share of draws too short to be told from none.
     short = float(now[~before].mean()) if (~before).any() else 0.0
     # One draw that is short is no rest: how long rests last shows in those of two steps.
-    twice = _still_twice(before, screen)
-    again = float(now[twice].mean()) if twice.any() else stays
     held = float(np.clip((again - short) / max(1 - short, 1e-9), 1e-6, 0.999))
     duration_s = -dt_s / math.log(held)
     entries = _entries(now, before, screen)
@@ -171,16 +178,6 @@ def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
         interval=(max(0.0, rate - half), rate + half),
         gain=gain,
     )
-
-
-def _still_twice(before: NDArray[np.bool_], screen: Screen) -> NDArray[np.bool_]:
-    """Return whether both of the two moves before each one were none, shape (move,)."""
-    moves = screen.scene.moves
-    order = np.lexsort((moves.at, moves.who))
-    next_one = (np.diff(moves.at[order]) == 1) & (np.diff(moves.who[order]) == 0)
-    twice = np.zeros(len(before), dtype=bool)
-    twice[order[1:]] = next_one & before[order[1:]] & before[order[:-1]]
-    return twice
 
 
 def _entries(now: NDArray[np.bool_], before: NDArray[np.bool_], screen: Screen) -> float:

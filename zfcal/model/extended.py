@@ -32,8 +32,16 @@ from zfcal.model.kernels.extended import (
     cell_table,
     extended_sums,
 )
-from zfcal.model.kernels.scene import PART, ask_components, ask_factors, attend, perceive
-from zfcal.model.kernels.world import Packed
+from zfcal.model.kernels.perception import REPULSION_M
+from zfcal.model.kernels.scene import (
+    PART,
+    ask_components,
+    ask_factors,
+    ask_rotations,
+    attend,
+    perceive,
+)
+from zfcal.model.kernels.world import ZONE, Packed, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
 from zfcal.model.steps import ANGLES
@@ -66,7 +74,13 @@ class View:
     Parameters
     ----------
     toward, angle_sr : ndarray, shape (step, column, 2) and (step, column)
-        Unit vectors to neighbours and solid angles, with the effects on sight.
+        Unit vectors to neighbours and solid angles, with the effects on sight. Where a
+        share of them is late, a second set of columns holds that share.
+    spin : ndarray, shape (step, 2)
+        Cosine and sine of the angle by which base directions are turned; empty where no
+        effect turns them.
+    seen_sr : ndarray, shape (step, agent)
+        Solid angles as effects are given them.
     parts : ndarray, shape (step, component, 4)
         Components of effects: weight, unit vector, kappa.
     tilt, tilt_taken : ndarray, shape (step, cell) and (step,)
@@ -78,6 +92,10 @@ class View:
     parts: Floats
     tilt: Floats
     tilt_taken: Floats
+    seen_sr: Floats
+    spin: Floats
+    late: dict[int, tuple[Floats, Floats]] = dataclasses.field(default_factory=dict)
+    """What was perceived so many steps late, so that a fit looks but once."""
 
 
 def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> View:
@@ -91,18 +109,86 @@ def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> V
         A view of the model without effects, if there is one: sight is taken from it.
     """
     packed = pack([parameters], scene.arena)
-    turns, lag = scene.turns, int(packed.lags[0])
-    if seen is None or lag > 0:
-        toward, angle = perceive(scene.states, turns.at, turns.who, lag, cos_of(parameters.fov_rad))
-    else:
-        toward, angle = seen.toward, seen.angle_sr
-    if len(packed.sights):
-        changed = np.empty_like(angle)
-        attend(scene.states, turns.at, turns.who, packed, angle, changed)
-        angle = changed
-    parts = components_of(scene, packed, angle)
-    tilt, tilt_taken = factors_of(scene, packed, angle)
-    return View(toward=toward, angle_sr=angle, parts=parts, tilt=tilt, tilt_taken=tilt_taken)
+    lag, (share, felt_m, whole) = int(packed.lags[0]), packed.lates[0]
+    known = {} if seen is None else seen.late
+    fov_rad = parameters.fov_rad
+
+    def perceived(late: int) -> tuple[Floats, Floats]:
+        if late not in known:
+            turns = scene.turns
+            known[late] = perceive(scene.states, turns.at, turns.who, late, cos_of(fov_rad))
+        toward, angle = known[late]
+        return toward, attended(scene, packed, angle)
+
+    toward, angle = perceived(sees_late(packed))
+    own = angle
+    if lag > 0 and share > 0.0 and not sees_late(packed):
+        late_toward, late_angle = perceived(lag) if whole > 0.0 else (toward, angle)
+        if not whole > 0.0:
+            late_toward = _headed_late(scene, toward, lag, felt_m)
+        toward = np.concatenate([toward, late_toward], axis=1)
+        angle = np.concatenate([(1 - share) * angle, share * late_angle], axis=1)
+    parts = components_of(scene, packed, own)
+    tilt, tilt_taken = factors_of(scene, packed, own)
+    return View(
+        toward=toward,
+        angle_sr=angle,
+        parts=parts,
+        tilt=tilt,
+        tilt_taken=tilt_taken,
+        seen_sr=own,
+        spin=spin_of(scene, packed, own),
+        late=known,
+    )
+
+
+def spin_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
+    """Return cosine and sine of the angle that effects turn base directions by; or nothing."""
+    turns = scene.turns
+    spin = np.zeros((len(turns) if len(packed.rotations) else 0, 2))
+    if len(packed.rotations):
+        ask_rotations(scene.states, turns.at, turns.who, packed, angle_sr, spin)
+    return spin
+
+
+def sees_late(packed: Packed) -> int:
+    """Return by how many steps all that agents of a model see is late."""
+    share, _, whole = packed.lates[0]
+    return int(packed.lags[0]) if share >= 1.0 and whole > 0.0 else 0
+
+
+def _headed_late(scene: Scene, toward: Floats, lag: int, felt_m: float) -> Floats:
+    """Return unit vectors to where others were; to where they are who are near enough."""
+    turns, states = scene.turns, scene.states
+    then = states[np.maximum(turns.at - lag, 0)]
+    own = states[turns.at][:, [X, Y]][np.arange(len(turns)), :, turns.who]
+    away = then[:, [X, Y]] - own[:, :, None]
+    length = np.hypot(away[:, 0], away[:, 1])
+    near = states[turns.at][:, [X, Y]] - own[:, :, None]
+    near_m = np.hypot(near[:, 0], near[:, 1])
+    late = (near_m > max(felt_m, REPULSION_M)) & (length > 0.0) & (then[:, ZONE] > 0)
+    made = toward.copy()
+    made[late] = (away / np.maximum(length, 1e-12)[:, None]).transpose(0, 2, 1)[late]
+    return made
+
+
+def attended(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
+    """Return solid angles as a model's effects on sight change them.
+
+    Parameters
+    ----------
+    angle_sr : ndarray, shape (step, column)
+        One set of columns of the scene, or several side by side.
+    """
+    if not len(packed.sights):
+        return angle_sr
+    turns, n = scene.turns, scene.states.shape[2]
+    sets = []
+    for first in range(0, angle_sr.shape[1], n):
+        own = np.ascontiguousarray(angle_sr[:, first : first + n])
+        sets.append(np.empty_like(own))
+        attend(scene.states, turns.at, turns.who, packed, own, sets[-1])
+    return np.concatenate(sets, axis=1)
 
 
 def components_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
@@ -155,6 +241,14 @@ class ZoneTurns:
     taken: Floats
     share: NDArray[np.uint8]
     landing: NDArray[np.int64]
+
+    def base_of(self, view: View) -> Floats:
+        """Return the modes of the base law as a view's effects turn them."""
+        if not len(view.spin):
+            return self.base
+        c, s = view.spin[self.rows, 0, None], view.spin[self.rows, 1, None]
+        x, y = self.base[..., 0], self.base[..., 1]
+        return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
     @property
     def enough(self) -> bool:
@@ -218,8 +312,9 @@ def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats
     at_taken, over = np.empty((n, COLUMNS)), np.empty((n, n_zones, COLUMNS))
     tilt = view.tilt[turns.rows] if len(view.tilt) else view.tilt
     extended_sums(
-        turns.base, view.toward[turns.rows], view.angle_sr[turns.rows], turns.taken, turns.share,
-        view.parts[turns.rows], tilt, (own[0], own[1]), constants(own[:2]), at_taken, over,
+        turns.base_of(view), view.toward[turns.rows], view.angle_sr[turns.rows], turns.taken,
+        turns.share, view.parts[turns.rows], tilt, (own[0], own[1]), constants(own[:2]),
+        at_taken, over,
     )  # fmt: skip
     for column, slope, value in ((BASE, BASE_SLOPE, own[0]), (SOCIAL, SOCIAL_SLOPE, own[1])):
         mean_cosine = i1e(value) / i0e(value)
@@ -321,8 +416,8 @@ class Fitted:
             tilt = view.tilt[rows] if len(view.tilt) else view.tilt
             here = np.empty(len(rows))
             cell_table(
-                turns.base, view.toward[rows], view.angle_sr[rows], turns.taken, turns.share,
-                view.parts[rows], tilt, (own[0], own[1]), constants(own[:2]), own[2],
+                turns.base_of(view), view.toward[rows], view.angle_sr[rows], turns.taken,
+                turns.share, view.parts[rows], tilt, (own[0], own[1]), constants(own[:2]), own[2],
                 np.exp(x[3:-1]), some, share, here,
             )  # fmt: skip
             mixture[rows], probability[rows], taken[rows] = some, share, here

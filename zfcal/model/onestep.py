@@ -124,7 +124,9 @@ def _prepare(
     state[DT_S] = parameters.dt_s
     if not _settle_all(state, tank):
         raise InputError("Agents must be inside the arena, got one outside.")
-    return state, pack([parameters], arena), tank
+    packed = pack([parameters], arena)
+    # Of one step alone nobody knows where the others were: they count as having stood still.
+    return state, packed._replace(lags=np.zeros_like(packed.lags)), tank
 
 
 @kernel
@@ -157,7 +159,7 @@ def _draw(
     look(state, 0, packed, sight)
     random = seeded(seed)
     theta = np.empty(n)
-    count, total = gather(i, state, 0, packed, sight, work.parts)
+    count, total = gather(i, state, 0, packed, sight, work)
     density_on_grid(i, speed, state, 0, packed, tank, sight, work)
     for k in range(n):
         if grid:

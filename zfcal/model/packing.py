@@ -128,11 +128,13 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         cos_fov=np.broadcast_to(cos_fov, (n_models,)).copy(),
         dt_s=float(models[0].dt_s),
         lags=_lags(effects, models, n_models),
+        lates=_lates(effects, models, n_models),
         clock_s=np.array([0.0, 1.0]),
         components=_hooks(effects, "component"),
         factors=_hooks(effects, "factor"),
         speeds=_hooks(effects, "speed"),
         sights=_hooks(effects, "sight"),
+        rotations=_hooks(effects, "rotation"),
         effects=_effect_parameters(effects, models, n_models),
     )
 
@@ -189,6 +191,17 @@ def _lags(
             values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
             lags[model] = max(lags[model], min(LAG_MAX, round(values[effect.lag] / given.dt_s)))
     return lags
+
+
+def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: int) -> Floats:
+    """Return what each model sees late: the share, beyond which distance, and how much of it."""
+    made = np.tile([1.0, 0.0, 1.0], (n_models, 1))
+    for effect in effects:
+        for model in range(n_models if effect.lag is not None else 0):
+            given = models[model % len(models)].effects[effect.name]
+            values = dict(zip(effect.names, effect.values(given), strict=True))
+            made[model] = values[effect.strength], values["felt_m"], values["whole"]
+    return made
 
 
 def _effect_parameters(

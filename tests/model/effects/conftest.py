@@ -53,6 +53,10 @@ class Asked:
         """Return the factor on the speed."""
         return self.effect.speed.ctypes(*self._given(i), chance)
 
+    def rotation(self, *, i=0):
+        """Return the angle by which the base's directions are turned."""
+        return self.effect.rotation.ctypes(*self._given(i))
+
     def component(self, *, i=0):
         """Return weight, unit vector and kappa."""
         out = np.zeros(3)

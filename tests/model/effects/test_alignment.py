@@ -10,7 +10,7 @@ import pytest
 
 from zfcal.errors import InputError
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.onestep import heading_density
+from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.simulate import simulate_tracks
 
 
@@ -60,6 +60,39 @@ def test_all_headings_can_lean_toward_that_of_those_near(ask):
     ratio = asked.factor(math.pi / 2) / asked.factor(-math.pi / 2)
     assert ratio == pytest.approx(math.exp(1.2))
     assert asked.component()[0] == 0.0
+
+
+def test_all_can_turn_a_share_of_the_way(ask):
+    """Weight 20: a fifth of the right angle to the heading of who is near, not of who is far."""
+    given = {"weight": 20.0, "turning": 1.0}
+    rows = {"X": [0.0, 0.1, 0.2], "HX": [1.0, 0.0, -1.0], "HY": [0.0, 1.0, 0.0]}
+    asked = ask("alignment", given, **rows)
+    assert asked.rotation() == pytest.approx(0.2 * math.pi / 2)
+    assert asked.rotation(i=2) == pytest.approx(-0.2 * math.pi / 2)
+    assert asked.component()[0] == 0.0
+    assert asked.factor(1.0) == 1.0
+
+
+def test_along_a_wall_the_nearer_sense_is_preferred_instead(ask):
+    """Nothing is turned there; with the neighbour against it e^(2 x 20 / 100)."""
+    rows = {"X": [0.0, 0.1], "HX": [1.0, 0.0], "HY": [0.0, 1.0], "FOLLOWS": [1.0, 1.0]}
+    asked = ask("alignment", {"weight": 20.0, "turning": 1.0}, **rows)
+    assert asked.rotation() == 0.0
+    ratio = asked.factor(math.pi / 2) / asked.factor(-math.pi / 2)
+    assert ratio == pytest.approx(math.exp(0.4))
+
+
+def test_turned_fish_head_where_the_density_says(two_rooms, make_natural):
+    """The neighbour is behind and not seen. Draws against the density: laws 2 % apart at most."""
+    plain = make_natural(two_rooms)
+    model = dataclasses.replace(plain, effects={"alignment": {"weight": 40.0, "turning": 1.0}})
+    state = {"xy_m": [(0.22, 0.77), (0.14, 0.77)], "heading_rad": [0.0, 2.0], "speed_m_s": 0.05}
+    theta, density = heading_density(model, two_rooms, **state)
+    drawn = np.sort(draw_headings(model, two_rooms, n=20_000, seed=3, **state))
+    below = np.interp(drawn, theta, np.cumsum(density) * (theta[1] - theta[0]))
+    assert np.abs(below - (np.arange(len(drawn)) + 0.5) / len(drawn)).max() < 0.02
+    _, straight = heading_density(plain, two_rooms, **state)
+    assert abs(theta[density.argmax()] - theta[straight.argmax()] - 0.8) < 0.1
 
 
 def test_aligned_fish_are_more_polarised(two_rooms, make_natural):

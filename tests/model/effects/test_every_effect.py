@@ -86,7 +86,10 @@ def test_the_generic_family_says_target_and_cue():
     for effect in generic_effects():
         family, target, cue = effect.name.split(":")
         assert family == "generic"
-        assert target == ("speed" if effect.on_speed else "heading")
+        if effect.sight is not None:
+            assert target == "attention"
+        else:
+            assert target == ("speed" if effect.on_speed else "heading")
         assert cue
         assert find_effect(effect.name) is effect
         assert effect not in all_effects()

@@ -109,3 +109,23 @@ def test_who_sees_nobody_has_no_cue(ask, name):
     asked = ask(f"generic:{name}", STRENGTH, X=[0.0, 0.1])
     asked.sight[:] = 0.0
     assert asked.factor(0.0) == asked.factor(2.0) == 1.0
+
+
+def test_attention_follows_the_side(ask):
+    """A neighbour on the left gains e^0.5, one on the right loses as much, one ahead nothing."""
+    asked = ask(
+        "generic:attention:neighbour-side", {"strength": 0.5}, X=[0.0, 0.0, 0.0, 0.1],
+        Y=[0.0, 0.1, -0.1, 0.0],
+    )  # fmt: skip
+    found = [asked.sight_of(j) for j in (1, 2, 3)]
+    assert found == pytest.approx([math.exp(0.5), math.exp(-0.5), 1.0])
+
+
+def test_attention_follows_the_distance(ask):
+    """Far beyond the middle e^1, far within e^-1, at it 1."""
+    asked = ask(
+        "generic:attention:neighbour-distance", {"strength": 1.0, "middle_m": 0.1},
+        X=[0.0, 0.5, 0.1, 0.001],
+    )  # fmt: skip
+    found = [asked.sight_of(j) for j in (1, 2, 3)]
+    assert found == pytest.approx([math.e, 1.0, math.exp(-1.0)], rel=1e-2)

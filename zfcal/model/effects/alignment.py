@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
+from zfcal.model.compiled import hook, inlined
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import apart, needs_neighbour, tilt
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
-from zfcal.model.kernels.world import HX, HY, ZONE
+from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
+from zfcal.model.kernels.world import FOLLOWS, HX, HY, ZONE
 
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""
@@ -16,12 +16,13 @@ _USUAL_SR = 0.01
 
 _NEAR_M = 0.15
 _PER_WEIGHT = 0.03
+_WAY_PER_WEIGHT = 0.01
 
 
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
     """Add a component about the neighbours' mean heading; the more they agree, the heavier."""
-    if parameters[3] > 0.0:
+    if parameters[3] > 0.0 or parameters[4] > 0.0:
         return 0.0
     x, y = 0.0, 0.0
     for j in range(n):
@@ -38,21 +39,48 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
     return parameters[0] * length
 
 
-@hook(FACTOR)
-def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the mean heading of all that are near, seen or not."""
-    if not parameters[3] > 0.0:
-        return 1.0
+@inlined
+def near_heading(state: Hooked, n: int, i: int) -> tuple[float, float, float]:
+    """Return the sum of the headings of all that are near, seen or not, and how many."""
     x, y, near = 0.0, 0.0, 0.0
     for j in range(n):
         if j != i and state[ZONE * n + j] > 0.0 and apart(state, n, i, j) < _NEAR_M:
             x += state[HX * n + j]
             y += state[HY * n + j]
             near += 1.0
+    return x, y, near
+
+
+@hook(FACTOR)
+def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Weigh headings by the mean heading of all that are near; the sense along a wall too."""
+    leaning = _PER_WEIGHT * parameters[3]
+    if parameters[4] > 0.0 and state[FOLLOWS * n + i] > 0.0:
+        leaning = _WAY_PER_WEIGHT * parameters[4]
+    if not leaning > 0.0:
+        return 1.0
+    x, y, near = near_heading(state, n, i)
     if not near > 0.0:
         return 1.0
     most = math.sqrt(x * x + y * y) / near
-    return tilt(_PER_WEIGHT * parameters[0] * parameters[3], (x * ux + y * uy) / near, most)
+    return tilt(leaning * parameters[0], (x * ux + y * uy) / near, most)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn a share of the way to the mean heading of all that are near; not along a wall."""
+    if not parameters[4] > 0.0 or state[FOLLOWS * n + i] > 0.0:
+        return 0.0
+    x, y, near = near_heading(state, n, i)
+    hx, hy = state[HX * n + i], state[HY * n + i]
+    if not near > 0.0:
+        return 0.0
+    return (
+        _WAY_PER_WEIGHT
+        * parameters[0]
+        * parameters[4]
+        * math.atan2(hx * y - hy * x, hx * x + hy * y)
+    )
 
 
 EFFECT = Effect(
@@ -90,18 +118,28 @@ EFFECT = Effect(
             says="0: some headings are drawn about the mean heading of those that are seen; 1: all "
             "headings lean toward that of those within 0.15 m, by 0.03 nats per weight.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all turn toward the mean heading of those within 0.15 m, by a hundredth of "
+            "the way per weight; along a wall they prefer the sense that is nearer to it.",
+        ),
     ),
     strength="weight",
-    probe=0.05,
+    probe=0.5,
     component=component,
     factor=factor,
+    rotation=rotation,
     shapes=lambda _arena: (
         {"kappa": 3.0, "grading": 1.0},
         {"kappa": 12.0, "grading": 1.0},
         {"kappa": 3.0, "grading": 0.0},
         {"kappa": 12.0, "grading": 0.0},
         {"leaning": 1.0},
+        {"turning": 1.0},
     ),
     lacks=needs_neighbour,
-    fixed=("grading", "leaning"),
+    fixed=("grading", "leaning", "turning"),
 )

@@ -10,7 +10,9 @@ An effect adds to a step, by compiled C functions, any of:
 ``speed``
     a factor on the drawn speed;
 ``sight``
-    a factor on the solid angle at which a neighbour is seen.
+    a factor on the solid angle at which a neighbour is seen;
+``rotation``
+    an angle by which the directions of the base's law are turned to the left.
 
 ``lag``
     the name of a parameter in seconds: others are seen where they were then.
@@ -109,10 +111,12 @@ class Effect:
         Name of the parameter that is zero where the effect is absent.
     probe
         A strength so small that the effect is proportional to it.
-    component, factor, speed, sight
+    component, factor, speed, sight, rotation
         Compiled functions (`numba.cfunc`), None for what it does not touch.
     lag
-        Name of a parameter in seconds by which agents respond late.
+        Name of a parameter in seconds by which agents respond late; the strength is the
+        share of what they see that is late, and ``felt_m`` and ``whole`` say of whom and
+        what.
     shapes
         Of an arena: values of the other parameters at which the effect is asked for.
     lacks
@@ -141,6 +145,7 @@ class Effect:
     factor: Any = None
     speed: Any = None
     sight: Any = None
+    rotation: Any = None
     lag: str | None = None
     shapes: Callable[[Arena], Shapes] = _as_it_is
     lacks: Callable[[Company], str | None] = _always

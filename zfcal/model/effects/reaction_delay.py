@@ -11,18 +11,43 @@ EFFECT = Effect(
     reference="Nagy et al. 2010, Nature 464: 890-893",
     parameters=(
         EffectParameter(
+            name="share",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="Share of the attention to others that goes to where they were.",
+        ),
+        EffectParameter(
             name="delay_s",
             low=0.0,
             high=2.0,
             default=0.6,
             says="Age of what fish see of the others, in seconds; a whole number of steps.",
         ),
+        EffectParameter(
+            name="felt_m",
+            low=0.0,
+            high=0.2,
+            default=0.0,
+            says="Neighbours as near as that are felt at once, in metres.",
+        ),
+        EffectParameter(
+            name="whole",
+            low=0.0,
+            high=1.0,
+            default=1.0,
+            says="1: whom fish see, and how large, is of that moment; 0: the direction alone, and "
+            "near ones are felt at once.",
+        ),
     ),
-    strength="delay_s",
-    probe=0.2,
+    strength="share",
     lag="delay_s",
-    shapes=lambda _arena: tuple({"delay_s": delay} for delay in (0.2, 0.4, 0.6, 0.8, 1.2, 1.6)),
+    shapes=lambda _arena: tuple(
+        {"delay_s": delay_s, "felt_m": felt_m, "whole": whole}
+        for felt_m, whole in ((0.0, 1.0), (0.05, 0.0))
+        for delay_s in (0.2, 0.4, 0.6, 1.0, 1.6)
+    ),
     lacks=needs_neighbour,
     identity_s=2.4,
-    fixed=("delay_s",),
+    fixed=("delay_s", "felt_m", "whole"),
 )

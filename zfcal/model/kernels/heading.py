@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel
 from zfcal.model.geometry import Tank, best_within, zone_of
-from zfcal.model.kernels.hooks import call_component, call_factor, call_speed
+from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation, call_speed
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
 from zfcal.model.kernels.staircase import staircase_turn
@@ -20,6 +20,7 @@ from zfcal.model.kernels.world import (
     HY,
     KAPPA_BASE,
     KAPPA_F,
+    LATE_SHARE,
     LAW_BASE,
     LAW_F,
     PAST_HX,
@@ -33,6 +34,7 @@ from zfcal.model.kernels.world import (
     X,
     Y,
     sight_row,
+    splits,
 )
 
 REJECTIONS = 200
@@ -61,16 +63,16 @@ def draw_speed(
 
 @inlined
 def gather(
-    i: int, state: Floats, model: int, packed: Packed, sight: Sight, parts: Floats
+    i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work
 ) -> tuple[int, float]:
     """Write the components of an agent's heading mixture beyond the base.
 
     Parameters
     ----------
-    parts : ndarray, shape (agent + component, 5)
-        Receives weight, unit vector x and y, kappa of each component, and the
-        constant of its sampler, zero where the zone's table serves; the base
-        has weight one and is not among them.
+    work
+        Its ``parts`` receive weight, unit vector x and y, kappa of each component, and the
+        constant of its sampler, zero where the zone's table serves; the base has weight
+        one and is not among them.
 
     Returns
     -------
@@ -80,7 +82,9 @@ def gather(
     """
     zone = int(state[ZONE, i])
     alpha = packed.zones[model, zone, ALPHA]
-    kappa = packed.zones[model, zone, KAPPA_F]
+    kappa, parts = packed.zones[model, zone, KAPPA_F], work.parts
+    late = splits(model, packed)
+    now = 1.0 - packed.lates[model, LATE_SHARE] if late else 1.0
     n = state.shape[1]
     # Sight of all by all, or of this agent alone.
     row = sight_row(n, packed)
@@ -90,13 +94,20 @@ def gather(
     count, total = 0, 1.0
     for k in range(first, first + row):
         angle = sight.angle_sr[k]
-        if angle > 0.0:
-            weight = alpha * angle
+        weight = now * alpha * angle
+        if weight > 0.0:
             parts[count, 0] = weight
             parts[count, 1] = sight.dx_m[k] * sight.toward_per_m[k]
             parts[count, 2] = sight.dy_m[k] * sight.toward_per_m[k]
             parts[count, 3] = kappa
             parts[count, 4] = _TABLE
+            total += weight
+            count += 1
+    for k in range(i * n, (i + 1) * n if late else i * n):
+        weight = alpha * work.late[k, 0]
+        if weight > 0.0:
+            parts[count, 0], parts[count, 3], parts[count, 4] = weight, kappa, _TABLE
+            parts[count, 1], parts[count, 2] = work.late[k, 1], work.late[k, 2]
             total += weight
             count += 1
     for k in range(packed.components.shape[0]):
@@ -109,7 +120,27 @@ def gather(
             parts[count, 0], parts[count, 4] = weight, vonmises_r(parts[count, 3])
             total += weight
             count += 1
+    if packed.rotations.shape[0] > 0:
+        _spin(i, state, model, packed, sight, work)
     return count, total
+
+
+@inlined
+def _spin(i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
+    """Write the cosine and sine of the angle by which effects turn an agent's base law."""
+    angle = 0.0
+    for k in range(packed.rotations.shape[0]):
+        angle += call_rotation(
+            packed.rotations[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
+            state.shape[1], i, packed.effects[model, packed.rotations[k, 1]].ctypes.data,
+        )  # fmt: skip
+    work.spin[0], work.spin[1] = math.cos(angle), math.sin(angle)
+
+
+@inlined
+def _spun(x: float, y: float, work: Work) -> tuple[float, float]:
+    """Return a base direction turned by the angle that `gather` wrote."""
+    return work.spin[0] * x - work.spin[1] * y, work.spin[1] * x + work.spin[0] * y
 
 
 @kernel
@@ -143,15 +174,17 @@ def density_on_grid(
     Zero where the landing point is outside. Each von Mises density is scaled by
     its own sum over the grid, which for a smooth periodic function is exact.
     """
-    count, _ = gather(i, state, model, packed, sight, work.parts)
+    count, _ = gather(i, state, model, packed, sight, work)
     zone = int(state[ZONE, i])
     kappa = packed.zones[model, zone, KAPPA_BASE]
     work.density[:] = 0.0
     if tank.follows[zone]:
-        _add(work, 0.5, state[TAU_X, i], state[TAU_Y, i], kappa)
-        _add(work, 0.5, -state[TAU_X, i], -state[TAU_Y, i], kappa)
+        bx, by = _spun(state[TAU_X, i], state[TAU_Y, i], work)
+        _add(work, 0.5, bx, by, kappa)
+        _add(work, 0.5, -bx, -by, kappa)
     else:
-        _add(work, 1.0, state[HX, i], state[HY, i], kappa)
+        bx, by = _spun(state[HX, i], state[HY, i], work)
+        _add(work, 1.0, bx, by, kappa)
     for k in range(count):
         _add(work, work.parts[k, 0], work.parts[k, 1], work.parts[k, 2], work.parts[k, 3])
     reach = speed * packed.dt_s
@@ -243,6 +276,8 @@ def _draw_mixture(
                 cx, cy = -cx, -cy
         else:
             cx, cy = state[HX, i], state[HY, i]
+        if packed.rotations.shape[0] > 0:
+            cx, cy = _spun(cx, cy, work)
     else:
         level -= 1.0
         k = 0
@@ -304,7 +339,7 @@ def draw_move(
     Without an admissible direction the speed is redrawn, at most 50 times;
     then the agent stays: speed zero, the heading and zone that it has.
     """
-    count, total = gather(i, state, model, packed, sight, work.parts)
+    count, total = gather(i, state, model, packed, sight, work)
     factor = 1.0
     for k in range(packed.speeds.shape[0]):
         factor *= call_speed(

@@ -30,6 +30,9 @@ SPEED = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _F8)
 stays and keeps its heading.
 """
 
+ROTATION = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER)
+"""``angle(state, sight, n, i, parameters)`` by which the base's directions turn left."""
+
 SIGHT = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _I8)
 """``factor(state, sight, n, i, parameters, j)`` on the solid angle of neighbour j."""
 
@@ -70,6 +73,12 @@ def call_factor(_context, at, state, sight, n, i, parameters, ux, uy, speed, lan
 def call_speed(_context, at, state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]
     """Call a function of kind `SPEED` at an address."""
     return _call(SPEED)
+
+
+@intrinsic
+def call_rotation(_context, at, state, sight, n, i, parameters):  # type: ignore[no-untyped-def]
+    """Call a function of kind `ROTATION` at an address."""
+    return _call(ROTATION)
 
 
 @intrinsic

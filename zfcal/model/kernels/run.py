@@ -19,6 +19,7 @@ from zfcal.model.kernels.world import (
     GRID,
     HX,
     HY,
+    LATE_WHOLE,
     SPEED,
     STATES,
     TIME,
@@ -31,9 +32,11 @@ from zfcal.model.kernels.world import (
     look,
     look_back,
     make_work,
+    note_late,
     place,
     remember,
     settle,
+    splits,
 )
 
 Floats = NDArray[np.float64]
@@ -81,15 +84,26 @@ def advance(
 
 @inlined
 def see_late(state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
-    """Look at where the others were some steps ago, and keep where all are now."""
+    """Look at where the others were some steps ago, and keep where all are now.
+
+    Where but a share is late, that goes to ``work.late``, and sight is of the present.
+    """
     slots = work.past.shape[0]
     step = int(work.steps[0])
     for i in range(state.shape[1]):
         work.past[step % slots, 0, i], work.past[step % slots, 1, i] = state[X, i], state[Y, i]
         work.past[step % slots, 2, i], work.past[step % slots, 3, i] = state[HX, i], state[HY, i]
     seen = max(0, step - packed.lags[model]) % slots
-    look_back(state, work.past, seen, model, packed, sight)
     work.steps[0] = step + 1.0
+    late = packed.lates[model]
+    if late[LATE_WHOLE] > 0.0:
+        look_back(state, work.past, seen, model, packed, sight)
+    else:
+        look(state, model, packed, sight)
+    if splits(model, packed):
+        note_late(state, work.past, seen, late, sight, work.late)
+        if late[LATE_WHOLE] > 0.0:
+            look(state, model, packed, sight)
 
 
 @inlined

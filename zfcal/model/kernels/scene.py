@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel
 from zfcal.model.geometry import Tank, zone_of
-from zfcal.model.kernels.hooks import call_component, call_factor, call_sight, call_speed
+from zfcal.model.kernels.hooks import (
+    call_component,
+    call_factor,
+    call_rotation,
+    call_sight,
+    call_speed,
+)
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.kernels.world import (
     DT_S,
@@ -201,6 +207,32 @@ def ask_components(
             )  # fmt: skip
             parts[s, h, 0] = max(weight, 0.0)
             parts[s, h, 1], parts[s, h, 2], parts[s, h, 3] = out[0], out[1], out[2]
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_rotations(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, spin: Floats
+) -> None:
+    """Write the cosine and sine of the angle by which effects turn the base's directions.
+
+    Parameters
+    ----------
+    spin : ndarray, shape (step, 2)
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i, angle = who[s], 0.0
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.rotations.shape[0]):
+            angle += call_rotation(
+                packed.rotations[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.rotations[h, 1]].ctypes.data,
+            )  # fmt: skip
+        spin[s, 0], spin[s, 1] = math.cos(angle), math.sin(angle)
         for j in range(n):
             row[i * n + j] = 0.0
 

@@ -43,6 +43,10 @@ LAG_MAX = 10
 # Columns of a zone's parameters.
 KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
 
+# What is late of what agents see: which share; beyond which distance; and whether who is seen,
+# and how large, is late too, or the direction alone.
+LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_COLUMNS = range(4)
+
 # Laws of a zone's tables of von Mises draws.
 LAW_BASE, LAW_F, LAWS = range(3)
 
@@ -69,10 +73,12 @@ class Packed(NamedTuple):
         The step, the same for all.
     lags : ndarray of int64, shape (model,)
         Steps by which agents respond late: others are seen where they were then.
+    lates : ndarray, shape (model, 3)
+        Columns LATE_SHARE, LATE_FELT_M, LATE_WHOLE.
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
-    components, factors, speeds, sights : ndarray of int64, shape (hook, 2)
+    components, factors, speeds, sights, rotations : ndarray of int64, shape (hook, 2)
         Address of an effect's function and its row of ``effects``.
     effects : ndarray, shape (model, effect, 8)
         Parameters of the effects.
@@ -86,11 +92,13 @@ class Packed(NamedTuple):
     cos_fov: Floats
     dt_s: float
     lags: Ints
+    lates: Floats
     clock_s: Floats
     components: Ints
     factors: Ints
     speeds: Ints
     sights: Ints
+    rotations: Ints
     effects: Floats
 
 
@@ -107,7 +115,7 @@ class Work(NamedTuple):
     ----------
     moves : ndarray, shape (agent, 4)
         Unit vector x and y of the next heading, landing zone, speed.
-    parts : ndarray, shape (agent + component, 5)
+    parts : ndarray, shape (2 agents + components, 5)
         The heading mixture of one agent.
     zones : ndarray, shape (agent,)
         Zone ids before the step.
@@ -117,6 +125,10 @@ class Work(NamedTuple):
         Where all were at former steps; see `look_back`.
     steps : ndarray, shape (1,)
         Steps done since the start, for models that respond late.
+    spin : ndarray, shape (2,)
+        Cosine and sine of the angle by which effects turn an agent's base directions.
+    late : ndarray, shape (agent * agent, 3)
+        Of what is late: its share of the solid angle, and the unit vector.
     """
 
     moves: Floats
@@ -128,6 +140,8 @@ class Work(NamedTuple):
     density: Floats
     past: Floats
     steps: Floats
+    spin: Floats
+    late: Floats
 
 
 @kernel
@@ -135,9 +149,10 @@ def make_work(n: int, n_components: int, grid: int) -> Work:
     """Return room for n agents, so many components of effects, and a grid of angles."""
     angles = np.linspace(-math.pi, math.pi, grid + 1)
     return Work(
-        np.zeros((n, 4)), np.zeros((n + n_components, 5)), np.zeros(n),
+        np.zeros((n, 4)), np.zeros((2 * n + n_components, 5)), np.zeros(n),
         np.cos(angles), np.sin(angles), np.zeros(grid + 1), np.zeros(grid + 1),
-        np.zeros((LAG_MAX + 1, 4, n)), np.zeros(1),
+        np.zeros((LAG_MAX + 1, 4, n)), np.zeros(1), np.array([1.0, 0.0]),
+        np.zeros((n * n, 3)),
     )  # fmt: skip
 
 
@@ -248,6 +263,41 @@ def look_back(
     see(sight, packed.cos_fov[model])
     if packed.sights.shape[0] > 0:
         _attend(state, model, packed, sight)
+
+
+@inlined
+def splits(model: int, packed: Packed) -> bool:
+    """Tell whether some of what agents see is late, and some is not."""
+    late = packed.lates[model]
+    return packed.lags[model] > 0 and (late[LATE_SHARE] < 1.0 or late[LATE_WHOLE] == 0.0)
+
+
+@inlined
+def note_late(
+    state: Floats, past: Floats, slot: int, late: Floats, sight: Sight, out: Floats
+) -> None:
+    """Write the late share of what each agent sees, to be added to the rest of it.
+
+    Parameters
+    ----------
+    late
+        A row of ``packed.lates``. Where all is late, sight is of that time; else it is of
+        now, and those that are near enough to be felt are headed for where they are.
+    out
+        ``work.late``.
+    """
+    n = state.shape[1]
+    for k in range(n * n):
+        i, j = k // n, k % n
+        out[k, 0] = late[LATE_SHARE] * sight.angle_sr[k]
+        out[k, 1] = sight.dx_m[k] * sight.toward_per_m[k]
+        out[k, 2] = sight.dy_m[k] * sight.toward_per_m[k]
+        away = math.hypot(sight.dx_m[k], sight.dy_m[k])
+        if late[LATE_WHOLE] == 0.0 and away > late[LATE_FELT_M] and sight.toward_per_m[k] > 0.0:
+            dx, dy = past[slot, 0, j] - state[X, i], past[slot, 1, j] - state[Y, i]
+            length = math.hypot(dx, dy)
+            if length > 0.0:
+                out[k, 1], out[k, 2] = dx / length, dy / length
 
 
 @inlined
