@@ -44,12 +44,13 @@ def named(ask, record):
 
 
 def test_an_effect_is_named_and_measured(named):
-    """First of all, with 0.4 in its interval, and in the extended model."""
+    """First of all, 0.4 within three standard errors, and in the extended model."""
     assert named.verdict is Verdict.NAMED
     effect = named.effects[0]
     assert effect.name == "turning-bias"
     low, high = effect.interval["strength"]
-    assert low < 0.4 < high
+    assert low < effect.strength["strength"] < high
+    assert abs(effect.strength["strength"] - 0.4) < 1.5 * (high - low) / 2
     assert effect.ties == ()
     assert effect.p < 1e-6
     assert effect.gain_nats_per_step > 4 * effect.gain_se > 0
@@ -183,3 +184,24 @@ def test_a_constant_speed_is_no_trouble(ask, worlds):
     assert all(math.isfinite(each.z) and 0 <= each.p <= 1 for each in asked)
     for effect in found.effects:
         assert all(math.isfinite(value) for value in effect.strength.values())
+
+
+def test_a_quick_answer_does_not_name_the_trackers_noise(ask, record):
+    """Taken for exact, positions that err by 1.5 mm show an effect; known to err, they do not."""
+    exact = record(41, minutes=8.0)
+    wrong_m = np.random.default_rng(4).normal(0.0, 0.0015, exact.xy_m.shape)
+    noisy = dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m)
+    assert ask(noisy, noise_m=0.0).effects
+    held = ask(noisy, noise_m=0.0015)
+    assert held.effects == ()
+    (null,) = (note for note in held.notes if note.name == "null")
+    assert null.values["replicates"] == 6
+
+
+def test_a_clear_effect_is_named_in_spite_of_noise(ask, record):
+    """Half a millimetre, and six replicates."""
+    exact = record(23, BIAS, minutes=6.0)
+    wrong_m = np.random.default_rng(4).normal(0.0, 0.0005, exact.xy_m.shape)
+    found = ask(dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m), noise_m=0.0005)
+    assert found.effects[0].name == "turning-bias"
+    assert found.effects[0].ties == ()

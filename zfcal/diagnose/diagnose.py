@@ -6,9 +6,11 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from zfcal.diagnose.candidates import Candidate, askable, candidates_of, company_of
 from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
@@ -62,6 +64,11 @@ _GENERIC_REPLICATES = 8
 _AT_LARGE_REPLICATES = 20
 """Replicates that are asked in general as well: where, and whether at all."""
 
+_QUICK_REPLICATES = 6
+_QUICK_Z = 2.5
+"""Where positions are not sharp, a quick answer holds what is larger than that against a few
+replicates."""
+
 _NOTICED = 5.0
 """Standard errors at which an effect of notable strength must stand to be testable."""
 
@@ -77,11 +84,11 @@ class _Row:
     """What one replicate says, or the measured tracks themselves."""
 
     listed: Floats
-    controls: Floats
+    controls: Floats | None
     at_large: tuple[Residuals, dict[str, float]] | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Case:
     """A question, its scene, the fitted model, and the families that are asked for."""
 
@@ -98,14 +105,16 @@ class _Case:
         scene, fitted, table = screen.scene, screen.fitted, screen.probability
         return residuals(scene, fitted, table=table), statistics(scene, fitted, rng, table=table)
 
+    @cached_property
     def chain(self) -> Chain:
-        """Return what makes replicates of the fitted model."""
+        """What makes replicates of the fitted model."""
         return Chain(
             samples=self.question.samples,
             arena=self.question.arena,
             fitted=self.screen.fitted,
             measurement=Measurement(noise_m=_noise(self.question), grain_m=self.question.grain_m),
             seed=self.question.seed,
+            keeps=_QUICK_REPLICATES if self.question.quick else 0,
         )
 
 
@@ -128,7 +137,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     case = _open(question)
     tell("fitting", 1, 1)
     scores = ask_all(case.screen, case.listed, question.n_workers)
-    asked = _best_shapes(scores)
+    asked = _asked(question, scores)
     rows = _null_rows(case, asked, tell)
     names = tuple(each.name for each in asked)
     own = case.at_large(0, case.screen)
@@ -154,37 +163,55 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 
 def _is_suspicious(question: Question, omnibus: Omnibus) -> bool:
     """Tell whether model and data disagree at all; noise does, for the theory alone."""
-    noise_m = math.inf if question.noise_m is None else question.noise_m
-    sees = not question.quick or noise_m <= _SHARP_M
-    return sees and omnibus.p < _UNEXPLAINED
+    sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
+    return (not question.quick or sharp) and omnibus.p < _UNEXPLAINED
 
 
-def _best_shapes(scores: Sequence[Score]) -> tuple[Candidate, ...]:
-    """Return each effect at the shape that the recording asks for most."""
+def _has_noise(question: Question) -> bool:
+    """Tell whether positions are known to err by so much that the theory alone is no null."""
+    return question.noise_m is not None and question.noise_m > _SHARP_M
+
+
+def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]:
+    """Return which effects are held against replicates, each at its best shape.
+
+    A quick answer asks those alone that would be taken for missing, and what is near that.
+    """
+    best = _best_shapes(scores)
+    if not question.quick:
+        return tuple(candidate for _, candidate in best)
+    clear = -stats.norm.ppf(LEVEL / 2 / max(len(scores), 1))
+    if not _has_noise(question) or not any(z > clear for z, _ in best):
+        return ()
+    return tuple(candidate for z, candidate in best if z > _QUICK_Z)
+
+
+def _best_shapes(scores: Sequence[Score]) -> list[tuple[float, Candidate]]:
+    """Return each effect at the shape that the recording asks for most, after its z."""
     best: dict[str, tuple[float, Candidate]] = {}
     for score in scores:
         z = abs(score.z) if score.candidate.signed else score.z
         if score.candidate.name not in best or z > best[score.candidate.name][0]:
             best[score.candidate.name] = (z, score.candidate)
-    return tuple(candidate for _, candidate in best.values())
+    return list(best.values())
 
 
 def _null_rows(case: _Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row]:
     question = case.question
-    if question.quick:
+    if not asked:
         return []
+    n_at_large = 0 if question.quick else _AT_LARGE_REPLICATES
 
     def ask(number: int, screen: Screen) -> _Row:
-        at_large = case.at_large(number + 1, screen) if number < _AT_LARGE_REPLICATES else None
         return _Row(
             listed=np.array([screen.ask(each).z for each in asked]),
-            controls=ask_controls(screen, question.seed),
-            at_large=at_large,
+            controls=None if question.quick else ask_controls(screen, question.seed),
+            at_large=case.at_large(number + 1, screen) if number < n_at_large else None,
         )
 
-    n = question.n_null
+    n = _QUICK_REPLICATES if question.quick else question.n_null
     return run_null(
-        case.chain(),
+        case.chain,
         ask,
         n,
         n_workers=question.n_workers,
@@ -206,14 +233,15 @@ def _rivals(case: _Case, screen: Screen) -> list[Best]:
     alone = Asked(candidates=case.generic, names=(), null=theory(0))
     found = best_of(alone, ask_all(screen, case.generic, question.n_workers))
     found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
-    if question.quick or not found:
+    if not found or (question.quick and not _has_noise(question)):
         return found
     asked = tuple(best.score.candidate for best in found)
 
     def ask(_number: int, other: Screen) -> Floats:
         return np.array([other.ask(each).z for each in asked])
 
-    rows = run_null(case.chain(), ask, _GENERIC_REPLICATES, n_workers=question.n_workers)
+    n = _QUICK_REPLICATES if question.quick else _GENERIC_REPLICATES
+    rows = run_null(case.chain, ask, n, n_workers=question.n_workers)
     names = tuple(each.name for each in asked)
     family = Asked(candidates=case.generic, names=names, null=_null(rows, names))
     return best_of(family, [best.score for best in found])
@@ -377,7 +405,8 @@ def _noise_note(question: Question) -> Note:
 
 def _controls_note(case: _Case, rows: Sequence[_Row], final: Screen) -> Note:
     z = ask_controls(final, case.question.seed)
-    null = from_replicates(np.array([row.controls for row in rows])) if rows else theory(len(z))
+    drawn = [row.controls for row in rows if row.controls is not None]
+    null = from_replicates(np.array(drawn)) if drawn else theory(len(z))
     own = null.standardised(z)
     fired = [name for name, value in zip(NAMES, own, strict=True) if abs(value) > _CONTROL]
     text = "Negative controls are silent, as they must be."

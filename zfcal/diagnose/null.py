@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
@@ -188,6 +188,8 @@ class Chain:
         Noise and grain.
     seed
         Of the trial.
+    keeps
+        Replicates below this number are kept, to be asked again.
     """
 
     samples: Samples
@@ -195,9 +197,19 @@ class Chain:
     fitted: Fitted
     measurement: Measurement
     seed: int
+    keeps: int = 0
+    kept: dict[int, Screen] = field(default_factory=dict)
 
     def screen(self, number: int) -> Screen:
         """Return replicate ``number``, fitted and ready to be asked."""
+        if number in self.kept:
+            return self.kept[number]
+        made = self._made(number)
+        if number < self.keeps:
+            self.kept[number] = made
+        return made
+
+    def _made(self, number: int) -> Screen:
         word = int(np.random.SeedSequence([self.seed, 7, number]).generate_state(1)[0])
         made = replicate(self.samples, self.arena, self.fitted, self.measurement, seed=word)
         scene = make_scene(made, self.arena)

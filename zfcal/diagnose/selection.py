@@ -9,6 +9,7 @@ asked again, until nothing is left.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,6 +33,10 @@ _LEAST_NATS = 6.0
 _LEAST_SHARE = 0.15
 """A further effect must gain this share of the first one's nats: an effect whose true form
 is a little different from its mechanism leaves something over that others answer to."""
+
+_IN_REACH = 0.5
+"""Share of the clearest one's standard errors below which a suspect is not put into the model:
+it would have to gain four times what its score promises."""
 
 _STANDS = 3.0
 _RIVAL_AHEAD = 3.0
@@ -106,6 +111,11 @@ def best_of(asked: Asked, scores: Sequence[Score]) -> list[Best]:
         if name not in found or abs(own) > abs(found[name].z):
             found[name] = Best(score=score, z=float(own), p=float(chance))
     return sorted(found.values(), key=lambda best: -abs(best.z))
+
+
+def _in_reach(ranked: Sequence[Best]) -> list[Best]:
+    """Return the suspects that could turn out to be the clearest one, of a ranked list."""
+    return [best for best in ranked if abs(best.z) >= _IN_REACH * abs(ranked[0].z)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -201,7 +211,7 @@ class Selector:
     def _step(self, screen: Screen, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
         taken = {step.choice.best.name for step in done}
         open_ = [best for best in ranked if best.score.candidate.name not in taken]
-        suspects = [best for best in open_ if best.p < LEVEL][:_SUSPECTS]
+        suspects = _in_reach([best for best in open_ if best.p < LEVEL])[:_SUSPECTS]
         worth = bool(suspects) or (self.suspicious and not done)
         rivals = self._rivals(screen, taken) if worth else []
         least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
@@ -215,11 +225,12 @@ class Selector:
 
     def _rivals(self, screen: Screen, taken: set[str]) -> list[Best]:
         found = (best for best in self.rivals(screen) if best.score.candidate.name not in taken)
-        return [best for best in found if abs(best.z) > RIVAL_Z][:RIVALS]
+        return _in_reach([best for best in found if abs(best.z) > RIVAL_Z])[:RIVALS]
 
     def _refits(self, screen: Screen, bests: Sequence[Best], least: float) -> list[Refit]:
-        made = [refit(screen, best.score) for best in bests]
-        return [each for each in made if each.nats > least]
+        with ThreadPoolExecutor(max(1, self.n_workers)) as pool:
+            made = pool.map(lambda best: refit(screen, best.score), bests)
+            return [each for each in made if each.nats > least]
 
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
         if not listed:
