@@ -76,7 +76,7 @@ def test_numbers_go_out_as_json(zfcal, tank, film):
 
 
 def test_a_killed_run_goes_on_and_ends_in_the_same_bytes(zfcal, tank, film, command, tmp_path):
-    """kill -9 in the second minute."""
+    """By kill -9, in the second minute."""
     running = subprocess.Popen(
         [*command, *words(film)], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

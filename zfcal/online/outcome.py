@@ -74,7 +74,7 @@ class Outcome:
         self._told = 0
         self._before: Image | None = None
         self._last: tuple[int, float] | None = None
-        self._led_s: float | None = None
+        self._leds: tuple[int, float] | None = None
         self._took_s: deque[float] = deque(maxlen=_LATENCIES)
 
     def begin(self, overhead: Feed, below: Below | None) -> None:
@@ -92,7 +92,8 @@ class Outcome:
             words.append("after a gap")
         self._before, self._last = frame.image, (frame.number, frame.time_s)
         self._exact += len(poses.agents) == self._plan.opened.trial.n_agents
-        self._look_for_leds(frame)
+        if self._leds_are_gone(frame):
+            words.append("no LED")
         for word in words:
             self._count(word, frame)
         self._tell_notes()
@@ -160,16 +161,14 @@ class Outcome:
         )
         self._tell(Note(text=text, warning=True))
 
-    def _look_for_leds(self, frame: Frame) -> None:
+    def _leds_are_gone(self, frame: Frame) -> bool:
+        """Return whether no LED was seen for five seconds."""
         if self._below is None:
-            return
+            return False
         seen = self._below.counts["one LED"] + self._below.counts["two LEDs"]
-        if self._led_s is None or seen != self._leds:
-            self._led_s, self._leds = frame.time_s, seen
-        elif frame.time_s - self._led_s > _NO_LED_S:
-            self._count("no LED", frame)
-
-    _leds = -1
+        if self._leds is None or seen != self._leds[0]:
+            self._leds = (seen, frame.time_s)
+        return frame.time_s - self._leds[1] > _NO_LED_S
 
     def _tell_notes(self) -> None:
         notes = [note for feed in self._feeds for note in feed.source.notes]
