@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,41 @@ import click
 from .options import EXISTING, PLACE
 
 if TYPE_CHECKING:
-    from zfcal.online.film import FilmOptions
+    from zfcal.vision.look import Look
 
 Command = Callable[..., None]
 
-_NEEDS_VIDEO = ("look", "photograph", "changes")
-
 
 def film_options(command: Command) -> Command:
-    """Add --video, --video-file, --look, --draw and --photograph."""
+    """Add --video, --video-file, --look, --draw and --photograph, as ``film``."""
+
+    @functools.wraps(command)
+    def run(
+        *args: Any,
+        video: bool,
+        video_file: Path | None,
+        look: str | None,
+        changes: tuple[str, ...],
+        photograph: Path | None,
+        **options: Any,
+    ) -> None:
+        given = {"--look": look, "--draw": changes, "--photograph": photograph}
+        film = None
+        if video or video_file is not None:
+            from zfcal.online.film import FilmOptions
+
+            film = FilmOptions(
+                look=_look(look, changes),
+                photograph=photograph,
+                seed=options["seed"],
+                video=video_file,
+            )
+        elif any(given.values()):
+            name = next(name for name, value in given.items() if value)
+            raise click.UsageError(f"{name} is about images: add --video.")
+        command(*args, film=film, **options)
+
+    decorated: Command = run
     for option in reversed(
         (
             click.option("--video", is_flag=True, help="Also draw what the cameras see."),
@@ -50,30 +77,14 @@ def film_options(command: Command) -> Command:
             ),
         )
     ):
-        command = option(command)
-    return command
+        decorated = option(decorated)
+    return decorated
 
 
-def filmed(*, video: bool, video_file: Path | None, **given: Any) -> FilmOptions | None:
-    """Return what is to be drawn; None if nothing is.
-
-    Raises
-    ------
-    UsageError
-        An option about images is given, and no images are asked for.
-    """
-    if not video and video_file is None:
-        for name in _NEEDS_VIDEO:
-            if given[name]:
-                option = "--draw" if name == "changes" else f"--{name}"
-                raise click.UsageError(f"{option} is about images: add --video.")
-        return None
-    from zfcal.online.film import FilmOptions
+def _look(preset: str | None, changes: tuple[str, ...]) -> Look:
     from zfcal.vision.look import USUAL, look_of
 
-    changes = dict(_change(text) for text in given["changes"])
-    look = look_of(given["look"] or USUAL, changes)
-    return FilmOptions(look=look, photograph=given["photograph"], seed=given["seed"])
+    return look_of(preset or USUAL, dict(map(_change, changes)))
 
 
 def _change(text: str) -> tuple[str, Any]:

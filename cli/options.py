@@ -88,6 +88,39 @@ def arena_options(command: Command) -> Command:
     return command
 
 
+def new_trial_options(command: Command) -> Command:
+    """Add what a simulation may say of a trial that it makes, handed over as ``new``."""
+
+    @functools.wraps(command)
+    def run(
+        *args: Any,
+        arena: str | None,
+        n_fish: int | None,
+        robot: bool,
+        n_robots: int | None,
+        fps: float | None,
+        **options: Any,
+    ) -> None:
+        n_robots = count_robots(robot=robot, n_robots=n_robots)
+        new = {"arena": arena, "n_fish": n_fish, "n_robots": n_robots, "fps": fps}
+        command(*args, new=new, **options)
+
+    decorated: Command = run
+    for option in reversed(
+        (
+            click.option(
+                "--arena", metavar="NAME|FILE", help="Arena of a new trial; default: the model's."
+            ),
+            click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Its fish."),
+            click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
+            click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Its robots."),
+            click.option("--fps", type=float, help="Its frame rate, in hertz."),
+        )
+    ):
+        decorated = option(decorated)
+    return decorated
+
+
 def count_robots(*, robot: bool, n_robots: int | None) -> int | None:
     """Return the number of robots that --robot and --robots ask for; None if neither does."""
     if robot and n_robots not in (None, 1):

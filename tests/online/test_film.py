@@ -241,9 +241,10 @@ def test_a_dry_run_says_what_would_be_drawn(home, tmp_path, heard, read_all):
     root = tmp_path / "t"
     dry = Task(dry_run=True)
 
-    def planned(options, look=PLAIN, **more):
+    def planned(options, look=PLAIN, video=None):
         heard.clear()
-        simulate_on_film(root, options, FilmOptions(look=look), heard.append, task=dry, **more)
+        wanted = FilmOptions(look=look, video=video)
+        simulate_on_film(root, options, wanted, heard.append, task=dry)
         return {e.path.relative_to(tmp_path).as_posix() for e in heard if isinstance(e, Planned)}
 
     video = tmp_path / "v.avi"
@@ -331,8 +332,8 @@ def test_a_photograph_lies_under_the_fish(home, tmp_path):
 def test_a_plain_video_holds_the_same_pixels(home, tmp_path, heard, ending):
     """As many frames as the tracks, at the trial's rate, bit by bit; made once."""
     root, video = tmp_path / "t", tmp_path / f"v{ending}"
-    drawn = FilmOptions(look=look_of(USUAL))
-    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append, video=video)
+    drawn = FilmOptions(look=look_of(USUAL), video=video)
+    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append)
     for camera, path in exported_paths(video, ("overhead", "below")).items():
         reader = cv2.VideoCapture(str(path))
         assert reader.get(cv2.CAP_PROP_FPS) == 15
@@ -345,7 +346,7 @@ def test_a_plain_video_holds_the_same_pixels(home, tmp_path, heard, ending):
     note = json.loads((tmp_path / f"v{ending}.json").read_text())
     assert note["lineage"]["inputs"].keys() == {"frames/overhead/000000.mcap"}
     heard.clear()
-    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append, video=video)
+    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append)
     assert {type(event) for event in heard} == {UpToDate}
     video.unlink()
     heard.clear()
@@ -366,7 +367,7 @@ def test_a_video_of_another_kind_is_refused_before_anything_is_done(home, tmp_pa
     """With the kinds that there are."""
     root = tmp_path / "t"
     with pytest.raises(InputError, match="no video file that can be written") as error:
-        simulate_on_film(root, of(home), FilmOptions(), say_nothing, video=tmp_path / "v.gif")
+        simulate_on_film(root, of(home), FilmOptions(video=tmp_path / "v.gif"), say_nothing)
     assert ".avi, .mkv, .mp4" in error.value.hint
     assert not root.exists()
     create_trial(root, NewTrial(n_fish=1, fps=15.0, arena="two-rooms"), say_nothing)

@@ -63,11 +63,14 @@ class FilmOptions:
         Of the empty tank from above, instead of a drawn one.
     seed
         Of noise, patterns and postures; None for the trial's.
+    video
+        A plain video file to make of the images as well; see `film_export`.
     """
 
     look: Look = dataclasses.field(default_factory=lambda: look_of(USUAL))
     photograph: Path | None = None
     seed: int | None = None
+    video: Path | None = None
 
 
 def camera_names(n_robots: int) -> tuple[str, ...]:

@@ -19,16 +19,15 @@ RIG_FPS = 15.0
 """Frame rate of the rig's cameras, in hertz."""
 
 
-def simulate_on_film(  # noqa: PLR0913 - those of `simulate`, and the images'
+def simulate_on_film(
     root: Path,
     options: SimulateOptions,
-    filmed: FilmOptions,
+    filmed: FilmOptions | None,
     tell: Tell,
     *,
     task: Task | None = None,
-    video: Path | None = None,
 ) -> None:
-    """Simulate a trial, and draw the camera images of its tracks.
+    """Simulate a trial, and draw the camera images of its tracks if they are asked for.
 
     Parameters
     ----------
@@ -37,18 +36,20 @@ def simulate_on_film(  # noqa: PLR0913 - those of `simulate`, and the images'
     options
         What to simulate.
     filmed
-        What to draw.
+        What to draw; None for tracks alone.
     tell
         Hears of every file.
     task
         How to go about it.
-    video
-        A plain video file to make of the images as well.
     """
     task = task or Task()
+    if filmed is None:
+        simulate(root, options, tell, task=task)
+        return
     new = not (root / "trial.toml").exists()
     # What cannot be drawn is said before anything is simulated.
     photograph_of(filmed)
+    video = filmed.video
     if video is not None:
         exported_paths(video, camera_names(1))
     if new and options.fps is None:
