@@ -140,9 +140,11 @@ class _Canvas:
         rings = [
             self._points(ring)
             for part in shapely.get_parts(area)
+            if not part.is_empty
             for ring in (part.exterior, *part.interiors)
         ]
-        cv2.fillPoly(self._fine, rings, _level(grey), shift=_SHIFT)
+        if rings:
+            cv2.fillPoly(self._fine, rings, _level(grey), shift=_SHIFT)
 
     def draw(self, lines: shapely.Geometry, grey: float, *, width_m: float) -> None:
         """Draw lines as wide as they are in the tank."""
