@@ -9,7 +9,7 @@ down; angles turn from x towards y, as the eye sees them: clockwise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -69,6 +69,8 @@ class Blob:
     contour : ndarray of int32, shape (point, 2)
     corners : ndarray, shape (corner, 2)
         The strongest first.
+    box
+        Left, top, width and height of the contour.
     """
 
     pixels: Floats
@@ -76,16 +78,12 @@ class Blob:
     darkness: float
     contour: NDArray[np.int32]
     corners: Floats
+    box: tuple[int, int, int, int]
 
     @property
     def area_px(self) -> float:
         """Pixels that it covers, those along the edge in part."""
         return float(self.weights.sum())
-
-    @property
-    def bounds(self) -> tuple[Floats, Floats]:
-        """The least and the largest x and y of its pixels."""
-        return self.pixels.min(axis=0), self.pixels.max(axis=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,7 +196,7 @@ def find_blobs(view: Contrast, *, min_blob_px: float, corners: Corners | None = 
 
 def _blob(view: Contrast, contour: NDArray[np.int32]) -> Blob | None:
     """Return what lies within a contour; None where nothing of it is surely animal."""
-    x0, y0, width, height = cv2.boundingRect(contour)
+    x0, y0, width, height = (int(value) for value in cv2.boundingRect(contour))
     # A pixel wider: the edge of a body is a share of the pixels around its mask.
     left, top = max(x0 - 1, 0), max(y0 - 1, 0)
     crop = np.s_[top : y0 + height + 1, left : x0 + width + 1]
@@ -221,6 +219,7 @@ def _blob(view: Contrast, contour: NDArray[np.int32]) -> Blob | None:
         darkness=darkness,
         contour=contour.reshape(-1, 2),
         corners=np.empty((0, 2)),
+        box=(x0, y0, width, height),
     )
 
 
@@ -232,21 +231,13 @@ def _with_corners(view: Contrast, blobs: list[Blob], how: Corners) -> list[Blob]
     for blob, (points, quality) in zip(blobs, found, strict=True):
         good = points[quality >= _QUALITY * best]
         if len(good) or not how.needed:
-            held.append(
-                Blob(
-                    pixels=blob.pixels,
-                    weights=blob.weights,
-                    darkness=blob.darkness,
-                    contour=blob.contour,
-                    corners=good,
-                )
-            )
+            held.append(replace(blob, corners=good))
     return held
 
 
 def _corners_of(view: Contrast, blob: Blob, how: Corners) -> tuple[Floats, Floats]:
     """Return corners within a blob, the strongest first, and their measures."""
-    x0, y0, width, height = cv2.boundingRect(blob.contour)
+    x0, y0, width, height = blob.box
     left, top = max(x0 - _MARGIN_PX, 0), max(y0 - _MARGIN_PX, 0)
     crop = np.s_[top : y0 + height + _MARGIN_PX, left : x0 + width + _MARGIN_PX]
     inside = np.zeros(view.grey[crop].shape, np.uint8)

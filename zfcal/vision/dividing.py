@@ -127,10 +127,10 @@ def _fitted(
         )
         for t, k in zip(order, own, strict=True)
     ]
-    for trail, shape in zip(
+    for _, shape in zip(
         trails, fit_bodies(blob, [trail.body(usual) for trail in trails], start), strict=True
     ):
-        yield Detection(shape=shape, blob=blob, shared=len(parts), trail=trail)
+        yield Detection(shape=shape, blob=blob, shared=len(parts))
 
 
 def _aligned(axis_rad: float, heading_rad: float) -> float:

@@ -32,8 +32,15 @@ _HIDDEN = 5
 _PROVEN = 3
 """Frames after which a new blob is an animal."""
 
-_SIZE = 0.3
-"""Squared body lengths that another size by a factor of e is worth."""
+_ALONG = 1.2
+"""How much farther a body moves along itself than sideways."""
+
+_HEADING = 0.015
+"""Squared body lengths that a turn by a right angle is worth."""
+
+_ALIKE, _SIZE = 0.15, 2.0
+"""Another size or darkness by up to a seventh is none; a larger difference, in logarithms and
+squared, is worth so many squared body lengths."""
 
 _STAY = 0.3
 
@@ -97,20 +104,23 @@ class Trails:
         In body lengths, squared: as errors that are normal add up. Plain distances would let
         animals in a line change places for nothing.
         """
-        at = np.array([t.predicted(time_s) for t in self._trails]).reshape(-1, 2)
-        to = np.array([(d.shape.x_px, d.shape.y_px) for d in detections]).reshape(-1, 2)
-        away = ((at[:, None] - to[None]) ** 2).sum(axis=2) / self._bodies.length_px**2
-        for k, detection in enumerate(detections):
-            if detection.shared == 1:
-                away[:, k] += [
-                    _SIZE * math.log(t.area_px / detection.shape.area_px) ** 2 for t in self._trails
-                ]
-        place = {id(trail): k for k, trail in enumerate(self._trails)}
-        for k, detection in enumerate(detections):
-            if detection.trail is not None:
-                # Found as the body of one track, it is nobody else's.
-                away[:, k] = np.inf
-                away[place[id(detection.trail)], k] = 0.0
+        if not self._trails or not detections:
+            return np.empty((len(self._trails), len(detections)))
+        due = [t.predicted(time_s) for t in self._trails]
+        at = np.array(
+            [[*xy, t.heading_rad, t.mass] for xy, t in zip(due, self._trails, strict=True)]
+        )
+        shapes = [d.shape for d in detections]
+        to = np.array([[s.x_px, s.y_px, s.axis_rad] for s in shapes])
+        alone = np.array([d.shared == 1 for d in detections])
+        away = _apart(at, to) / self._bodies.length_px**2
+        odd = np.maximum(
+            np.abs(np.log(at[:, 3:] / np.array([d.mass for d in detections]))) - _ALIKE, 0.0
+        )
+        away += np.where(alone, _SIZE * odd**2, 0.0)
+        turn = at[:, None, 2] - to[None, :, 2]
+        head = np.array([s.head for s in shapes])
+        away += _HEADING * (1 - head * np.cos(turn) - (1 - head) * np.abs(np.cos(turn)))
         return away
 
     def _take(self, matches: list[Match], detections: list[Detection], time_s: float) -> None:
@@ -178,7 +188,35 @@ class Trails:
 
 def _distance(blob: Blob, at: Floats, near: float) -> float:
     """Return how far a point is from a blob, infinite where it is farther than near."""
-    least, most = blob.bounds
-    if (at < least - near).any() or (at > most + near).any():
-        return float("inf")
+    x, y, width, height = blob.box
+    left, top = at[0] - x, at[1] - y
+    if not (-near <= left <= width + near and -near <= top <= height + near):
+        return math.inf
     return float(np.sqrt(((blob.pixels - at) ** 2).sum(axis=1).min()))
+
+
+def _apart(at: Floats, to: Floats) -> Floats:
+    """Return squared distances, those along the body shortened: fish do not move sideways.
+
+    Parameters
+    ----------
+    at : ndarray, shape (track, 3 or more)
+        x, y and heading.
+    to : ndarray, shape (detection, 3 or more)
+        The same.
+
+    Returns
+    -------
+    ndarray, shape (track, detection)
+    """
+    step = to[None, :, :2] - at[:, None, :2]
+    middle = (
+        at[:, None, 2]
+        + np.arctan2(
+            np.sin(to[None, :, 2] - at[:, None, 2]), np.cos(to[None, :, 2] - at[:, None, 2])
+        )
+        / 2
+    )
+    along = step[..., 0] * np.cos(middle) + step[..., 1] * np.sin(middle)
+    across = step[..., 1] * np.cos(middle) - step[..., 0] * np.sin(middle)
+    return (along / _ALONG) ** 2 + across**2

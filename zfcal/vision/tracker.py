@@ -178,8 +178,9 @@ class FishTracker:
             return []
         xy_px = np.array([trail.xy for trail in seen])
         ahead_px = xy_px + [(math.cos(t.heading_rad), math.sin(t.heading_rad)) for t in seen]
-        xy_m = self._projection.to_metres(xy_px)
-        ahead_m = self._projection.to_metres(ahead_px) - xy_m
+        # In one call: undoing a lens costs much the same for ten points as for five.
+        xy_m, ahead_m = np.split(self._projection.to_metres(np.vstack([xy_px, ahead_px])), 2)
+        ahead_m = ahead_m - xy_m
         return [
             Seen(
                 agent=trail.agent,

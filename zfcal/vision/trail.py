@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 _TRUST = 0.7
 """Weight of the newest step in the velocity."""
 
-_KEPT = 0.7
+_KEPT = 0.3
 """Share of its velocity that a fish keeps from one frame to the next: it turns often."""
 
 _GLIDE_S = 0.2
@@ -51,14 +51,16 @@ class Detection:
         The foreground that it is part of.
     shared
         How many animals are in that.
-    trail
-        Whose it is, where it was found as the body of a track.
     """
 
     shape: Shape
     blob: Blob
     shared: int = 1
-    trail: Trail | None = None
+
+    @property
+    def mass(self) -> float:
+        """Area times darkness: what tells a lure from a fish, and a large fish from a small one."""
+        return self.shape.area_px * self.blob.darkness
 
 
 class Trail:
@@ -89,6 +91,7 @@ class Trail:
         "hits",
         "is_told",
         "likeness",
+        "mass",
         "missed",
         "opening",
         "shape",
@@ -109,6 +112,7 @@ class Trail:
         self.shape = shape
         self.blob: Blob = detection.blob
         self.area_px = shape.area_px
+        self.mass = detection.mass
         self.heading_rad = shape.axis_rad
         self.hits = 1
         self.likeness = 0.0
@@ -169,7 +173,9 @@ class Trail:
         self.doubt = max(_FADING * self.doubt, 0.5 if unsure else 0.0)
         if detection.shared == 1:
             self._alone += 1
-            self.area_px += max(0.1, 1 / self._alone) * (shape.area_px - self.area_px)
+            weight = max(0.1, 1 / self._alone)
+            self.area_px += weight * (shape.area_px - self.area_px)
+            self.mass += weight * (detection.mass - self.mass)
 
     def confidence(self, usual: Body) -> float:
         """Return how sure the last sighting is, in [0, 1]; below 0.5 it is a guess.
