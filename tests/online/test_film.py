@@ -191,7 +191,10 @@ def test_the_same_again_does_nothing(home, tmp_path, heard, read_all):
 
 def test_an_interrupted_drawing_is_taken_up(home, tmp_path, monkeypatch, read_all):
     """Nothing half drawn is left, and the end is that of an undisturbed run."""
-    options, filmed = of(home, duration_s=61.0, fps=1.0), FilmOptions(look=look_of(USUAL))
+    options, filmed = (
+        of(home, duration_s=61.0, fps=1.0, n_fish=2, n_robots=0),
+        FilmOptions(look=look_of(USUAL)),
+    )
     simulate_on_film(tmp_path / "whole" / "t", options, filmed, say_nothing)
     root = tmp_path / "broken" / "t"
     painted = []
@@ -215,24 +218,30 @@ def test_an_interrupted_drawing_is_taken_up(home, tmp_path, monkeypatch, read_al
 def test_another_look_or_seed_draws_anew(home, tmp_path, heard):
     """The tracks stay for another look; a shorter simulation takes its images with it."""
     root = tmp_path / "t"
-    simulate_on_film(root, of(home, duration_s=61.0, fps=1.0), FilmOptions(look=PLAIN), say_nothing)
+    simulate_on_film(
+        root,
+        of(home, duration_s=61.0, fps=1.0, n_fish=2, n_robots=0),
+        FilmOptions(look=PLAIN),
+        say_nothing,
+    )
     bright = dataclasses.replace(PLAIN, floor_grey=200.0)
     simulate_on_film(
-        root, of(home, duration_s=61.0, fps=1.0), FilmOptions(look=bright), heard.append
+        root,
+        of(home, duration_s=61.0, fps=1.0, n_fish=2, n_robots=0),
+        FilmOptions(look=bright),
+        heard.append,
     )
     made = {
         event.path.relative_to(root).as_posix(): event.reason
         for event in heard
         if isinstance(event, Made)
     }
-    assert sorted(made) == [
-        f"frames/{camera}/{start}.mcap"
-        for camera in ("below", "overhead")
-        for start in ("000000", "000060")
-    ]
+    assert sorted(made) == [f"frames/overhead/{start}.mcap" for start in ("000000", "000060")]
     assert all(reason.startswith("option look: ") for reason in made.values())
     heard.clear()
-    simulate_on_film(root, of(home, fps=1.0), FilmOptions(look=bright), heard.append)
+    simulate_on_film(
+        root, of(home, fps=1.0, n_fish=2, n_robots=0), FilmOptions(look=bright), heard.append
+    )
     assert [path.name for path in (root / "frames" / "overhead").iterdir()] == ["000000.mcap"]
 
 
@@ -333,7 +342,7 @@ def test_a_plain_video_holds_the_same_pixels(home, tmp_path, heard, ending):
     """As many frames as the tracks, at the trial's rate, bit by bit; made once."""
     root, video = tmp_path / "t", tmp_path / f"v{ending}"
     drawn = FilmOptions(look=look_of(USUAL), video=video)
-    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append)
+    simulate_on_film(root, of(home, duration_s=0.4), drawn, heard.append)
     for camera, path in exported_paths(video, ("overhead", "below")).items():
         reader = cv2.VideoCapture(str(path))
         assert reader.get(cv2.CAP_PROP_FPS) == 15
@@ -342,11 +351,11 @@ def test_a_plain_video_holds_the_same_pixels(home, tmp_path, heard, ending):
             _, image = reader.read()
             assert np.array_equal(image if picture.ndim == 3 else image[..., 0], picture)
         assert not reader.read()[0]
-        assert len(pictures) == 15
+        assert len(pictures) == 6
     note = json.loads((tmp_path / f"v{ending}.json").read_text())
     assert note["lineage"]["inputs"].keys() == {"frames/overhead/000000.mcap"}
     heard.clear()
-    simulate_on_film(root, of(home, duration_s=1.0), drawn, heard.append)
+    simulate_on_film(root, of(home, duration_s=0.4), drawn, heard.append)
     assert {type(event) for event in heard} == {UpToDate}
     video.unlink()
     heard.clear()
