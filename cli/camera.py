@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from .camera_align import align
+from .camera_board import board, sheet
 from .camera_corners import corners
 from .camera_points import older, points
 from .options import laid_out
@@ -27,5 +28,5 @@ def command() -> None:
     """
 
 
-for part in (points, corners, older, align):
+for part in (sheet, board, points, corners, older, align):
     command.add_command(part)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
+from .camera_options import figure_option, task_of
 from .options import PLACE, makes_artifacts, speaks
 from .output import Output
 
@@ -24,6 +26,7 @@ from .output import Output
     show_default=True,
     help="So much of the recording is looked at.",
 )
+@figure_option
 @makes_artifacts
 @speaks
 def align(
@@ -34,8 +37,7 @@ def align(
     below: str | None,
     start_s: float,
     seconds: float,
-    dry_run: bool,
-    force: bool,
+    **where: Any,
 ) -> None:
     r"""Bring the camera below into the frame of the one overhead.
 
@@ -49,8 +51,7 @@ def align(
         zfcal camera align trial --overhead above.mp4 --below below.mp4
     """
     from zfcal.online.camera_align import Recording, align_cameras
-    from zfcal.online.opening import Task
 
     recording = Recording(overhead=overhead, below=below, start_s=start_s, seconds=seconds)
-    task = Task(dry_run=dry_run, force=force)
+    task = task_of(where)
     out.attempt(lambda: align_cameras(trial, recording, out.tell, task=task))

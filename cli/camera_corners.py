@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from .camera_options import box, image_options, numbers, place_of, place_options
+from .camera_options import aim_of, box, image_options, numbers, place_options
 from .options import makes_artifacts, speaks
 from .output import Output
 
@@ -27,11 +28,7 @@ def corners(
     bounds_m: tuple[float, float, float, float] | None,
     size: tuple[int, int] | None,
     image: Path | None,
-    place: Path | None,
-    trial: Path | None,
-    name: str | None,
-    dry_run: bool,
-    force: bool,
+    **where: Any,
 ) -> None:
     r"""Take the pixels of the arena's four corners, X,Y each.
 
@@ -45,7 +42,6 @@ def corners(
             --trial trial --camera overhead
     """
     from zfcal.online.camera_corners import Corners, make_from_corners
-    from zfcal.online.opening import Task
 
     given = Corners(
         px=tuple((x, y) for x, y in (numbers(text, 2) for text in corners)),
@@ -54,6 +50,5 @@ def corners(
         arena=arena,
         bounds_m=bounds_m,
     )
-    where = place_of(place, trial, name)
-    task = Task(dry_run=dry_run, force=force)
-    out.attempt(lambda: make_from_corners(where, given, out.tell, task=task))
+    place, task = aim_of(where, image)
+    out.attempt(lambda: make_from_corners(place, given, out.tell, task=task))

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import EXISTING, PLACE
 
 if TYPE_CHECKING:
-    from zfcal.online.camera_making import Place
+    from zfcal.online.camera_making import CameraTask, Found, Place
 
 Command = Callable[..., None]
+
+
+figure_option = click.option(
+    "--figure", type=PLACE, metavar="PNG", help="Draw the errors into this file."
+)
 
 
 def numbers(text: str, count: int) -> tuple[float, ...]:
@@ -54,7 +60,7 @@ def image_options(command: Command) -> Command:
 
 
 def place_options(command: Command) -> Command:
-    """Add -o, --trial and --camera, handed over as ``place``."""
+    """Add -o, --trial, --camera and --figure: what `aim_of` takes."""
     for option in reversed(
         (
             click.option("-o", "--out", "place", type=PLACE, help="The camera file to write."),
@@ -65,18 +71,40 @@ def place_options(command: Command) -> Command:
                 type=click.Choice(["overhead", "below"]),
                 help="Which one of the trial it is.",
             ),
+            figure_option,
         )
     ):
         command = option(command)
     return command
 
 
-def place_of(out: Path | None, trial: Path | None, name: str | None) -> Place:
-    """Return the place that the options ask for."""
+def aim_of(where: Mapping[str, Any], image: Path | None = None) -> tuple[Place, CameraTask]:
+    """Return where a camera goes and how it is to be made, by the options of a command."""
     from zfcal.online.camera_making import place_for
 
+    out, trial, name = where["place"], where["trial"], where["name"]
     if (out is None) == (trial is None):
         raise click.UsageError("Give -o FILE, or --trial TRIAL with --camera.")
     if (trial is None) != (name is None):
         raise click.UsageError("--trial and --camera go together.")
-    return place_for(out=out, trial=trial, name=name)
+    return place_for(out=out, trial=trial, name=name), task_of(where, image)
+
+
+def task_of(where: Mapping[str, Any], image: Path | None = None) -> CameraTask:
+    """Return how a camera is to be made: --dry-run, --force and --figure."""
+    from zfcal.online.camera_making import CameraTask
+
+    figure: Path | None = where["figure"]
+    draw = None if figure is None else functools.partial(_draw, figure=figure, image=image)
+    return CameraTask(dry_run=where["dry_run"], force=where["force"], draw=draw)
+
+
+def _draw(found: Found, *, figure: Path, image: Path | None) -> Path:
+    from zfcal.artifacts.atomic import write_whole
+    from zfcal.artifacts.images import read_image
+    from zfcal.report.camera_figure import draw_residuals, residuals_of
+
+    backdrop = None if image is None else read_image(image)
+    residuals = residuals_of(found)
+    write_whole(figure, lambda part: draw_residuals(residuals, part, image=backdrop))
+    return figure

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
-from .camera_options import image_options, place_of, place_options
+from .camera_options import aim_of, image_options, place_options
 from .options import EXISTING, makes_artifacts, speaks
 from .output import Output
 
@@ -43,11 +44,7 @@ def points(
     robust: bool,
     size: tuple[int, int] | None,
     image: Path | None,
-    place: Path | None,
-    trial: Path | None,
-    name: str | None,
-    dry_run: bool,
-    force: bool,
+    **where: Any,
 ) -> None:
     r"""Take points of the tank whose place is known.
 
@@ -61,14 +58,12 @@ def points(
         zfcal camera points marks.csv --lens below-lens.toml -o below.toml
     """
     from zfcal.online.camera_points import Points, make_from_points
-    from zfcal.online.opening import Task
 
     if lens is not None and model is not None:
         raise click.UsageError("--lens has its model already: leave --model out.")
     given = Points(path=file, size_px=size, image=image, lens=lens, model=model, robust=robust)
-    where = place_of(place, trial, name)
-    task = Task(dry_run=dry_run, force=force)
-    out.attempt(lambda: make_from_points(where, given, out.tell, task=task))
+    place, task = aim_of(where, image)
+    out.attempt(lambda: make_from_points(place, given, out.tell, task=task))
 
 
 @click.command("import")
@@ -83,11 +78,7 @@ def older(
     *,
     model: str | None,
     robust: bool,
-    place: Path | None,
-    trial: Path | None,
-    name: str | None,
-    dry_run: bool,
-    force: bool,
+    **where: Any,
 ) -> None:
     r"""Read a camera of the older rig: OpenCV's XML with calibrationPoints.
 
@@ -99,9 +90,7 @@ def older(
         zfcal camera import cats2-below-camera.xml --trial trial --camera below
     """
     from zfcal.online.camera_points import Points, make_from_older
-    from zfcal.online.opening import Task
 
     given = Points(path=file, model=model, robust=robust)
-    where = place_of(place, trial, name)
-    task = Task(dry_run=dry_run, force=force)
-    out.attempt(lambda: make_from_older(where, given, out.tell, task=task))
+    place, task = aim_of(where)
+    out.attempt(lambda: make_from_older(place, given, out.tell, task=task))

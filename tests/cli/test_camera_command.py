@@ -117,7 +117,7 @@ def test_wrong_use_is_one_line_with_a_hint(zfcal, tmp_path, words, code, says):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["points", "corners", "import", "align"])
+@pytest.mark.parametrize("name", ["sheet", "board", "points", "corners", "import", "align"])
 def test_every_camera_command_has_help_with_an_example(zfcal, name):
     """And the group too."""
     assert "Example:" in zfcal("camera", "--help").out
@@ -209,3 +209,57 @@ def test_points_that_cannot_be_are_one_line(zfcal, tmp_path, text, says):
     assert says in done.err
     assert "hint:" in done.err
     assert not (tmp_path / "c.toml").exists()
+
+
+def test_a_figure_shows_the_errors(zfcal, tmp_path):
+    """A PNG, whose path is told; with the picture of the tank behind it."""
+    (tmp_path / "marks.csv").write_text(MARKS)
+    cv2.imwrite(str(tmp_path / "tank.png"), np.full((500, 500, 3), 90, np.uint8))
+    words = ["--image", "tank.png", "-o", "c.toml", "--figure", "errors.png"]
+    done = zfcal("camera", "points", "marks.csv", *words)
+    assert done.lines == ["c.toml", "errors.png"]
+    picture = cv2.imread(str(tmp_path / "errors.png"))
+    assert picture.shape[1] > 900
+    assert picture.std() > 5
+
+
+def test_a_sheet_is_drawn_to_scale(zfcal, tmp_path):
+    """Ten pixels a millimetre, a margin of one square."""
+    words = ["--board", "4x3", "--square-mm", "20", "-o", "board.png"]
+    assert zfcal("camera", "sheet", *words).lines == ["board.png"]
+    image = cv2.imread(str(tmp_path / "board.png"), cv2.IMREAD_GRAYSCALE)
+    assert image.shape == (200 * 6, 200 * 7)
+    assert image[300, 300] == 0
+    assert image[300, 500] == 255
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["a.png", "--board", "9", "--square-mm", "25"], 2, "expected COLUMNSxROWS"),
+        (["a.png", "--board", "9x6", "--square-mm", "25"], 1, "was found in 0 of 1 images"),
+        (["a.png", "b.png", "--board", "9x6", "--square-mm", "25"], 1, "The images differ in size"),
+        (["a.png", "--board", "9x6", "--square-mm", "2500"], 1, "none of a board to hold"),
+        (["a.png", "--board", "2x6", "--square-mm", "25"], 1, "3 by 3 inner corners or more"),
+        (["a.png", "--board", "9x6", "--square-mm", "25", "--lies", "a.png"], 2, "go together"),
+        (["empty", "--board", "9x6", "--square-mm", "25"], 1, "empty: holds no images"),
+    ],
+)
+def test_board_images_that_will_not_do_are_one_line(zfcal, tmp_path, words, code, says):
+    """With what to do, and no lens."""
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((480, 640), 90, np.uint8))
+    cv2.imwrite(str(tmp_path / "b.png"), np.full((500, 500), 90, np.uint8))
+    (tmp_path / "empty").mkdir()
+    done = zfcal("camera", "board", *words, "-o", "lens.toml")
+    assert done.code == code
+    assert says in done.err
+    assert not (tmp_path / "lens.toml").exists()
+
+
+def test_a_lens_alone_is_no_camera_of_a_trial(zfcal, trial, tmp_path):
+    """It does not say where it stands."""
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((480, 640), 90, np.uint8))
+    words = ["--board", "9x6", "--square-mm", "25", "--trial", "trial", "--camera", "below"]
+    done = zfcal("camera", "board", "a.png", *words)
+    assert done.code == 1
+    assert "not where the camera stands" in done.err

@@ -12,9 +12,9 @@ import pytest
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.online.camera_align import Recording, align_cameras
+from zfcal.online.camera_making import CameraTask
 from zfcal.online.cameras import read_camera
 from zfcal.online.events import Made, Result, UpToDate
-from zfcal.online.opening import Task
 from zfcal.online.setup import NewTrial, create_trial
 
 ANGLE, SHIFT = 0.03, (0.03, -0.02)
@@ -49,7 +49,7 @@ def trial(filmed, tmp_path):
 def aligned(root, recording=Recording(), **task):  # noqa: B008 - it is frozen
     """Align, and return what was told."""
     told = []
-    align_cameras(root, recording, told.append, task=Task(**task))
+    align_cameras(root, recording, told.append, task=CameraTask(**task))
     return told
 
 

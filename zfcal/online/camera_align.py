@@ -10,24 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from zfcal.artifacts.frame_files import frame_segments, read_frames
+from zfcal.artifacts.frame_files import frame_segments
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.online.camera_making import Place, Recipe, make_camera
+from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_camera
 from zfcal.online.events import Tell
-from zfcal.online.opening import Task
+from zfcal.online.sources import source_of
 from zfcal.trial import Trial
 from zfcal.vision.alignment import Alignment, Spots, align_spots
 from zfcal.vision.calibration import Calibration, summary
 from zfcal.vision.camera import Projection, check_fits
 from zfcal.vision.frames import Frame
+from zfcal.vision.live import ArrivalClock
 from zfcal.vision.registering import register
 from zfcal.vision.robot import LedOptions, RobotFinder
 from zfcal.vision.seen import TrackerOptions
-from zfcal.vision.stamps import Shot
 from zfcal.vision.tracker import FishTracker, follow
-from zfcal.vision.video import decoded, is_live, open_source
+from zfcal.vision.video import is_live
 
 ALIGNED = "below-aligned.toml"
 _SURE = 0.5
@@ -53,7 +53,7 @@ class Recording:
     seconds: float = 120.0
 
 
-def align_cameras(root: Path, recording: Recording, tell: Tell, *, task: Task) -> None:
+def align_cameras(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) -> None:
     """Correct the camera below so that it sees the robot where overhead does.
 
     The corrected camera is a file of its own, which the trial names from then on; it is
@@ -141,7 +141,8 @@ def _frames(
 ) -> Iterator[Frame]:
     """Yield the images of a stretch whose time advances."""
     last_s = -math.inf
-    for number, shot in enumerate(_shots(source, trial.fps, recording.start_s)):
+    opened = source_of(source, fps=trial.fps, clock=ArrivalClock())
+    for number, shot in enumerate(opened.shots()):
         if shot.time_s >= recording.start_s + recording.seconds:
             return
         if recording.start_s <= shot.time_s and shot.time_s > last_s:
@@ -149,17 +150,6 @@ def _frames(
             check_fits(projection, frame.size_px, camera=f"{source}: its camera file")
             last_s = shot.time_s
             yield frame
-
-
-def _shots(source: str, fps: float, start_s: float) -> Iterator[Shot]:
-    path = Path(source)
-    if path.suffix != ".mcap" and not (path.is_dir() and frame_segments(path)):
-        yield from open_source(source, fps=fps).shots()
-        return
-    for time_s, data in read_frames(path, start_s=start_s):
-        image = decoded(data)
-        if image is not None:
-            yield Shot(time_s=time_s, image=image)
 
 
 def _spots(rows: list[tuple[float, float, float]]) -> Spots:

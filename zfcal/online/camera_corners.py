@@ -9,9 +9,8 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.images import read_image
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.online.camera_making import Place, Recipe, make_camera
+from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.events import Tell
-from zfcal.online.opening import Task
 from zfcal.vision.calibration import calibrate_corners
 
 Box = tuple[float, float, float, float]
@@ -42,7 +41,7 @@ class Corners:
     bounds_m: Box | None = None
 
 
-def make_from_corners(place: Place, corners: Corners, tell: Tell, *, task: Task) -> None:
+def make_from_corners(place: Place, corners: Corners, tell: Tell, *, task: CameraTask) -> None:
     """Make a camera file from the four corners of the arena.
 
     Parameters

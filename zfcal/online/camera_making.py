@@ -18,12 +18,28 @@ from zfcal.online.events import Made, Note, Result, Tell
 from zfcal.online.opening import Task, at_work, reason_to_make
 from zfcal.trial import CONFIG_NAME
 from zfcal.vision.calibration import Calibration
-from zfcal.vision.lens import Lens
+from zfcal.vision.calibration_boards import LensCalibration
 
 NAMES = ("overhead", "below")
 
-Found: TypeAlias = Calibration | tuple[Lens, Mapping[str, Any]]
-"""A camera with its errors; or a lens alone with what is known of it."""
+Found: TypeAlias = Calibration | LensCalibration
+"""A camera with its errors, or a lens alone."""
+
+Draw: TypeAlias = Callable[[Found], Path]
+"""Draws the errors, and returns where the picture is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraTask(Task):
+    """How a camera is to be made.
+
+    Parameters
+    ----------
+    draw
+        Draws the errors of one that was made; None for no picture.
+    """
+
+    draw: Draw | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +120,7 @@ def place_for(*, out: Path | None, trial: Path | None, name: str | None) -> Plac
 
 
 def make_camera(
-    place: Place, recipe: Recipe, work: Callable[[], Found], tell: Tell, *, task: Task
+    place: Place, recipe: Recipe, work: Callable[[], Found], tell: Tell, *, task: CameraTask
 ) -> None:
     """Make a camera file, unless it is up to date.
 
@@ -119,7 +135,7 @@ def make_camera(
     tell
         Hears of the files, the errors and what a person should know.
     task
-        Whether to write, and whether to do it again.
+        Whether to write, whether to do it again, and who draws the errors.
     """
     lineage = recipe.lineage(place.base)
     with nullcontext() if place.root is None else at_work(place.root, "camera", task):
@@ -128,6 +144,8 @@ def make_camera(
             found = work()
             _write(place, found, lineage)
             tell(Made(path=place.path, reason=reason))
+            if task.draw is not None:
+                tell(Made(path=task.draw(found), reason=reason))
             _tell_result(found, tell)
         if place.root is not None and not task.dry_run:
             _name(place.root, place, tell)
@@ -138,8 +156,7 @@ def _write(place: Place, found: Found, lineage: Lineage) -> None:
         points = (found.pairs.px, found.pairs.m)
         write_camera(place.path, found.camera, lineage, result=found.result(), points=points)
     else:
-        lens, result = found
-        write_camera(place.path, lens, lineage, result=result)
+        write_camera(place.path, found.lens, lineage, result=found.result)
 
 
 def _name(root: Path, place: Place, tell: Tell) -> None:
@@ -148,7 +165,7 @@ def _name(root: Path, place: Place, tell: Tell) -> None:
 
 
 def _tell_result(found: Found, tell: Tell) -> None:
-    result = found.result() if isinstance(found, Calibration) else dict(found[1])
+    result = found.result() if isinstance(found, Calibration) else found.result
     for note in result.get("notes", ()):
         tell(Note(text=note, warning=True))
     tell(Note(text=in_words(result)))
@@ -161,7 +178,7 @@ def in_words(result: Mapping[str, Any]) -> str:
     for key, unit, words in (
         ("error_mm", "mm", "error"),
         ("left_out_mm", "mm", "of points left out"),
-        ("error_px", "px", "error"),
+        ("error_px", "px", "in the image"),
     ):
         if key in result:
             found = result[key]

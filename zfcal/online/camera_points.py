@@ -9,10 +9,9 @@ from zfcal.artifacts.older_cameras import read_older_camera
 from zfcal.artifacts.point_files import read_points
 from zfcal.errors import InputError
 from zfcal.online.camera_corners import size_of_images
-from zfcal.online.camera_making import Place, Recipe, make_camera
+from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_lens
 from zfcal.online.events import Tell
-from zfcal.online.opening import Task
 from zfcal.vision.calibration import Calibration, Pairs
 from zfcal.vision.calibration_points import calibrate_points, calibrate_pose
 from zfcal.vision.lens import PINHOLE, Lens
@@ -46,7 +45,7 @@ class Points:
     robust: bool = False
 
 
-def make_from_points(place: Place, points: Points, tell: Tell, *, task: Task) -> None:
+def make_from_points(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
     """Make a camera file from a CSV file of points.
 
     Raises
@@ -74,7 +73,7 @@ def make_from_points(place: Place, points: Points, tell: Tell, *, task: Task) ->
     make_camera(place, recipe, work, tell, task=task)
 
 
-def make_from_older(place: Place, points: Points, tell: Tell, *, task: Task) -> None:
+def make_from_older(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
     """Make a camera file from one of the older rig.
 
     Raises

@@ -36,6 +36,9 @@ _BEYOND = 1.5
 _SLACK = 1.05
 """Decentring moves a pixel by less than this from where the radial part alone puts it."""
 _EXACT_PX = 1e-7
+_AT_ONCE = 4096
+"""OpenCV's projection gives all derivatives as well: of a whole image that would be a gigabyte."""
+
 _AT_REST = (np.zeros(3), np.zeros(3))
 
 
@@ -151,6 +154,9 @@ class Lens:
 
     def _project(self, rays: Floats) -> Floats:
         """Return the pixels of finite rays, folded or not."""
+        if len(rays) > _AT_ONCE:
+            parts = range(0, len(rays), _AT_ONCE)
+            return np.concatenate([self._project(rays[i : i + _AT_ONCE]) for i in parts])
         world = np.column_stack([rays, np.ones(len(rays))])[:, None, :]
         project = cv2.fisheye.projectPoints if self.model == FISHEYE else cv2.projectPoints
         pixels, _ = project(

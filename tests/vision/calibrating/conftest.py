@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
+from zfcal.vision.boards import draw_board
 from zfcal.vision.calibration import Pairs
 from zfcal.vision.camera import FISHEYE, PINHOLE, Camera
 
@@ -48,6 +50,39 @@ def true_errors_mm(found, camera, *, n=21, low=0.0, high=1.0):
     return 1000 * np.hypot(*(found.to_metres(camera.to_pixels(m)) - m).T)
 
 
+def board_image(board, camera, *, square_px=40, noise=2.0, seed=0):
+    """Return what a camera sees of a board that lies in the plane z = 0."""
+    width, height = camera.size_px
+    down, across = np.mgrid[0:height, 0:width]
+    places = camera.to_metres(np.stack([across, down], axis=-1))
+    # A margin and the outer squares lie before the first inner corner.
+    face = np.nan_to_num((places / board.square_m + 2) * square_px - 0.5, nan=-1e4)
+    drawn = draw_board(board, square_px=square_px)
+    x, y = np.moveaxis(face.astype(np.float32), -1, 0)
+    seen = cv2.remap(drawn, x, y, cv2.INTER_LINEAR, borderValue=120)
+    noisy = cv2.GaussianBlur(seen, (0, 0), 0.8) + np.random.default_rng(seed).normal(
+        0, noise, seen.shape
+    )
+    return np.clip(noisy, 0, 255).astype(np.uint8)
+
+
+def held(lens, board, n, *, far_m, seed=0):
+    """Return cameras before which a board is held in n ways, all of it in the image."""
+    rng = np.random.default_rng(seed)
+    size = np.array(lens.size_px)
+    middle = np.array([*(board.corners_m.max(axis=0) / 2), 0.0])
+    cameras = []
+    while len(cameras) < n:
+        ray = np.array([*lens.to_rays(rng.uniform(0.2 * size, 0.8 * size)), 1.0])
+        rotation = cv2.Rodrigues(rng.uniform(-0.6, 0.6, 3))[0]
+        place = rng.uniform(*far_m) * ray / np.linalg.norm(ray) - rotation @ middle
+        camera = Camera.of(lens, cv2.Rodrigues(rotation)[0], place)
+        px = camera.to_pixels(board.corners_m)
+        if np.isfinite(px).all() and (px > 12).all() and (px < size - 12).all():
+            cameras.append(camera)
+    return cameras
+
+
 @pytest.fixture(scope="session")
 def rig():
     """Return the known cameras, and what makes points of them."""
@@ -58,4 +93,6 @@ def rig():
         square=square,
         pairs_of=pairs_of,
         true_errors_mm=true_errors_mm,
+        board_image=board_image,
+        held=held,
     )
