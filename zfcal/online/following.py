@@ -26,8 +26,9 @@ from zfcal.tracks import FramePoses
 from zfcal.vision.background import Background, background_of
 from zfcal.vision.frames import Frame
 from zfcal.vision.fusing import Fuser
-from zfcal.vision.live import ArrivalClock
+from zfcal.vision.live import ArrivalClock, LiveCamera
 from zfcal.vision.overlay import Scene
+from zfcal.vision.robot import RobotSeen
 from zfcal.vision.seen import Seen
 from zfcal.vision.stamps import FrameClock, Shot, number_frames
 from zfcal.vision.tracker import FishTracker, follow
@@ -82,7 +83,9 @@ class Following:
         )
         self._origins = origins
         self._recorders: dict[str, Recorder] = {}
+        self._robots: dict[int, RobotSeen] = {}
         self._handed = (-1, 0.0)
+        self._held_s = -1.0
         self._end_s = 0.0
 
     def run(self) -> None:
@@ -108,14 +111,14 @@ class Following:
         self._outcome.begin(overhead, below)
         take_up(self._resumed, self._minutes)
         try:
-            for frame, seen in follow(tracker, self._frames(overhead)):
+            for frame, seen in follow(tracker, self._frames(overhead, below)):
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
-                self._take(frame, seen, bad, below, drawing)
+                self._take(frame, seen, bad, drawing)
         except BaseException:
             self._minutes.interrupt(self._end_s)
             raise
         finally:
-            self._close(below)
+            self._close(overhead, below)
         self._minutes.finish(self._end_s)
         drawing.finish(self._tell)
         self._outcome.finish()
@@ -123,31 +126,39 @@ class Following:
     def _said_clock(self) -> dict[str, str]:
         return {STARTED: repr(self._clock.started_unix_s)}
 
-    def _take(
-        self, frame: Frame, seen: list[Seen], bad: list[str], below: Below | None, drawing: Drawing
-    ) -> None:
+    def _take(self, frame: Frame, seen: list[Seen], bad: list[str], drawing: Drawing) -> None:
         """Write down one frame."""
-        robot = None if below is None else below.at(frame.time_s)
+        robot = self._robots.pop(frame.number, None)
         poses = FramePoses(
             time_s=frame.time_s,
             frame=frame.number,
             agents=self._fuser.step(seen, robot, frame.time_s),
         )
-        words = self._outcome.judge(frame, poses, bad)
+        words = self._outcome.judge(frame, poses, bad, robot)
         self._minutes.add(poses, next_agent=self._fuser.next_agent, bad=words)
         self._end_s = frame.time_s + 1 / self._fps
-        self._outcome.written(frame, handed=self._handed, now_s=self._now(frame))
+        self._note_time(frame)
         outlines = [each.contour_px for each in seen]
         drawing.add(Scene(frame=frame, poses=poses, outlines=outlines, bad=words))
 
-    def _now(self, frame: Frame) -> float:
-        """Return how long ago a frame was read, in seconds; of a camera, since it arrived."""
-        if self._plan.is_live:
-            return self._clock.now() - frame.time_s
-        return time.perf_counter() - self._handed[1]
+    def _note_time(self, frame: Frame) -> None:
+        """Note how long a frame took from being read, or from its arrival, to being written.
 
-    def _frames(self, feed: Feed) -> Iterator[Frame]:
-        """Yield the frames that are asked for, as they are read."""
+        Those that waited for a background do not count, nor those that arrived meanwhile.
+        """
+        if self._handed[0] != frame.number:
+            self._held_s = self._clock.now() if self._plan.is_live else frame.time_s
+        elif not self._plan.is_live:
+            self._outcome.took(time.perf_counter() - self._handed[1])
+        elif frame.time_s > self._held_s:
+            self._outcome.took(self._clock.now() - frame.time_s)
+
+    def _frames(self, feed: Feed, below: Below | None) -> Iterator[Frame]:
+        """Yield the frames that are asked for, as they are read.
+
+        The robot is looked for at once: frames may wait for a background, images of the
+        camera below do not.
+        """
         shots: Iterator[Shot] = feed.shots
         options = self._plan.options
         first_s = options.start_s or 0.0
@@ -161,6 +172,8 @@ class Following:
         length_s = options.duration_s or (feed.source.length_s or 0.0) - first_s
         for frame in number_frames(shots, self._numbers):
             self._handed = (frame.number, time.perf_counter())
+            if below is not None:
+                self._robots[frame.number] = below.at(frame.time_s)
             done_s = frame.time_s - first_s
             if int(done_s) > int(done_s - 1 / self._fps) and length_s > 0:
                 self._tell(Progress(stage="track", done=int(done_s), total=int(length_s) + 1))
@@ -196,7 +209,9 @@ class Following:
             )
         return background
 
-    def _close(self, below: Below | None) -> None:
+    def _close(self, overhead: Feed, below: Below | None) -> None:
+        if isinstance(overhead.source, LiveCamera):
+            overhead.source.stop()
         if below is not None:
             below.close()
         for recorder in self._recorders.values():

@@ -19,6 +19,7 @@ from zfcal.online.stretch import NOISE_KEY
 from zfcal.online.track_plan import Plan
 from zfcal.tracks import FISH, FramePoses, Tracks
 from zfcal.vision.frames import Frame, Image
+from zfcal.vision.robot import RobotSeen
 from zfcal.vision.stamps import Tally
 
 _SAYS = {
@@ -74,7 +75,7 @@ class Outcome:
         self._told = 0
         self._before: Image | None = None
         self._last: tuple[int, float] | None = None
-        self._leds: tuple[int, float] | None = None
+        self._led_s: float | None = None
         self._took_s: deque[float] = deque(maxlen=_LATENCIES)
 
     def begin(self, overhead: Feed, below: Below | None) -> None:
@@ -83,7 +84,9 @@ class Outcome:
         self._feeds = [overhead] if below is None else [overhead, below.feed]
         self._tell_notes()
 
-    def judge(self, frame: Frame, poses: FramePoses, bad: list[str]) -> tuple[str, ...]:
+    def judge(
+        self, frame: Frame, poses: FramePoses, bad: list[str], robot: RobotSeen | None
+    ) -> tuple[str, ...]:
         """Return what was wrong with a frame, in words, and tell what is new."""
         words = list(dict.fromkeys(bad))
         if self._before is not None and np.array_equal(self._before, frame.image):
@@ -92,17 +95,16 @@ class Outcome:
             words.append("after a gap")
         self._before, self._last = frame.image, (frame.number, frame.time_s)
         self._exact += len(poses.agents) == self._plan.opened.trial.n_agents
-        if self._leds_are_gone(frame):
+        if self._leds_are_gone(frame, robot):
             words.append("no LED")
         for word in words:
             self._count(word, frame)
         self._tell_notes()
         return tuple(words)
 
-    def written(self, frame: Frame, *, handed: tuple[int, float], now_s: float) -> None:
-        """Note how long a frame took; those that waited for a background do not count."""
-        if handed[0] == frame.number:
-            self._took_s.append(now_s)
+    def took(self, seconds: float) -> None:
+        """Note how long a frame took."""
+        self._took_s.append(seconds)
 
     def finish(self) -> None:
         """Say how it went."""
@@ -161,14 +163,13 @@ class Outcome:
         )
         self._tell(Note(text=text, warning=True))
 
-    def _leds_are_gone(self, frame: Frame) -> bool:
+    def _leds_are_gone(self, frame: Frame, robot: RobotSeen | None) -> bool:
         """Return whether no LED was seen for five seconds."""
-        if self._below is None:
+        if robot is None:
             return False
-        seen = self._below.counts["one LED"] + self._below.counts["two LEDs"]
-        if self._leds is None or seen != self._leds[0]:
-            self._leds = (seen, frame.time_s)
-        return frame.time_s - self._leds[1] > _NO_LED_S
+        if not robot.is_lost or self._led_s is None:
+            self._led_s = frame.time_s
+        return frame.time_s - self._led_s > _NO_LED_S
 
     def _tell_notes(self) -> None:
         notes = [note for feed in self._feeds for note in feed.source.notes]

@@ -95,6 +95,7 @@ class LiveCamera:
         self._changed = threading.Condition()
         self._ended = False
         self._stop = threading.Event()
+        self._reader: threading.Thread | None = None
 
     def shots(self) -> Iterator[Shot]:
         """Yield images as they come, until the camera is gone for good or `stop` is called."""
@@ -104,25 +105,28 @@ class LiveCamera:
                 f"{self.name}: no camera answers there.",
                 hint="Check the cable, the address, and who else uses it (fuser /dev/video0).",
             )
-        reader = threading.Thread(target=self._read, args=(capture,), daemon=True)
-        reader.start()
+        self._reader = threading.Thread(target=self._read, args=(capture,), daemon=True)
+        self._reader.start()
         try:
             while (shot := self._next()) is not None:
                 yield shot
         finally:
             self.stop()
-            reader.join(timeout=2 * _TIMEOUT_MS / 1000)
 
-    def newest(self) -> list[Shot]:
-        """Return what has arrived since, without waiting."""
+    def newest(self, *, patience_s: float = 0.0) -> list[Shot]:
+        """Return what has arrived since; where nothing has, what comes within a moment."""
         with self._changed:
+            if patience_s > 0 and not self._waiting:
+                self._changed.wait(timeout=patience_s)
             found = list(self._waiting)
             self._waiting.clear()
         return found
 
     def stop(self) -> None:
-        """End the reading."""
+        """End the reading, and wait for it: a thread must not be inside OpenCV at the end."""
         self._stop.set()
+        if self._reader is not None and self._reader is not threading.current_thread():
+            self._reader.join(timeout=2 * _TIMEOUT_MS / 1000)
 
     def _next(self) -> Shot | None:
         with self._changed:
