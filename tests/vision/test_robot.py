@@ -235,3 +235,22 @@ def test_a_robot_that_was_lost_for_long_has_its_front_told_anew():
     for k in range(1, 4):
         heading = front.step(5.0 + k / FPS, np.array([0.1 - 0.01 * k, 0.0]), 0.0)
     assert away(heading, math.pi) < 1e-9
+
+
+@pytest.mark.parametrize("with_mask", [True, False])
+def test_looking_where_it_is_bright_finds_what_looking_everywhere_does(with_mask):
+    """A light in a corner of the image makes it look everywhere: the others stay where they are."""
+    mask = np.full((480, 640), 255, np.uint8) if with_mask else None
+    some = picture([(0.5, 0.5), (0.53, 0.5), (0.2, 0.7)])
+    corners = some.copy()
+    for place in ((2, 2), (637, 477)):
+        cv2.circle(corners, place, 2, GREEN, -1)
+    few = led_blobs(some, LedOptions(), mask=mask)
+    all_of_them = led_blobs(corners, LedOptions(), mask=mask)
+    assert len(few) == 3
+    assert {tuple(blob) for blob in few} < {tuple(blob) for blob in all_of_them}
+
+
+def test_an_image_without_any_light_has_no_blobs():
+    """Quickly, too."""
+    assert led_blobs(np.full((480, 640, 3), 60, np.uint8), LedOptions()).shape == (0, 2)

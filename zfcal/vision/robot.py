@@ -8,6 +8,7 @@ drive backwards overrules it, or a short drive after a turn that may have been e
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass
@@ -189,9 +190,12 @@ def led_blobs(image: Image, options: LedOptions, *, mask: Image | None = None) -
     ndarray, shape (blob, 2)
         In pixels, five at most.
     """
-    bright = _in_colour(image, options)
+    place = _lit(image, options, mask)
+    if place is None:
+        return np.empty((0, 2))
+    bright = _in_colour(np.ascontiguousarray(image[place]), options)
     if mask is not None:
-        bright = np.asarray(cv2.bitwise_and(bright, mask), np.uint8)
+        bright = np.asarray(cv2.bitwise_and(bright, np.ascontiguousarray(mask[place])), np.uint8)
     # An LED that dazzles is a ring with a white middle. What opening would take away are
     # specks, and LEDs at the rim of a fish-eye, which are hardly larger: those go by area.
     closed = cv2.morphologyEx(bright, cv2.MORPH_CLOSE, _KERNEL)
@@ -202,7 +206,26 @@ def led_blobs(image: Image, options: LedOptions, *, mask: Image | None = None) -
         if (area := max(cv2.contourArea(contour), float(len(contour)))) >= options.least_px
     ]
     found.sort(key=lambda blob: (-blob[0], blob[1], blob[2]))
-    return np.array([blob[1:] for blob in found[:_MOST_BLOBS]], np.float64).reshape(-1, 2)
+    corner = (place[1].start, place[0].start)
+    return np.array([blob[1:] for blob in found[:_MOST_BLOBS]], np.float64).reshape(-1, 2) + corner
+
+
+def _lit(image: Image, options: LedOptions, mask: Image | None) -> tuple[slice, slice] | None:
+    """Return rows and columns of what is bright at all, which is little; None if nothing is."""
+    # A pixel cannot be brighter after the blur than the brightest under its kernel.
+    peak = functools.reduce(cv2.max, cv2.split(image)) if image.ndim == 3 else image
+    peak = cv2.inRange(peak, options.least_value, 255)
+    if mask is not None:
+        wide = cv2.dilate(mask, np.ones((options.blur_px, options.blur_px), np.uint8))
+        peak = cv2.bitwise_and(peak, wide)
+    left, top, width, height = cv2.boundingRect(peak)
+    if not width:
+        return None
+    room = options.blur_px + 4
+    return (
+        slice(max(top - room, 0), top + height + room),
+        slice(max(left - room, 0), left + width + room),
+    )
 
 
 def _centre(contour: cv2.typing.MatLike) -> tuple[float, float]:
