@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.heats import unbeaten
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import Null
 from zfcal.diagnose.screening import Score, Screen, ask_all
@@ -228,8 +230,10 @@ class Selector:
         return _in_reach([best for best in found if abs(best.z) > RIVAL_Z])[:RIVALS]
 
     def _refits(self, screen: Screen, bests: Sequence[Best], least: float) -> list[Refit]:
+        scores = [best.score for best in bests]
+        worth = compress(scores, unbeaten(screen, scores, self.n_workers))
         with ThreadPoolExecutor(max(1, self.n_workers)) as pool:
-            made = pool.map(lambda best: refit(screen, best.score), bests)
+            made = pool.map(lambda score: refit(screen, score), worth)
             return [each for each in made if each.nats > least]
 
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
