@@ -275,7 +275,7 @@ def _homography_alone(pairs: Pairs) -> Calibration:
     found = calibrate_homography(pairs)
     note = (
         f"{len(pairs)} points support no lens, only a homography: straight walls stay bent. "
-        "With 7 points a lens can be tried, 12 to 20 judge it."
+        "With 6 points a lens can be tried, 12 to 20 judge it."
     )
     return Calibration(
         camera=found.camera,
