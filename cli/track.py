@@ -17,7 +17,15 @@ from .tracking import track_options, tracking_options
 @tracking_options
 @makes_artifacts
 @speaks
-def command(out: Output, trial: Path, *, dry_run: bool, force: bool, **options: Any) -> None:
+def command(
+    out: Output,
+    trial: Path,
+    *,
+    trajectories: Path | None,
+    dry_run: bool,
+    force: bool,
+    **options: Any,
+) -> None:
     r"""Track a recording, or a live camera, into poses and tracks.
 
     SRC is a video file, a folder or pattern of images, MCAP image segments (a
@@ -35,4 +43,21 @@ def command(out: Output, trial: Path, *, dry_run: bool, force: bool, **options: 
     from zfcal.online.track import track
 
     task = Task(dry_run=dry_run, force=force)
-    out.attempt(lambda: track(trial, track_options(options), out.tell, task=task))
+
+    def work() -> None:
+        track(trial, track_options(options), out.tell, task=task)
+        if trajectories is not None and not dry_run:
+            _draw(out, trial, trajectories)
+
+    out.attempt(work)
+
+
+def _draw(out: Output, trial: Path, path: Path) -> None:
+    from zfcal.artifacts.atomic import write_whole
+    from zfcal.online.opening import open_trial
+    from zfcal.online.stretch import read_tracked
+    from zfcal.report.trajectories_figure import draw_trajectories
+
+    arena = open_trial(trial).arena
+    write_whole(path, lambda part: draw_trajectories(arena, read_tracked(trial), part))
+    out.note(f"{path}: paths drawn.")

@@ -93,6 +93,22 @@ def read_stretch(opened: OpenTrial, window_s: tuple[int, int] | None, tell: Tell
     )
 
 
+def read_tracked(root: Path) -> Tracks:
+    """Return all rows of a trial's segments.
+
+    Raises
+    ------
+    InputError
+        There are no segments.
+    DamagedError
+        One is damaged.
+    """
+    files = segment_files(root, None)
+    if not files:
+        raise InputError(f"{root}: has no tracks.", hint=f"Make them with: zfcal track {root}")
+    return concatenate([read_tracks(path) for path in files])
+
+
 def segment_files(root: Path, window_s: tuple[int, int] | None) -> list[Path]:
     """Return the segments of a trial that a stretch touches, in order of time."""
     starts = segment_starts(root)
