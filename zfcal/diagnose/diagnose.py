@@ -23,6 +23,7 @@ from zfcal.diagnose.findings import (
     Screened,
     Verdict,
 )
+from zfcal.diagnose.heldout import own_speeds
 from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
 from zfcal.diagnose.null import (
     Chain,
@@ -47,6 +48,7 @@ from zfcal.diagnose.selection import (
     Step,
     best_of,
 )
+from zfcal.diagnose.sharpening import sharpened
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.tracing import trace
 from zfcal.model.effects import Effect, find_effect
@@ -108,14 +110,17 @@ class _Case:
     @cached_property
     def chain(self) -> Chain:
         """What makes replicates of the fitted model."""
-        return Chain(
-            samples=self.question.samples,
-            arena=self.question.arena,
-            fitted=self.screen.fitted,
-            measurement=Measurement(noise_m=_noise(self.question), grain_m=self.question.grain_m),
-            seed=self.question.seed,
-            keeps=_QUICK_REPLICATES if self.question.quick else 0,
+        question, fitted = self.question, self.screen.fitted
+        chain = Chain(
+            samples=question.samples,
+            arena=question.arena,
+            fitted=fitted,
+            maker=own_speeds(self.screen, fitted.parameters, question.arena.bins.speed_m_s),
+            measurement=Measurement(noise_m=_noise(question), grain_m=question.grain_m),
+            seed=question.seed,
+            keeps=_QUICK_REPLICATES if question.quick else 0,
         )
+        return sharpened(chain) if _has_noise(question) else chain
 
 
 def diagnose(question: Question, tell: Tell) -> Diagnosis:
@@ -139,12 +144,13 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     scores = ask_all(case.screen, case.listed, question.n_workers)
     asked = _asked(question, scores)
     rows = _null_rows(case, asked, tell)
-    names = tuple(each.name for each in asked)
     own = case.at_large(0, case.screen)
     omnibus = judge(own[1], [row.at_large[1] for row in rows if row.at_large])
     selector = Selector(
         listed=Asked(
-            candidates=case.listed, names=names, null=_null([row.listed for row in rows], names)
+            candidates=case.listed,
+            held=asked,
+            null=_null([row.listed for row in rows], len(asked)),
         ),
         rivals=lambda screen: _rivals(case, screen),
         suspicious=_is_suspicious(question, omnibus),
@@ -223,14 +229,14 @@ def _noise(question: Question) -> float:
     return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
 
 
-def _null(rows: Sequence[Floats], names: Sequence[str]) -> Null:
-    return from_replicates(np.array(rows)) if len(rows) > 2 else theory(len(names))
+def _null(rows: Sequence[Floats], n_statistics: int) -> Null:
+    return from_replicates(np.array(rows)) if len(rows) > 2 else theory(n_statistics)
 
 
 def _rivals(case: _Case, screen: Screen) -> list[Best]:
     """Return what beyond the list a model is asked for, held against a few replicates."""
     question = case.question
-    alone = Asked(candidates=case.generic, names=(), null=theory(0))
+    alone = Asked(candidates=case.generic, held=(), null=theory(0))
     found = best_of(alone, ask_all(screen, case.generic, question.n_workers))
     found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
     if not found or (question.quick and not _has_noise(question)):
@@ -242,8 +248,7 @@ def _rivals(case: _Case, screen: Screen) -> list[Best]:
 
     n = _QUICK_REPLICATES if question.quick else _GENERIC_REPLICATES
     rows = run_null(case.chain, ask, n, n_workers=question.n_workers)
-    names = tuple(each.name for each in asked)
-    family = Asked(candidates=case.generic, names=names, null=_null(rows, names))
+    family = Asked(candidates=case.generic, held=asked, null=_null(rows, len(asked)))
     return best_of(family, [best.score for best in found])
 
 

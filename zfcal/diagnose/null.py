@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ from zfcal.errors import InputError
 from zfcal.model.extended import Fitted, maximise
 from zfcal.model.scene import Scene, make_scene
 from zfcal.model.simulate import simulate_tracks
+from zfcal.parameters import Parameters
 from zfcal.tracks import ROBOT, Samples
 
 Floats = NDArray[np.float64]
@@ -186,6 +187,8 @@ class Chain:
         The model at its maximum likelihood.
     measurement
         Noise and grain.
+    maker
+        The model that makes the replicates; None for the fitted one.
     seed
         Of the trial.
     keeps
@@ -197,8 +200,14 @@ class Chain:
     fitted: Fitted
     measurement: Measurement
     seed: int
+    maker: Parameters | None = None
     keeps: int = 0
     kept: dict[int, Screen] = field(default_factory=dict)
+
+    @property
+    def simulated(self) -> Parameters:
+        """The model that makes the replicates."""
+        return self.fitted.parameters if self.maker is None else self.maker
 
     def screen(self, number: int) -> Screen:
         """Return replicate ``number``, fitted and ready to be asked."""
@@ -211,7 +220,8 @@ class Chain:
 
     def _made(self, number: int) -> Screen:
         word = int(np.random.SeedSequence([self.seed, 7, number]).generate_state(1)[0])
-        made = replicate(self.samples, self.arena, self.fitted, self.measurement, seed=word)
+        maker = replace(self.fitted, parameters=self.simulated)
+        made = replicate(self.samples, self.arena, maker, self.measurement, seed=word)
         scene = make_scene(made, self.arena)
         again = maximise(
             scene,

@@ -8,6 +8,7 @@ asked again, until nothing is left.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -40,6 +41,9 @@ _IN_REACH = 0.5
 """Share of the clearest one's standard errors below which a suspect is not put into the model:
 it would have to gain four times what its score promises."""
 
+_UNLIKE = 0.25
+"""Share of what noise makes of a statistic that its replicates may miss."""
+
 _STANDS = 3.0
 _RIVAL_AHEAD = 3.0
 _RIVAL_TIMES = 1.25
@@ -55,21 +59,25 @@ class Asked:
     ----------
     candidates
         Each effect at each shape.
-    names
-        Effects of which the null is known, each at the shape that the recording asks for.
+    held
+        Those of which the null is known: effects at the shape that the recording asks for.
     null
-        Of their z, in the order of the names; the theory for all others.
+        Of their z, in their order; the theory for all others.
     """
 
     candidates: tuple[Candidate, ...]
-    names: tuple[str, ...]
+    held: tuple[Candidate, ...]
     null: Null
 
     def standardised(self, scores: Sequence[Score]) -> Floats:
         """Return z less its centre over its spread; zero on the side that cannot be."""
         own = [self.centre_of(score.candidate) for score in scores]
         centre, spread = np.array(own).reshape(-1, 2).T
-        z = (np.array([score.z for score in scores]) - centre) / spread
+        raw = np.array([score.z for score in scores])
+        z = (raw - centre) / spread
+        # What noise does to another shape of the effect is not known: it may be nothing.
+        exact = np.array([score.candidate in self.held for score in scores], dtype=bool)
+        z = np.where(exact | (np.abs(z) < np.abs(raw)), z, raw)
         one_sided = np.array([not score.candidate.signed for score in scores])
         return np.where(one_sided & (z < 0), 0.0, z)
 
@@ -79,11 +87,16 @@ class Asked:
         return np.asarray(-np.expm1(len(z) * np.log1p(-np.minimum(own, 1 - 1e-16))))
 
     def centre_of(self, candidate: Candidate) -> tuple[float, float]:
-        """Return centre and spread of a candidate's z."""
-        if candidate.name not in self.names:
+        """Return centre and spread of a candidate's z, the effect's at another shape if need be.
+
+        The spread holds that replicates are the recording's measurement in parts only.
+        """
+        names = [each.name for each in self.held]
+        if candidate.name not in names:
             return 0.0, 1.0
-        at = self.names.index(candidate.name)
-        return float(self.null.centre[at]), float(self.null.spread[at])
+        at = names.index(candidate.name)
+        centre = float(self.null.centre[at])
+        return centre, math.hypot(float(self.null.spread[at]), _UNLIKE * centre)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
