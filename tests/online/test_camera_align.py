@@ -31,11 +31,11 @@ def filmed_robot():
 
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory):
-    """Return a trial of 14 s whose camera below is off by 36 mm, and its true camera."""
+    """Return a trial of 12 s whose camera below is off by 36 mm, and its true camera."""
     root = tmp_path_factory.mktemp("filmed") / "trial"
     create_trial(root, NewTrial(n_fish=2, n_robots=1, fps=15, arena="open-square"), [].append)
     module = filmed_robot()
-    _, below = module.film(root, seconds=14, n_fish=2, angle_rad=ANGLE, shift_m=SHIFT, late_s=0.1)
+    _, below = module.film(root, seconds=12, n_fish=2, angle_rad=ANGLE, shift_m=SHIFT, late_s=0.1)
     return root, below
 
 
@@ -74,11 +74,7 @@ def test_the_trial_uses_it_and_the_calibration_stays(trial):
     assert "below-aligned.toml" in made
     assert read_trial(trial).cameras["below"]["file"] == "cameras/below-aligned.toml"
     assert (trial / "cameras" / "below.toml").read_bytes() == before
-    again = aligned(trial)
-    assert any(isinstance(event, UpToDate) for event in again)
-    first = (trial / "cameras" / "below-aligned.toml").read_bytes()
-    aligned(trial, force=True)
-    assert (trial / "cameras" / "below-aligned.toml").read_bytes() == first
+    assert any(isinstance(event, UpToDate) for event in aligned(trial))
 
 
 def test_a_dry_run_looks_at_no_image(trial):

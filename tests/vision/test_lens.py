@@ -110,6 +110,16 @@ def test_what_is_lost_stays_lost_and_harms_nobody_else():
     assert WIDE.to_pixels(np.empty((0, 3, 2))).shape == (0, 3, 2)
 
 
+@pytest.mark.parametrize("lens", LENSES)
+def test_pixels_far_outside_alone_have_no_ray_or_their_own(lens):
+    """None of them within the lens's reach: NaN, or a ray that comes back."""
+    far = np.array([[-5e4, -5e4], [9e4, 100.0]])
+    rays = lens.to_rays(far)
+    back = lens.to_pixels(rays)
+    assert np.isnan(rays).all(axis=1).any()
+    np.testing.assert_allclose(back[np.isfinite(back)], far[np.isfinite(back)], atol=1e-5)
+
+
 def test_half_the_size_sees_the_same_rays():
     """The middle of the first 2 x 2 pixels is that of the first pixel of the half image."""
     half = WIDE.scaled((320, 240))

@@ -207,7 +207,8 @@ def _unknown(place: _Place, name: str) -> Iterator[Finding]:
     named = {place.trial.arena, place.trial.model} if place.trial else set()
     if place.trial and place.trial.cameras:
         named |= {path for camera in place.trial.cameras.values() for path in camera.values()}
-    if name == CONFIG_NAME or name in named or folder in {"diagnosis", "report"}:
+    is_figure = folder == "cameras" and name.endswith(".png")
+    if name == CONFIG_NAME or name in named or is_figure or folder in {"diagnosis", "report"}:
         return
     says = "is no artifact of a trial, and no command reads it"
     if re.fullmatch(r"\d{1,5}\D.*", name.rpartition("/")[2]):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -109,12 +109,16 @@ class Fitted:
     parameters: Floats
 
 
+Start: TypeAlias = tuple[Lens, Sequence[Camera]]
+"""A lens and a camera for each view, from where a search may start."""
+
+
 def fit_views(
     views: Sequence[View],
     size_px: tuple[int, int],
     free: Freedom,
     *,
-    start: tuple[Lens, Sequence[Camera]] | None = None,
+    start: Start | None = None,
     robust: bool = False,
 ) -> Fitted:
     """Fit a lens, and a pose for each view.
@@ -162,9 +166,7 @@ def fit_views(
     )
 
 
-def find_start(
-    views: Sequence[View], size_px: tuple[int, int], model: str
-) -> tuple[Lens, list[Camera]]:
+def find_start(views: Sequence[View], size_px: tuple[int, int], model: str) -> Start:
     """Return a lens without distortion and poses that roughly see the views.
 
     Raises

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import Fitted, Freedom, View, fit_pose, fit_views
+from zfcal.vision.bundle import Fitted, Freedom, Start, View, find_start, fit_pose, fit_views
 from zfcal.vision.calibration import summary
 from zfcal.vision.lens import FISHEYE, PINHOLE, Floats, Lens
 
@@ -125,8 +125,9 @@ def calibrate_lens(
     unseen = [
         (errors, free)
         for name in ((PINHOLE, FISHEYE) if model is None else (model,))
+        if (start := _start(views, size_px, name)) is not None
         for free in LADDERS[name]
-        if np.isfinite(errors := _cross_validated(views, size_px, free)).all()
+        if np.isfinite(errors := _cross_validated(views, size_px, free, start)).all()
     ]
     tried = _judged(unseen)
     if not tried:
@@ -140,7 +141,16 @@ def calibrate_lens(
     return _calibration(views, fitted, chosen, tried, labels)
 
 
-def _cross_validated(views: Sequence[View], size_px: tuple[int, int], free: Freedom) -> Floats:
+def _start(views: Sequence[View], size_px: tuple[int, int], model: str) -> Start | None:
+    try:
+        return find_start(views, size_px, model)
+    except InputError:
+        return None
+
+
+def _cross_validated(
+    views: Sequence[View], size_px: tuple[int, int], free: Freedom, start: Start
+) -> Floats:
     """Return the distances in pixels of corners whose view the lens has not seen.
 
     The pose of such a view is found from every other corner and judged by the rest.
@@ -149,8 +159,9 @@ def _cross_validated(views: Sequence[View], size_px: tuple[int, int], free: Free
     folds = np.arange(len(views)) % min(N_FOLDS, len(views))
     for fold in range(folds.max() + 1):
         kept = [view for view, at in zip(views, folds, strict=True) if at != fold]
+        cameras = [camera for camera, at in zip(start[1], folds, strict=True) if at != fold]
         try:
-            lens = fit_views(kept, size_px, free).lens
+            lens = fit_views(kept, size_px, free, start=(start[0], cameras)).lens
         except InputError:
             return np.array([np.nan])
         for view, at in zip(views, folds, strict=True):

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import Fitted, Freedom, View, fit_pose, fit_views
+from zfcal.vision.bundle import Fitted, Freedom, Start, View, find_start, fit_pose, fit_views
 from zfcal.vision.calibration import (
     Calibration,
     Pairs,
@@ -187,11 +187,12 @@ def _try_all(pairs: Pairs, model: str | None, *, robust: bool) -> Sequence[Tried
         errors = _cross_validated(pairs, None, robust=robust)
         tried.append(Tried(name="homography", n_parameters=8, errors_m=errors, free=None))
     for name in (PINHOLE, FISHEYE) if model is None else (model,):
+        start = _start(pairs, name)
         for free in LADDERS[name]:
             n_parameters = N_POSE + free.n_lens
-            if 2 * len(pairs) < n_parameters + SPARE:
+            if 2 * len(pairs) < n_parameters + SPARE or start is None:
                 continue
-            errors = _cross_validated(pairs, free, robust=robust)
+            errors = _cross_validated(pairs, free, start=start, robust=robust)
             if np.isfinite(errors).sum() > len(pairs) / 2:
                 tried.append(
                     Tried(name=free.name, n_parameters=n_parameters, errors_m=errors, free=free)
@@ -199,8 +200,20 @@ def _try_all(pairs: Pairs, model: str | None, *, robust: bool) -> Sequence[Tried
     return tried
 
 
-def _cross_validated(pairs: Pairs, free: Freedom | None, *, robust: bool) -> Floats:
-    """Return each point's distance in metres by a fit that has not seen it."""
+def _start(pairs: Pairs, model: str) -> Start | None:
+    try:
+        return find_start([View(px=pairs.px, m=pairs.m)], pairs.size_px, model)
+    except InputError:
+        return None
+
+
+def _cross_validated(
+    pairs: Pairs, free: Freedom | None, *, start: Start | None = None, robust: bool
+) -> Floats:
+    """Return each point's distance in metres by a fit that has not seen it.
+
+    The search for it starts from where all points roughly fit: that saves most of the time.
+    """
     errors = np.full(len(pairs), np.nan)
     folds = np.arange(len(pairs)) % min(N_FOLDS, len(pairs))
     for fold in range(folds.max() + 1):
@@ -212,7 +225,7 @@ def _cross_validated(pairs: Pairs, free: Freedom | None, *, robust: bool) -> Flo
             if free is None:
                 camera = fit_homography(some)
             else:
-                camera = _fit(some, free, robust=robust).cameras[0]
+                camera = _fit(some, free, start=start, robust=robust).cameras[0]
         except InputError:
             continue
         off = camera.to_metres(pairs.px[~seen]) - pairs.m[~seen]
@@ -220,8 +233,9 @@ def _cross_validated(pairs: Pairs, free: Freedom | None, *, robust: bool) -> Flo
     return errors
 
 
-def _fit(pairs: Pairs, free: Freedom, *, robust: bool) -> Fitted:
-    return fit_views([View(px=pairs.px, m=pairs.m)], pairs.size_px, free, robust=robust)
+def _fit(pairs: Pairs, free: Freedom, *, start: Start | None = None, robust: bool) -> Fitted:
+    view = View(px=pairs.px, m=pairs.m)
+    return fit_views([view], pairs.size_px, free, start=start, robust=robust)
 
 
 def _simplest_of_the_best(tried: Sequence[Tried]) -> Tried:

@@ -154,6 +154,9 @@ class Lens:
 
     def _project(self, rays: Floats) -> Floats:
         """Return the pixels of finite rays, folded or not."""
+        if not len(rays):
+            # OpenCV's fish-eye has no answer to no question.
+            return np.empty((0, 2))
         if len(rays) > _AT_ONCE:
             parts = range(0, len(rays), _AT_ONCE)
             return np.concatenate([self._project(rays[i : i + _AT_ONCE]) for i in parts])

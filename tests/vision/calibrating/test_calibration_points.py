@@ -33,14 +33,14 @@ def test_the_pose_of_a_known_lens_is_found_exactly(rig, name, n):
 
 @BOTH
 def test_noise_of_a_third_of_a_pixel_leaves_less_than_a_millimetre(rig, name):
-    """Sixteen points, twenty draws: the error all over the tank, median and nearly largest."""
+    """Sixteen points, twelve draws: the error all over the tank, median and nearly largest."""
     camera = rig.cameras[name]
     errors = [
         rig.true_errors_mm(
             calibrate_pose(camera.lens, rig.pairs_of(camera, 4, noise_px=0.3, seed=seed)).camera,
             camera,
         )
-        for seed in range(20)
+        for seed in range(12)
     ]
     assert np.median(errors) < 0.7
     assert np.percentile(errors, 99) < 3.0
@@ -61,7 +61,7 @@ def test_points_left_out_tell_the_noise(rig, name):
     turn=st.floats(-math.pi, math.pi),
     away_m=st.floats(0.7, 2.5),
 )
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_any_pose_is_found(rig, tilt, around, turn, away_m):
     """From above, however tipped and turned: the other pose that a plane has is told apart."""
     down = np.diag([1.0, -1.0, -1.0])
@@ -109,7 +109,7 @@ def test_a_focal_length_that_cannot_be_known_is_said_to_be_so(rig):
     straight = dataclasses.replace(
         rig.overhead, rotation_rad=(math.pi, 0, 0), distortion=(-0.2, 0, 0, 0, 0)
     )
-    found = calibrate_points(rig.pairs_of(straight, 6, noise_px=0.2), model="pinhole")
+    found = calibrate_points(rig.pairs_of(straight, 5, noise_px=0.2), model="pinhole")
     assert any("focal length is known to" in note for note in found.notes)
     assert np.median(rig.true_errors_mm(found.camera, straight)) < 0.7
 
