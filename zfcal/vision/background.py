@@ -28,7 +28,7 @@ LEARN_RATE = 0.05
 _BLACK = 12
 """A frame whose brightest hundredth is darker than this grey shows nothing."""
 
-_UNIFORM = 2.0
+_UNIFORM = 0.5
 """A frame whose greys spread less than this shows nothing either."""
 
 _SAMPLES = 25
@@ -90,7 +90,7 @@ def grey_of(image: Image) -> Grey:
 
 def shows_nothing(grey: Grey) -> bool:
     """Tell whether an image is black or of one grey: a lens cap, a lost signal."""
-    some = grey[::8, ::8]
+    some = grey[::4, ::4]
     return bool(np.quantile(some, 0.99) < _BLACK or some.std() < _UNIFORM)
 
 
@@ -236,7 +236,10 @@ def _without_sitters(learnt: Background, samples: list[Grey], *, light: bool) ->
     # Opened, so that a flickering edge, a pixel wide, stays what it was learnt as.
     square = np.ones((3, 3), np.uint8)
     core = cv2.morphologyEx((away > width).astype(np.uint8), cv2.MORPH_OPEN, square)
-    sat = (cv2.dilate(core, square, iterations=2) > 0) & (away > 0)
+    # Whole pieces that hold some of what is left, and their edges: tails are thin.
+    _, piece = cv2.connectedComponents((away > width).astype(np.uint8), connectivity=8)
+    held = np.isin(piece, np.setdiff1d(piece[core > 0], 0)).astype(np.uint8)
+    sat = (cv2.dilate(held, square, iterations=2) > 0) & (away > 0)
     level = np.where(sat, usual, learnt.level)
     below = learnt.level.astype(np.int16) - learnt.low
     above = learnt.high.astype(np.int16) - learnt.level

@@ -59,7 +59,7 @@ class Bodies:
         Where the number of animals is known, only frames with as many blobs count; otherwise
         all blobs do that are not much fainter or smaller than the others.
         """
-        darkness = _usual_darkness([blob for blobs in frames for blob in blobs])
+        darkness = _usual_darkness(frames, n_agents)
         dark = [[b for b in blobs if b.darkness > _FAINT * darkness] for blobs in frames]
         whole = [blobs for blobs in dark if len(blobs) == n_agents] or dark
         kept = [blob for blobs in whole for blob in blobs]
@@ -84,11 +84,16 @@ class Bodies:
         self._fresh = 0
 
 
-def _usual_darkness(blobs: Sequence[Blob]) -> float:
-    """Return the darkness that half of what is dark lies above, by area."""
-    if not blobs:
-        return math.nan
-    darkness = np.array([blob.darkness for blob in blobs])
-    order = np.argsort(darkness)
-    mass = np.cumsum(np.array([blob.area_px for blob in blobs])[order] * darkness[order])
-    return float(darkness[order][np.searchsorted(mass, mass[-1] / 2)])
+def _usual_darkness(frames: Sequence[Sequence[Blob]], n_agents: int | None) -> float:
+    """Return the median darkness of the blobs of each frame that weigh most.
+
+    As many as there are animals; where that is not known, those that weigh at least a quarter
+    of the heaviest. A lure, much darker than fish, is one of several.
+    """
+    darkness = []
+    for blobs in frames:
+        heavy = sorted(((b.area_px * b.darkness, b.darkness) for b in blobs), reverse=True)
+        if n_agents is None:
+            heavy = [each for each in heavy if each[0] > 0.25 * heavy[0][0]]
+        darkness += [each[1] for each in heavy[:n_agents]]
+    return float(np.median(darkness)) if darkness else math.nan

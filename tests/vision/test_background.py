@@ -1,0 +1,120 @@
+"""The empty tank is learnt from frames with fish in them, or taken from an image."""
+
+import cv2
+import numpy as np
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.vision.background import (
+    BackgroundLearner,
+    background_of,
+    background_of_many,
+    grey_of,
+    shows_nothing,
+)
+
+
+def learnt(images, **how):
+    """Return the background of some images."""
+    learner = BackgroundLearner(n_frames=len(images))
+    for image in images:
+        learner.add(image)
+    return learner.freeze(**how)
+
+
+def test_what_is_read_off_the_frozen_mixture_is_what_it_calls_background(drawn):
+    """Pixel by pixel the same as OpenCV's own answer, for greys about the tank's."""
+    rng = np.random.default_rng(1)
+    images = [drawn.image([], rng=rng, size=60) for _ in range(40)]
+    mixture = cv2.createBackgroundSubtractorMOG2(history=40, varThreshold=16.0, detectShadows=False)
+    mixture.setBackgroundRatio(0.5)
+    for number, image in enumerate(images):
+        mixture.apply(image, None, 0.05 if number else 1.0)
+
+    background = learnt(images)
+
+    for away in (-30, -9, -5, 0, 5, 9, 30):
+        probe = np.clip(background.level.astype(int) + away, 0, 255).astype(np.uint8)
+        asked = mixture.apply(probe, None, 0.0) == 0
+        read = (probe >= background.low) & (probe <= background.high)
+        np.testing.assert_array_equal(read, asked)
+
+
+def test_fish_that_swim_leave_no_trace(drawn):
+    """Three fish on a circle: the tank within its noise everywhere."""
+    images = [drawn.image(bodies) for bodies in drawn.circling(100)]
+
+    assert np.abs(learnt(images).level.astype(int) - 180).max() <= 8
+
+
+def test_a_fish_that_rests_for_the_last_second_is_no_tank(drawn):
+    """It swims for 70 frames and rests for 30: longer than the mixture remembers."""
+    moving = drawn.circling(70, n=1)
+    images = [drawn.image(bodies) for bodies in moving + [moving[-1]] * 30]
+
+    assert learnt(images).level.min() > 165
+
+
+def test_frames_that_show_nothing_are_not_learnt_from(drawn):
+    """Black, and of one grey; a tank with a fish shows something."""
+    learner = BackgroundLearner(n_frames=5)
+
+    assert not learner.add(np.zeros((50, 50), np.uint8))
+    assert not learner.add(np.full((50, 50), 128, np.uint8))
+    assert learner.count == 0
+    assert learner.add(drawn.image([(100, 100, 0)]))
+    assert not shows_nothing(drawn.image([(100, 100, 0)]))
+
+
+def test_without_a_frame_of_use_there_is_no_background():
+    """One clear line, and what to do."""
+    with pytest.raises(InputError, match="No frame shows a tank") as caught:
+        BackgroundLearner().freeze()
+    assert "--background" in caught.value.hint
+
+
+def test_frames_of_two_sizes_do_not_mix(drawn):
+    """What was expected and what came."""
+    learner = BackgroundLearner()
+    learner.add(drawn.image([], size=80))
+
+    with pytest.raises(InputError, match="80 x 80 px, got one of 60 x 60 px"):
+        learner.add(drawn.image([], size=60))
+
+
+def test_the_median_of_frames_is_a_background(drawn):
+    """Fish that swim are not in it; its range is four standard deviations of the noise."""
+    background = background_of_many([drawn.image(b) for b in drawn.circling(40)])
+
+    assert np.abs(background.level.astype(int) - 180).max() <= 9
+    assert background.low[0, 0] == pytest.approx(172, abs=2)
+
+
+def test_a_negative_of_the_negative_is_the_same(drawn):
+    """And what was darker than the tank is lighter in between."""
+    background = background_of(drawn.image([], noise=0.0))
+    twice = background.inverted().inverted()
+
+    assert background.inverted().level[0, 0] == 255 - 180
+    for name in ("level", "low", "high"):
+        np.testing.assert_array_equal(getattr(twice, name), getattr(background, name))
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.0, 1.3])
+def test_the_gain_is_how_much_brighter_an_image_is(drawn, factor):
+    """Fish in it do not count."""
+    background = background_of(drawn.image([], noise=0.0))
+    image = drawn.image(drawn.circling(1)[0], noise=0.0)
+
+    assert background.gain((image * factor).astype(np.uint8)) == pytest.approx(factor, rel=0.01)
+
+
+def test_colour_becomes_grey_and_grey_stays():
+    """OpenCV's weights for blue, green and red."""
+    colour = np.zeros((4, 4, 3), np.uint8)
+    colour[..., 1] = 100
+    grey = np.full((4, 4), 7, np.uint8)
+
+    assert grey_of(colour)[0, 0] == 59
+    assert grey_of(grey) is grey
+    assert grey_of(grey[..., None]).shape == (4, 4)

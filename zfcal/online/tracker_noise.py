@@ -1,0 +1,41 @@
+"""How exact the tracker's own positions are: what a diagnosis has to know of them.
+
+Noise is that of the animals seen alone. Errors of a tracker are not white: the posture of a
+body moves its seen centroid for several frames in a row. What is estimated is the white noise
+with the same second differences, which is what the diagnosis takes noise to be.
+"""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.diagnose.noise import from_frames
+from zfcal.tracks import Tracks
+
+_ALONE = 0.75
+"""Confidence from which an animal was alone in its blob, and known for a while."""
+
+
+def tracker_noise(tracks: Tracks, *, fps: float, dt_s: float) -> float | None:
+    """Return the position noise of tracks, standard deviation per coordinate in metres.
+
+    Parameters
+    ----------
+    tracks
+        As tracked, at the full frame rate.
+    fps
+        Frames per second.
+    dt_s
+        The model's step.
+
+    Returns
+    -------
+    float or None
+        None where there are too few frames in a row, or none between two steps.
+    """
+    per_step = max(1, round(fps * dt_s))
+    alone = tracks.take(tracks.confidence >= _ALONE)
+    if per_step < 2 or len(alone) < 3:
+        return None
+    sd_m, _ = from_frames(alone, fps=fps, per_step=per_step)
+    return sd_m if math.isfinite(sd_m) else None
