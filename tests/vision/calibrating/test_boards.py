@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.vision.boards import Board, draw_board, find_board
+from zfcal.vision.boards import Board, _right_way_round, draw_board, find_board
 from zfcal.vision.bundle import View
 from zfcal.vision.calibration_boards import calibrate_lens, coverage
 
@@ -51,6 +51,9 @@ def test_a_board_turned_round_is_known_by_its_colours(rig):
     upright, turned = find_board(image, CHESS), find_board(image[::-1, ::-1].copy(), CHESS)
     last = np.array(image.shape[::-1]) - 1
     np.testing.assert_allclose(turned.px, last - upright.px, atol=0.3)
+    # OpenCV's newer finder sees to that itself, the older one does not.
+    np.testing.assert_array_equal(_right_way_round(image, CHESS, upright.px[::-1]), upright.px)
+    np.testing.assert_array_equal(_right_way_round(image, CHESS, upright.px), upright.px)
 
 
 def test_a_board_that_is_not_there_is_not_found():
