@@ -16,10 +16,11 @@ from .report import write_page
 @click.option("--force", is_flag=True, help="Make it again, even if it is up to date.")
 @speaks
 def command(out: Output, folder: Path, *, force: bool) -> None:
-    r"""Simulate a tank, import its tracks, analyse, calibrate and report.
+    r"""Simulate a tank and its cameras, track, analyse, calibrate and report.
 
-    DIR gets tank/ (the simulated truth), tracks.csv (what a tracker would have
-    written) and trial/ (all that is made from that file). Takes a minute or so.
+    DIR gets tank/ (the simulated truth and the images of it), trial/ (all that
+    is made from these images) and a contact sheet of the worst frames. Takes a
+    minute or two.
 
     \b
     Example:

@@ -264,17 +264,20 @@ def test_a_full_disk_is_said_and_loses_nothing(process, trial):
     assert process("analyse", "trial").code == 0
 
 
+@pytest.mark.slow
 def test_a_demo_ends_with_figures(zfcal, monkeypatch):
-    """A shorter one than people get; its second run does nothing."""
+    """A shorter one than people get, tracked from images; its second run does nothing."""
     from zfcal.calibrate.task import Settings
 
     quick = Settings(
         population=4, generations=1, steps=20, n_confirmed=1, long_runs=1, long_s=20, n_windows=4
     )
-    monkeypatch.setattr("zfcal.online.demo.DURATION_S", 180.0)
+    monkeypatch.setattr("zfcal.online.demo.DURATION_S", 120.0)
+    monkeypatch.setattr("zfcal.online.demo.FPS", 5.0)
     monkeypatch.setattr("zfcal.online.demo.SETTINGS", quick)
     done = zfcal("demo", "here")
     assert done.code == 0
     assert "Figures: here/trial/report" in done.err
-    assert "here/trial/models/000180.toml" in done.lines
+    assert "here/trial/models/000120.toml" in done.lines
+    assert "here/trial/poses/000060.mcap" in done.lines
     assert "nothing to do" in zfcal("demo", "here").err

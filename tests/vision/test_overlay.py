@@ -136,11 +136,11 @@ def test_the_worst_frame_of_a_second_is_kept():
     assert tiles == [number % 251 for number in expected]
 
 
-def test_a_sheet_of_nothing_is_none():
-    """A frame that is not bad is not wanted."""
+def test_a_sheet_without_frames_is_none():
+    """Where there is nothing wrong the first frames are shown."""
     worst = WorstFrames()
-    assert not worst.wants(0.0, 1.0)
     assert worst.sheet() is None
+    assert worst.wants(0.0, 1.0)
 
 
 def test_a_video_appears_when_it_is_closed(tmp_path):

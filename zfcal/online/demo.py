@@ -1,7 +1,8 @@
-"""A whole small trial from nothing: a simulated tank, and the main job on its tracks."""
+"""A whole small trial from nothing: a simulated tank, its camera images, and the main job."""
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from zfcal.artifacts.atomic import write_text_whole
@@ -10,14 +11,17 @@ from zfcal.calibrate.task import Settings
 from zfcal.online.analyse import AnalyseOptions, analyse
 from zfcal.online.calibrate import CalibrateOptions, calibrate
 from zfcal.online.events import Made, Note, Tell, UpToDate
-from zfcal.online.import_ import Source, import_tracks
+from zfcal.online.film import FilmOptions, film, frames_folder
 from zfcal.online.opening import Task
+from zfcal.online.rig import BELOW, OVERHEAD, CameraChoice
 from zfcal.online.segments import segment_path, segment_starts
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.online.simulate import SimulateOptions, simulate
+from zfcal.online.track import track
+from zfcal.online.track_plan import Pictures, TrackOptions
 from zfcal.tracks import KINDS, Tracks, concatenate
 
-DURATION_S = 360.0
+DURATION_S = 180.0
 FPS = 15.0
 TANK_SEED = 27
 """With this one the fish visit both rooms, and the corridor 9 % of the time, within six minutes."""
@@ -27,7 +31,7 @@ TRIAL_SEED = 1
 SETTINGS = Settings(
     population=40, generations=10, steps=1500, n_confirmed=4, long_runs=4, n_windows=100
 )
-"""A quarter of the default effort: five windows in well under a minute on two cores."""
+"""A quarter of the default effort: two windows in well under a minute on two cores."""
 
 _HEAD = "time_s,agent,kind,x_m,y_m,heading_rad\n"
 
@@ -38,8 +42,9 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
     Parameters
     ----------
     folder
-        Gets ``tank/`` (the simulated truth), ``tracks.csv`` (what a tracker would
-        have written of it) and ``trial/`` (everything made from that file).
+        Gets ``tank/`` (the simulated truth, and what its cameras saw), ``trial/``
+        (everything made from the images) and ``contact-sheet.png`` (the frames with
+        which most is wrong).
     tell
         Hears of every file.
     task
@@ -51,30 +56,28 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
         The trial.
     """
     task = task or Task()
-    tank, trial, csv = folder / "tank", folder / "trial", folder / "tracks.csv"
+    tank, trial = folder / "tank", folder / "trial"
     new = NewTrial(n_fish=4, n_robots=1, fps=FPS, arena="two-rooms", seed=TANK_SEED)
     made = create_trial(tank, new, tell, task=task)
     swim = SimulateOptions(model=tank / made.model, duration_s=DURATION_S)
     simulate(tank, swim, tell, task=task)
-    export_csv(tank, csv, tell)
-    create_trial(
-        trial,
-        NewTrial(
-            n_fish=4,
-            n_robots=1,
-            fps=FPS,
-            arena="two-rooms",
-            seed=TRIAL_SEED,
-            source="zfcal demo: simulated fish and robot, through a CSV file",
-        ),
-        tell,
-        task=task,
-    )
-    import_tracks(trial, Source(path=csv, format="csv", options={}), tell, task=task)
+    film(tank, FilmOptions(), tell, task=task)
+    seen = dataclasses.replace(new, seed=TRIAL_SEED, source="zfcal demo: images of a drawn tank")
+    create_trial(trial, seen, tell, task=task)
+    track(trial, _cameras(tank, folder / "contact-sheet.png"), tell, task=task)
     analyse(trial, AnalyseOptions(), tell, task=task)
     calibrate(trial, CalibrateOptions(settings=SETTINGS), tell, task=task)
-    tell(Note(text=f"{trial}: a trial of {DURATION_S:g} s, analysed and calibrated."))
+    tell(Note(text=f"{trial}: a trial of {DURATION_S:g} s, tracked, analysed and calibrated."))
     return trial
+
+
+def _cameras(tank: Path, sheet: Path) -> TrackOptions:
+    """Return options that track what the cameras of a drawn tank saw."""
+    overhead, below = (
+        CameraChoice(source=str(frames_folder(tank, name)), file=tank / "cameras" / f"{name}.toml")
+        for name in (OVERHEAD, BELOW)
+    )
+    return TrackOptions(overhead=overhead, below=below, pictures=Pictures(contact_sheet=sheet))
 
 
 def export_csv(root: Path, path: Path, tell: Tell) -> None:

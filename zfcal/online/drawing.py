@@ -64,7 +64,7 @@ class Drawing:
         if self._sheet_path is None:
             return
         if sheet is None:
-            tell(Note(text=f"{self._sheet_path}: not drawn, since nothing was wrong."))
+            tell(Note(text=f"{self._sheet_path}: not drawn, since no frame shows a tank."))
             return
         _, data = cv2.imencode(".png", sheet)
         write_bytes_whole(self._sheet_path, data.tobytes())
