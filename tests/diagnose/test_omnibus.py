@@ -249,3 +249,12 @@ def test_angles_are_counted_to_the_left():
     assert signed_angle(np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]])) == pytest.approx(
         [math.pi / 2]
     )
+
+
+def test_what_noise_explains_is_trusted_to_a_quarter():
+    """Thirteen where replicates show nine is no disagreement; where they show none it is."""
+    rng = np.random.default_rng(12)
+    noisy = [{"a": rng.normal(9, 1)} for _ in range(39)]
+    quiet = [{"a": rng.normal(0, 1)} for _ in range(39)]
+    assert judge({"a": 13.0}, noisy).p > 0.01
+    assert judge({"a": 13.0}, quiet).p < 1e-6

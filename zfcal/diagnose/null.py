@@ -32,6 +32,9 @@ T = TypeVar("T")
 _ROUNDS = 3
 """Steps of a replicate's fit, which starts at the parameters that made it."""
 
+UNLIKE = 0.25
+"""Share of what noise makes of a statistic that its replicates may miss."""
+
 _PRIOR_WEIGHT = 20.0
 """Replicates that the theory, a spread of one, counts for."""
 

@@ -31,6 +31,7 @@ from scipy.stats import t as student
 from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of, normal_of_tail
 from zfcal.diagnose.contexts import contexts, speed_context
+from zfcal.diagnose.null import UNLIKE
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
 from zfcal.diagnose.surroundings import probabilities, surroundings
@@ -260,6 +261,7 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
         squares = float(((drawn - centre) ** 2).sum())
         df = max(drawn.size - 1, 0) + _PRIOR_WEIGHT
         spread = math.sqrt((squares + _PRIOR_WEIGHT) / df * (1 + 1 / max(drawn.size, 1)))
+        spread = math.hypot(spread, UNLIKE * centre)
         made[name] = (z - centre) / spread if n else z
         tails[name] = float(student.sf(made[name], df)) if n else float(ndtr(-z))
     if not made:

@@ -235,15 +235,16 @@ class Screen:
         # Mixtures are compared at a strength worth noticing, tilts next to none.
         tables, angle, strong = self._tables, fitted.view.seen_sr, candidate.notable
         total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
-        if effect.component is not None:
+        shape = candidate.values(strong)
+        if effect.calls("component", shape):
             parts = components_of(scene, at(strong), angle)
             component_score(parts, scene.turns.taken, *tables.mixtures(), some)
             total += some / strong
         if effect.sight is not None:
             total += self._sight_scores(scene, at(strong)) / strong
-        if effect.rotation is not None:
+        if effect.calls("rotation", shape):
             total += self._turned_scores(scene, at(effect.probe)) / effect.probe
-        if effect.factor is not None:
+        if effect.calls("factor", shape):
             tilt, tilt_taken = factors_of(scene, at(effect.probe), angle, tables.probability)
             factor_score(tilt, tilt_taken, tables.probability, some)
             total += some * fitted.weight / effect.probe

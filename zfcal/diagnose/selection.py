@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.heats import unbeaten
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
-from zfcal.diagnose.null import Null
+from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.screening import Score, Screen, ask_all
 
 Floats = NDArray[np.float64]
@@ -40,9 +40,6 @@ is a little different from its mechanism leaves something over that others answe
 _IN_REACH = 0.5
 """Share of the clearest one's standard errors below which a suspect is not put into the model:
 it would have to gain four times what its score promises."""
-
-_UNLIKE = 0.25
-"""Share of what noise makes of a statistic that its replicates may miss."""
 
 _STANDS = 3.0
 _RIVAL_AHEAD = 3.0
@@ -96,7 +93,7 @@ class Asked:
             return 0.0, 1.0
         at = names.index(candidate.name)
         centre = float(self.null.centre[at])
-        return centre, math.hypot(float(self.null.spread[at]), _UNLIKE * centre)
+        return centre, math.hypot(float(self.null.spread[at]), UNLIKE * centre)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

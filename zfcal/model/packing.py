@@ -130,11 +130,11 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         lags=_lags(effects, models, n_models),
         lates=_lates(effects, models, n_models),
         clock_s=np.array([0.0, 1.0]),
-        components=_hooks(effects, "component"),
-        factors=_hooks(effects, "factor"),
-        speeds=_hooks(effects, "speed"),
-        sights=_hooks(effects, "sight"),
-        rotations=_hooks(effects, "rotation"),
+        components=_hooks(effects, "component", models),
+        factors=_hooks(effects, "factor", models),
+        speeds=_hooks(effects, "speed", models),
+        sights=_hooks(effects, "sight", models),
+        rotations=_hooks(effects, "rotation", models),
         effects=_effect_parameters(effects, models, n_models),
     )
 
@@ -169,11 +169,12 @@ def _alias(zone: ZoneParameters) -> tuple[Floats, NDArray[np.int64]]:
     return take, other
 
 
-def _hooks(effects: Sequence[Effect], kind: str) -> NDArray[np.int64]:
+def _hooks(effects: Sequence[Effect], kind: str, models: Sequence[Parameters]) -> NDArray[np.int64]:
+    """Return addresses of the functions of a kind that have anything to do in any model."""
     rows = [
-        (function.address, row)
+        (getattr(effect, kind).address, row)
         for row, effect in enumerate(effects)
-        if (function := getattr(effect, kind)) is not None
+        if any(effect.calls(kind, model.effects[effect.name]) for model in models)
     ]
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
 

@@ -12,6 +12,7 @@ import pytest
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Company, all_effects, find_effect, generic_effects
 from zfcal.model.effects.places import places
+from zfcal.model.packing import pack
 from zfcal.model.simulate import simulate_tracks
 
 LISTED = {
@@ -236,3 +237,31 @@ def test_places_cover_the_tank(two_rooms):
     points = points[two_rooms.zone_of(points) > 0]
     nearest = np.linalg.norm(points[:, None] - found[None], axis=-1).min(axis=1)
     assert nearest.max() < 0.13
+
+
+@EVERY
+def test_what_is_not_called_would_have_done_nothing(effect, ask, two_rooms):
+    """At each shape that leaves a function out: a factor of one, an angle of zero."""
+    rng = np.random.default_rng(8)
+    for shape in effect.shapes(two_rooms):
+        given = shape | {effect.strength: 0.5 * strength_of(effect).default}
+        for _ in range(5):
+            asked = ask(effect.name, given, **random_rows(rng))
+            if effect.factor is not None and not effect.calls("factor", given):
+                assert asked.factor(rng.uniform(-3, 3)) == 1.0
+            if effect.rotation is not None and not effect.calls("rotation", given):
+                assert asked.rotation() == 0.0
+
+
+def test_functions_that_do_nothing_are_not_packed(two_rooms, make_natural):
+    """Alignment that leans has a factor and turns nothing; that which is drawn anew has neither."""
+
+    def packed(**shape):
+        given = {"alignment": {"weight": 5.0, **shape}}
+        return pack([dataclasses.replace(make_natural(two_rooms), effects=given)], two_rooms)
+
+    counts = [
+        (len(own.components), len(own.factors), len(own.rotations))
+        for own in (packed(), packed(leaning=1.0), packed(turning=1.0))
+    ]
+    assert counts == [(1, 0, 0), (1, 1, 0), (1, 1, 1)]

@@ -142,4 +142,5 @@ EFFECT = Effect(
     ),
     lacks=needs_neighbour,
     fixed=("grading", "leaning", "turning"),
+    needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
 )

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from zfcal.arena import Arena
@@ -133,6 +133,9 @@ class Effect:
         scatter.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
+    needs
+        By kind of function: it does nothing, and is not called, where all of these
+        parameters are zero.
     """
 
     name: str
@@ -154,6 +157,7 @@ class Effect:
     stops: bool = False
     individual: bool = False
     fixed: tuple[str, ...] = ()
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -164,6 +168,13 @@ class Effect:
     def on_speed(self) -> bool:
         """Whether it changes the speed; otherwise it changes the heading."""
         return self.speed is not None
+
+    def calls(self, kind: str, given: Mapping[str, float]) -> bool:
+        """Return whether a function of a kind has anything to do at these parameters."""
+        if getattr(self, kind) is None:
+            return False
+        values = dict(zip(self.names, self.values(given), strict=True))
+        return kind not in self.needs or any(values[name] != 0.0 for name in self.needs[kind])
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Return the parameters in their order, with defaults for those not given.

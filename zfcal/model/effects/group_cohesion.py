@@ -102,4 +102,5 @@ EFFECT = Effect(
     ),
     lacks=needs_neighbour,
     fixed=("full_m", "leaning"),
+    needs={"factor": ("leaning",)},
 )

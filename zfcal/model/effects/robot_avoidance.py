@@ -70,4 +70,5 @@ EFFECT = Effect(
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
     lacks=_lacks,
     fixed=("flight",),
+    needs={"factor": ("flight",)},
 )
