@@ -99,14 +99,11 @@ class Fitted:
         It in the pose of each view.
     focal_sd_px
         Standard deviation of the focal length, from the scatter of the points.
-    parameters : ndarray
-        The solution, from where a similar problem can start.
     """
 
     lens: Lens
     cameras: tuple[Camera, ...]
     focal_sd_px: float
-    parameters: Floats
 
 
 Start: TypeAlias = tuple[Lens, Sequence[Camera]]
@@ -162,7 +159,6 @@ def fit_views(
         lens=lens,
         cameras=tuple(cameras),
         focal_sd_px=problem.focal_sd_px(found),
-        parameters=found.x,
     )
 
 
