@@ -34,8 +34,13 @@ def tracker_noise(tracks: Tracks, *, fps: float, dt_s: float) -> float | None:
         None where there are too few frames in a row, or none between two steps.
     """
     per_step = max(1, round(fps * dt_s))
-    alone = tracks.take(tracks.confidence >= _ALONE)
-    if per_step < 2 or len(alone) < 3:
+    if per_step < 2:
         return None
-    sd_m, _ = from_frames(alone, fps=fps, per_step=per_step)
-    return sd_m if math.isfinite(sd_m) else None
+    for least in (_ALONE, 0.0):
+        # In a crowd for most of the time: noise is then that of crowds as well.
+        chosen = tracks.take(tracks.confidence >= least)
+        if len(chosen) >= 3:
+            sd_m, _ = from_frames(chosen, fps=fps, per_step=per_step)
+            if math.isfinite(sd_m):
+                return sd_m
+    return None
