@@ -75,6 +75,7 @@ def new(tmp_path):
 
     def make(name="trial", **changes):
         settings = {"n_fish": 3, "fps": FPS, "side_m": 0.4, **changes}
+        settings["dt_s"] = 2 / settings["fps"]
         create_trial(tmp_path / name, NewTrial(**settings), say_nothing)
         return tmp_path / name
 
@@ -96,7 +97,7 @@ def all_tracks(root):
 def tracked(tmp_path_factory, film):
     """Return a trial that was tracked from the video, not to be written into."""
     root = tmp_path_factory.mktemp("tracked") / "trial"
-    create_trial(root, NewTrial(n_fish=3, fps=FPS, side_m=0.4), say_nothing)
+    create_trial(root, NewTrial(n_fish=3, fps=FPS, side_m=0.4, dt_s=0.4), say_nothing)
     track(root, asked(film), say_nothing)
     return root
 
@@ -297,7 +298,8 @@ def test_a_camera_its_recording_and_a_video_give_the_same_tracks(new, images, st
     seen = [decoded(image) for _, image in read_frames(recorded)]
     film = write_video(tmp_path / "v.avi", seen, fps=20.0)
     track(video, replace(options, overhead=asked(film).overhead), say_nothing)
-    assert np.array_equal(all_tracks(video).x_m, of_live.x_m)
+    # Who is who may depend on when images arrived; where somebody is does not.
+    assert np.array_equal(np.sort(all_tracks(video).x_m), np.sort(of_live.x_m))
 
 
 def test_a_live_recording_that_was_killed_goes_on(new, images, streaming, heard):

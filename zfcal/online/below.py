@@ -9,10 +9,11 @@ from typing import final
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.online.rig import Feed, region_of
+from zfcal.online.rig import Feed
 from zfcal.online.sources import Recorder
 from zfcal.vision.frames import Frame
 from zfcal.vision.pairing import Nearest
+from zfcal.vision.region import region_of
 from zfcal.vision.robot import LedOptions, RobotFinder, RobotSeen
 
 
@@ -44,7 +45,7 @@ class Below:
         self.counts: Counter[str] = Counter()
         keep = None if recorder is None else recorder.keep
         self._images = Nearest(feed.source, feed.shots, keep=keep)
-        mask = (region_of(arena, feed) * np.uint8(255)).astype(np.uint8)
+        mask = (region_of(arena, feed.projection) * np.uint8(255)).astype(np.uint8)
         self._finder = RobotFinder(leds, feed.projection, mask=mask)
         self._last: tuple[float, RobotSeen] | None = None
 

@@ -19,7 +19,7 @@ from zfcal.online.minutes import Minutes, Origins
 from zfcal.online.opening import Task
 from zfcal.online.outcome import Outcome, measured
 from zfcal.online.resuming import STARTED, Resumed, take_up
-from zfcal.online.rig import BELOW, OVERHEAD, Feed, open_feed, region_of
+from zfcal.online.rig import BELOW, OVERHEAD, Feed, open_feed
 from zfcal.online.sources import Recorder
 from zfcal.online.track_plan import Plan
 from zfcal.tracks import FramePoses
@@ -28,6 +28,7 @@ from zfcal.vision.frames import Frame
 from zfcal.vision.fusing import Fuser
 from zfcal.vision.live import ArrivalClock, LiveCamera
 from zfcal.vision.overlay import Scene
+from zfcal.vision.region import region_of
 from zfcal.vision.robot import RobotSeen
 from zfcal.vision.seen import Seen
 from zfcal.vision.stamps import FrameClock, Shot, number_frames
@@ -105,7 +106,7 @@ class Following:
             plan.options.tracker,
             overhead.projection,
             background=self._background(overhead),
-            region=region_of(plan.opened.arena, overhead),
+            region=region_of(plan.opened.arena, overhead.projection),
         )
         drawing = Drawing(plan, overhead)
         self._outcome.begin(overhead, below)

@@ -11,12 +11,12 @@ from typing import final
 import numpy as np
 
 from zfcal.artifacts.lineage import JSON
-from zfcal.diagnose.noise import from_frames
 from zfcal.online.below import Below
 from zfcal.online.events import LeftOut, Note, Result, Tell
 from zfcal.online.rig import Feed
 from zfcal.online.stretch import NOISE_KEY
 from zfcal.online.track_plan import Plan
+from zfcal.online.tracker_noise import tracker_noise
 from zfcal.tracks import FISH, FramePoses, Tracks
 from zfcal.vision.frames import Frame, Image
 from zfcal.vision.robot import RobotSeen
@@ -44,10 +44,8 @@ def measured(plan: Plan, tracks: Tracks) -> Mapping[str, JSON]:
     """Return what is known of a segment's tracks: their noise, where it can be told."""
     trial = plan.opened.trial
     fish = tracks.take(tracks.kind == FISH)
-    if len(fish) < 3:
-        return {}
-    sd_m, _ = from_frames(fish, fps=trial.fps, per_step=max(2, round(trial.fps * trial.dt_s)))
-    return {NOISE_KEY: sd_m} if np.isfinite(sd_m) else {}
+    sd_m = tracker_noise(fish, fps=trial.fps, dt_s=trial.dt_s)
+    return {} if sd_m is None else {NOISE_KEY: sd_m}
 
 
 @final

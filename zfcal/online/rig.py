@@ -7,10 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-import shapely
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
@@ -28,9 +25,6 @@ OVERHEAD, BELOW = "overhead", "below"
 
 _LIVE_RATE = 0.1
 """Arrival times of a dozen images tell a rate no better than that."""
-
-_BESIDE_M = 0.015
-"""Bodies are looked for so far beyond the walls: they have a height, and cameras look aslant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,23 +204,3 @@ def open_feed(opened: OpenTrial, view: View, clock: ArrivalClock) -> Feed:
         size_px=size_px,
         projection=view.projection(opened.arena, size_px),
     )
-
-
-def region_of(arena: Arena, feed: Feed) -> NDArray[np.bool_]:
-    """Return where in the image agents can be.
-
-    Returns
-    -------
-    ndarray of bool, shape (height, width)
-    """
-    width, height = feed.size_px
-    inside = np.zeros((height, width), np.uint8)
-    wide = shapely.buffer(arena.outline, _BESIDE_M, join_style="mitre")
-    # Straight walls are curves to a fish-eye.
-    wide = shapely.segmentize(wide, 0.01)
-    for rings, value in (([wide.exterior], 1), (wide.interiors, 0)):
-        for ring in rings:
-            pixels = feed.projection.to_pixels(np.asarray(ring.coords)[:, :2])
-            known = pixels[np.isfinite(pixels).all(axis=1)]
-            cv2.fillPoly(inside, [np.rint(known).astype(np.int32)], [value])
-    return inside > 0
