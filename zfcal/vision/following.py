@@ -144,13 +144,14 @@ class Trails:
             trail.agent = self._new_id()
         trail.update(detection, time_s, unsure=unsure)
         trail.likeness += 0.1 * (self._likeness(detection) - trail.likeness)
-        if detection.shared == 1 and trail.hits > _PROVEN:
+        if detection.shared == 1 and trail.hits > _PROVEN and trail.is_told:
             self._bodies.add(detection.shape, detection.blob.darkness)
 
     def _likeness(self, detection: Detection) -> float:
-        """Return how much of a usual animal's area and darkness it has, in [0, 1]."""
+        """Return how like a usual animal's its area and darkness are, in [0, 1]."""
         usual = self._bodies.usual
-        area = min(detection.shape.area_px / usual.area_px, 1.0)
+        area = detection.shape.area_px / usual.area_px
+        area = min(area, 1 / area)
         return area * min(detection.blob.darkness / usual.darkness, 1.0)
 
     def _is_animal(self, detection: Detection) -> bool:
