@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.artifacts.checking import check_trial
 from zfcal.artifacts.frame_files import FrameWriter
-from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.pose_files import read_poses
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.errors import InputError
@@ -118,6 +119,14 @@ def test_the_robot_is_told_from_the_fish_in_every_frame(root, filmed):
     fish = tracks.take(tracks.kind == FISH)
     assert len(fish) == 2 * N
     assert len(np.unique(fish.agent)) == 2
+
+
+def test_images_outside_the_trial_are_known_by_their_names(root, filmed):
+    """`zfcal check` does not look for them in the trial."""
+    track(root, options_of(filmed), say_nothing)
+    lineage = read_lineage(root / "tracks" / "000000.parquet")
+    assert {"overhead:000000.mcap", "below:000000.mcap"} < set(lineage.inputs)
+    assert not [found for found in check_trial(root) if "overhead:" in found.says]
 
 
 def test_what_is_drawn_below_does_not_move_the_fish(root, filmed):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.frame_files import FrameWriter, read_frames
+from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.mcap_files import Overview
 from zfcal.errors import InputError
@@ -34,11 +35,14 @@ def files_of(root: Path, text: str) -> dict[str, str]:
     if is_live(text):
         return {}
     images = images_of(text)
-    if images is None or Path(text).is_dir():
-        return hash_sources(root, Path(text))
+    paths = [Path(text)] if images is None or Path(text).is_dir() else images
     found: dict[str, str] = {}
-    for image in images:
-        found |= hash_sources(root, image)
+    for path in paths:
+        hashes = hash_sources(root, path)
+        if relative_to(root, path).startswith(".."):
+            # A name with a folder would be looked for in the trial.
+            hashes = {name.replace("/", ":"): digest for name, digest in hashes.items()}
+        found |= hashes
     return found
 
 
