@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.online.tracker_noise import tracker_noise
+from zfcal.online.tracker_noise import losses, tracker_noise
 from zfcal.tracks import FISH, Tracks
 from zfcal.vision.frames import Frame
 from zfcal.vision.look import CLEAN, look_of
@@ -97,3 +97,22 @@ def test_without_frames_between_steps_the_noise_is_not_known(followed):
     _, told = followed
 
     assert tracker_noise(tracks_of(told), fps=FPS, dt_s=1 / FPS) is None
+
+
+def test_losses_by_hand():
+    """Three agents in four frames: two rows are missing, one id is new, one row is a guess."""
+    rows = [(0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (2, 1), (2, 3), (3, 1), (3, 3), (3, 4)]
+    frame, agent = np.array(rows).T
+    tracks = Tracks(
+        time_s=frame / 15,
+        frame=frame,
+        agent=agent.astype(np.int32),
+        kind=np.zeros(10, np.int8),
+        x_m=np.zeros(10),
+        y_m=np.zeros(10),
+        heading_rad=np.full(10, np.nan, np.float32),
+        confidence=np.array([0.4] + 9 * [0.9], np.float32),
+    )
+    assert losses(tracks, n_agents=3) == {"drops": 2, "suspected_swaps": 1, "guesses": 1}
+    nobody = tracks.take(np.zeros(10, np.bool_))
+    assert losses(nobody, n_agents=3) == {"drops": 0, "suspected_swaps": 0, "guesses": 0}

@@ -16,7 +16,7 @@ from zfcal.online.events import LeftOut, Note, Result, Tell
 from zfcal.online.rig import Feed
 from zfcal.online.stretch import NOISE_KEY
 from zfcal.online.track_plan import Plan
-from zfcal.online.tracker_noise import tracker_noise
+from zfcal.online.tracker_noise import losses, tracker_noise
 from zfcal.tracks import FISH, FramePoses, Tracks
 from zfcal.vision.frames import Frame, Image
 from zfcal.vision.robot import RobotSeen
@@ -41,11 +41,12 @@ _LATENCIES = 100_000
 
 
 def measured(plan: Plan, tracks: Tracks) -> Mapping[str, JSON]:
-    """Return what is known of a segment's tracks: their noise, where it can be told."""
+    """Return what is known of a segment's tracks: losses, and noise where it can be told."""
     trial = plan.opened.trial
     fish = tracks.take(tracks.kind == FISH)
     sd_m = tracker_noise(fish, fps=trial.fps, dt_s=trial.dt_s)
-    return {} if sd_m is None else {NOISE_KEY: sd_m}
+    noise: Mapping[str, JSON] = {} if sd_m is None else {NOISE_KEY: sd_m}
+    return {**losses(tracks, n_agents=trial.n_agents), **noise}
 
 
 def _same(one: Image, other: Image) -> bool:

@@ -1,4 +1,4 @@
-"""How exact the tracker's own positions are: what a diagnosis has to know of them.
+"""How exact the tracker's own positions are, and how whole: what a diagnosis has to know.
 
 Noise is that of the animals seen alone. Errors of a tracker are not white: the posture of a
 body moves its seen centroid for several frames in a row. What is estimated is the white noise
@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from zfcal.diagnose.noise import from_frames
 from zfcal.tracks import Tracks
 
+_GUESS = 0.5
 _ALONE = 0.75
 """Confidence from which an animal was alone in its blob, and known for a while."""
 
@@ -44,3 +47,29 @@ def tracker_noise(tracks: Tracks, *, fps: float, dt_s: float) -> float | None:
             if math.isfinite(sd_m):
                 return sd_m
     return None
+
+
+def losses(tracks: Tracks, *, n_agents: int) -> dict[str, int]:
+    """Return how often the tracker lost somebody.
+
+    Parameters
+    ----------
+    tracks
+        Of one segment; its frames without anybody do not count.
+    n_agents
+        Fish and robots in the tank.
+
+    Returns
+    -------
+    dict
+        ``drops``: agents that were not seen, summed over frames. ``suspected_swaps``: ids
+        that begin after the first frame, since an agent gets a new one when it is not sure
+        any more which one it is. ``guesses``: rows with a confidence below one half.
+    """
+    frames, seen = np.unique(tracks.frame, return_counts=True)
+    _, first = np.unique(tracks.agent, return_index=True)
+    return {
+        "drops": int(np.maximum(n_agents - seen, 0).sum()),
+        "suspected_swaps": int((tracks.frame[first] > frames[:1]).sum()),
+        "guesses": int((tracks.confidence < _GUESS).sum()),
+    }
