@@ -8,10 +8,11 @@ import sys
 import pytest
 
 COMMITTED = ("calibration", "cluster", "growth", "long", "main_job", "optimisers", "roofline",
-             "rounds")  # fmt: skip
+             "rounds", "tracking")  # fmt: skip
 
 SCRIPTS = (*(f"bench_{name}" for name in COMMITTED), "growth_document", "measuring", "naive",
-           "optimisers", "optimisers_document", "regressions", "rounds_document")  # fmt: skip
+           "optimisers", "optimisers_document", "regressions", "rounds_document",
+           "tracking_measures")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

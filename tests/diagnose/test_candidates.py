@@ -21,7 +21,13 @@ def scene_of(record, tank):
 def test_a_candidate_has_its_shape_and_a_strength(candidate):
     """All parameters of the effect, the strength among them."""
     own = candidate("alignment", kappa=3.0)
-    assert own.values(7.0) == {"weight": 7.0, "kappa": 3.0, "grading": 1.0, "leaning": 0.0}
+    assert own.values(7.0) == {
+        "weight": 7.0,
+        "kappa": 3.0,
+        "grading": 1.0,
+        "leaning": 0.0,
+        "turning": 0.0,
+    }
     assert own.name == "alignment"
     assert own.notable == 20.0
 

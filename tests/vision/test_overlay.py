@@ -137,10 +137,11 @@ def test_the_worst_frame_of_a_second_is_kept():
 
 
 def test_a_sheet_without_frames_is_none():
-    """Where there is nothing wrong the first frames are shown."""
+    """A frame with which nothing is wrong is not wanted, one with a little is."""
     worst = WorstFrames()
     assert worst.sheet() is None
-    assert worst.wants(0.0, 1.0)
+    assert not worst.wants(0.0, 1.0)
+    assert worst.wants(0.1, 1.0)
 
 
 def test_a_video_appears_when_it_is_closed(tmp_path):
