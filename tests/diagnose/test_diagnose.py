@@ -187,12 +187,12 @@ def test_a_constant_speed_is_no_trouble(ask, worlds):
 
 
 def test_a_quick_answer_does_not_name_the_trackers_noise(ask, record):
-    """Taken for exact, positions that err by 1.5 mm show an effect; known to err, they do not."""
-    exact = record(41, minutes=8.0)
-    wrong_m = np.random.default_rng(4).normal(0.0, 0.0015, exact.xy_m.shape)
+    """Taken for exact, positions that err by 2 mm show an effect; known to err, they do not."""
+    exact = record(41, minutes=4.0)
+    wrong_m = np.random.default_rng(4).normal(0.0, 0.002, exact.xy_m.shape)
     noisy = dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m)
     assert ask(noisy, noise_m=0.0).effects
-    held = ask(noisy, noise_m=0.0015)
+    held = ask(noisy, noise_m=0.002)
     assert held.effects == ()
     (null,) = (note for note in held.notes if note.name == "null")
     assert null.values["replicates"] == 6
@@ -200,7 +200,7 @@ def test_a_quick_answer_does_not_name_the_trackers_noise(ask, record):
 
 def test_a_clear_effect_is_named_in_spite_of_noise(ask, record):
     """Half a millimetre, and six replicates."""
-    exact = record(23, BIAS, minutes=6.0)
+    exact = record(23, BIAS, minutes=4.0)
     wrong_m = np.random.default_rng(4).normal(0.0, 0.0005, exact.xy_m.shape)
     found = ask(dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m), noise_m=0.0005)
     assert found.effects[0].name == "turning-bias"
