@@ -14,6 +14,7 @@ from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import measure, measure_robot
 from zfcal.errors import InputError
+from zfcal.online import analyse as stage
 from zfcal.online.analyse import AnalyseOptions, analyse
 from zfcal.online.events import LeftOut, Made, Note, Planned, Result, UpToDate
 from zfcal.online.opening import Task, open_trial
@@ -323,3 +324,28 @@ def test_an_unknown_scoring_is_refused():
     """There are two."""
     with pytest.raises(InputError, match="paper, legacy"):
         AnalyseOptions(scoring="new")
+
+
+def test_a_segment_that_appears_meanwhile_is_left_for_the_next_run(make_trial, heard, monkeypatch):
+    """Between two looks into tracks/ its writer may have closed one more minute."""
+    root = make_trial(seconds=180, n_robots=1)
+    late, aside = root / "tracks" / "000120.parquet", root / "000120.parquet"
+    late.rename(aside)
+    first = stage.whole_segments
+
+    def then_one_more(trial):
+        found = first(trial)
+        aside.rename(late)
+        return found
+
+    monkeypatch.setattr(stage, "whole_segments", then_one_more)
+    analyse(root, AnalyseOptions(), heard.append)
+    assert not stats_of_path(root, 180).exists()
+    monkeypatch.undo()
+    analyse(root, AnalyseOptions(), heard.append)
+    assert stats_of_path(root, 180).exists()
+
+
+def stats_of_path(root, end):
+    """Return where the statistics of a window lie."""
+    return root / "stats" / f"{end:06d}.parquet"

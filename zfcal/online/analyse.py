@@ -146,7 +146,7 @@ def analyse(
             segments=segments,
             whole=tuple(whole_segments(opened.trial)),
         )
-        known = window_ends(opened.trial, tell)
+        known = window_ends(opened.trial, tell, list(run.whole))
         _tell_oddities(run, known)
         ends = [end for end in known if task.wants(end)]
         for number, end in enumerate(ends, start=1):

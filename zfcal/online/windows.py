@@ -21,13 +21,23 @@ def starts_of(end_s: int, *, length_s: int = LENGTH_S) -> range:
     return range(end_s - length_s, end_s, STEP_S)
 
 
-def window_ends(trial: Trial, tell: Tell) -> list[int]:
+def window_ends(trial: Trial, tell: Tell, starts: list[int] | None = None) -> list[int]:
     """Return the seconds at which whole windows end, in order.
 
     No window ends in a last part segment, nor stretches over a missing one; the
     latter is told.
+
+    Parameters
+    ----------
+    trial
+        Whose.
+    tell
+        Hears of what is missing.
+    starts
+        Its whole segments, where they were looked up before: in a trial that grows,
+        two looks do not find the same.
     """
-    starts = whole_segments(trial)
+    starts = whole_segments(trial) if starts is None else starts
     known = set(starts)
     if not starts:
         return []
