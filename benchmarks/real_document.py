@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -235,11 +235,22 @@ def fill(results: dict[str, Any], document: Path = DOCUMENT) -> Path:
 
 def filled(text: str, results: dict[str, Any]) -> str:
     """Return a text with its tables replaced."""
-    for name, make in TABLES.items():
+    return replaced(text, {name: make(results["recordings"]) for name, make in TABLES.items()})
+
+
+def replaced(text: str, tables: Mapping[str, str]) -> str:
+    """Return a text with what stands between the comments of each name replaced.
+
+    Raises
+    ------
+    ValueError
+        The text lacks the place of one.
+    """
+    for name, made in tables.items():
         place = re.compile(rf"(<!-- {name} -->\n).*?(\n<!-- /{name} -->)", re.DOTALL)
         if len(place.findall(text)) != 1:
             raise ValueError(f"The text needs <!-- {name} --> and <!-- /{name} --> once.")
-        body = make(results["recordings"]).replace("\\", r"\\")
+        body = made.replace("\\", r"\\")
         text = place.sub(rf"\g<1>\n{body}\n\g<2>", text)
     return text
 
