@@ -30,7 +30,7 @@ def worlds():
 @pytest.fixture(scope="session")
 def base(worlds):
     """Return scene and fitted model of ten minutes of fish that do as the base model does."""
-    return worlds.fitted_scene(worlds.base_walk(11, minutes=10))
+    return worlds.fitted_scene(worlds.base_walk(13, minutes=10))
 
 
 @pytest.fixture(scope="session")
