@@ -1,0 +1,221 @@
+"""The driver and its line, over real pseudo-terminals with a robot that is a process."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from zfcal.errors import InputError
+from zfcal.robot import events, lastword
+from zfcal.robot.body import Pose, Wheels
+from zfcal.robot.events import Said
+from zfcal.robot.faults import Complaints
+from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.port import SerialLine
+from zfcal.robot.simulated import SimulatedFishBot, Traits
+from zfcal.robot.virtual_process import Control
+
+STOP = events.stop().encode().hex()
+GO = Wheels(left_m_s=0.10, right_m_s=0.12)
+
+
+def heard(robot):
+    """Return the frames that a virtual robot has heard, in hexadecimal."""
+    return [frame for _, frame in robot.control.ask("heard")["heard"]]
+
+
+def connected(robot, until):
+    """Return an open line to a virtual robot."""
+    line = SerialLine(str(robot.port))
+    assert until(lambda: line.is_open)
+    return line
+
+
+def drive(bot, wheels=GO):
+    """Send wheel speeds; return whether they went."""
+    return bot.send(bot.frame_for(wheels))
+
+
+def test_bytes_go_over_a_real_serial_port(start_virtual, until):
+    """The driver asks who is there, the robot answers, and obeys in the published bytes."""
+    robot = start_virtual("--noise", "0", "--lag-s", "0")
+    bot = FishBot("F", connected(robot, until))
+    said = []
+    assert until(lambda: said.extend(bot.listen()) or any(s.what == "described" for s in said))
+    assert Said(what="described", robot="F", name="Fish_bot_F") in said
+    assert drive(bot)
+    assert until(lambda: robot.control.ask("pose")["x_m"] > 0.01)
+    bot.close()
+    assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
+    frames = heard(robot)
+    assert frames[:2] == ["020000" + "0011a00500", "0400000010a023000500"]
+    assert frames[2] == "040000000b000a000c00"
+    assert set(frames[3:]) == {STOP}
+
+
+def test_a_robot_in_steps_moves_when_it_is_told(start_virtual, until):
+    """Through process and terminal it ends where the same bytes bring it in memory."""
+    robot = start_virtual("--stepped", "--seed", "3", "--noise", "0.1")
+    bot = FishBot("F", connected(robot, until))
+    twin = SimulatedFishBot(Traits(noise=0.1), Pose(x_m=0, y_m=0, heading_rad=0), seed=3)
+    for k in range(1, 30):
+        frame = bot.frame_for(Wheels(left_m_s=0.1, right_m_s=0.1 + 0.001 * k))
+        assert bot.send(frame)
+        twin.receive(frame.encode())
+        twin.advance(k / 10)
+        at = robot.control.ask("advance", to_s=k / 10, received=bot.line.n_sent)
+        assert (at["time_s"], at["x_m"], at["y_m"]) == (twin.time_s, twin.pose.x_m, twin.pose.y_m)
+    bot.close()
+
+
+def test_who_watches_a_robot_is_told_where_it_is(start_virtual, until):
+    """A line of JSON every 20 ms, on a connection of its own."""
+    robot = start_virtual()
+    watcher = Control(robot.socket)
+    watcher.ask("watch", every_s=0.02)
+    times = [watcher.next()["time_s"] for _ in range(10)]
+    watcher.close()
+    assert all(0.015 < b - a < 0.3 for a, b in itertools.pairwise(times))
+    with pytest.raises(InputError, match="nothing is known"):
+        robot.control.ask("dance")
+
+
+def test_a_robot_that_was_unplugged_is_found_again(start_virtual, until):
+    """On another terminal behind the same name; meanwhile nothing is sent, and it is said."""
+    robot = start_virtual()
+    bot = FishBot("F", connected(robot, until))
+    assert drive(bot)
+    robot.control.ask("unplug")
+    assert until(lambda: not drive(bot))
+    assert not bot.line.is_open
+    assert bot.line.problem
+    robot.control.ask("plug")
+    assert until(lambda: drive(bot))
+    assert bot.line.n_opened == 2
+    bot.listen()
+    bot.close()
+    assert until(lambda: events.list_nodes().encode().hex() in heard(robot))
+
+
+def test_silence_stops_the_robot(line):
+    """From its own thread, within half a second and a tick; then nothing but STOP goes out."""
+    bot = FishBot("F", line)
+    with Watchdog(bot) as watchdog:
+        watchdog.fresh()
+        began_s = time.monotonic()
+        assert drive(bot)
+        while bot.is_held is False and time.monotonic() < began_s + 2:
+            time.sleep(0.002)
+        passed_s = time.monotonic() - began_s
+        assert line.sent[-1].hex() == STOP
+        assert not drive(bot)
+        assert watchdog.n_bites == 1
+        watchdog.fresh()
+        assert drive(bot)
+    assert 0.45 < passed_s < 0.6
+
+
+def test_before_the_first_pose_nothing_moves(line):
+    """A watchdog that never heard of anything fresh holds the robot."""
+    bot = FishBot("F", line)
+    with Watchdog(bot):
+        time.sleep(0.2)
+        assert not drive(bot)
+    assert set(map(bytes.hex, line.sent)) == {STOP}
+
+
+def test_what_is_too_fast_is_never_sent(line):
+    """Refused, and said."""
+    bot = FishBot("F", line)
+    with pytest.raises(InputError, match=r"0\.310 m/s"):
+        drive(bot, Wheels(left_m_s=0.31, right_m_s=0.0))
+    assert line.sent == []
+
+
+def test_what_rounding_cuts_off_comes_later(line):
+    """2.3 cm/s in whole centimetres: 23 cm/s over ten commands."""
+    bot = FishBot("F", line)
+    sent = [bot.frame_for(Wheels(left_m_s=0.023, right_m_s=-0.023)).arguments for _ in range(10)]
+    assert [sum(side) for side in zip(*sent, strict=True)] == [23, -23]
+    bot.frame_for(Wheels(left_m_s=0.004, right_m_s=0.0))
+    bot.stop_frame()
+    assert bot.frame_for(Wheels(left_m_s=0.004, right_m_s=0.0)).arguments == (0, 0)
+
+
+def test_stop_is_the_last_word_at_the_end(line):
+    """Also when something breaks in between."""
+
+    def drive_into_a_bug():
+        with FishBot("F", line) as bot:
+            drive(bot)
+            return 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        drive_into_a_bug()
+    assert line.sent[-1].hex() == STOP
+    assert not line.is_open
+
+
+KILLED = """
+import sys, time
+from zfcal.robot.body import Wheels
+from zfcal.robot.fishbot import FishBot
+from zfcal.robot.port import SerialLine
+line = SerialLine(sys.argv[1])
+line.wait(5)
+bot = FishBot("F", line)
+while True:
+    bot.send(bot.frame_for(Wheels(left_m_s=0.2, right_m_s=0.2)))
+    print("sent", flush=True)
+    time.sleep(0.05)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
+def test_stop_is_the_last_word_of_a_driver_that_is_killed(start_virtual, until, number):
+    """By a signal that nothing can catch: the small process beside it says STOP."""
+    robot = start_virtual()
+    words = [sys.executable, "-c", KILLED, str(robot.port)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as process:
+        for _ in range(3):
+            process.stdout.readline()
+        os.kill(process.pid, number)
+        process.wait()
+    frames = []
+    assert until(lambda: frames.extend(heard(robot)) or frames[-1:] == [STOP])
+    assert frames.count("040000000b0014001400") >= 3
+    assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
+
+
+def test_the_last_word_is_stop():
+    """Written out there, since that process imports nothing."""
+    assert events.stop().encode() == lastword.STOP
+
+
+def test_a_lost_supply_is_one_that_is_told_for_three_seconds():
+    """One complaint is none, nor are two a minute apart; it ends when they do."""
+    low = Said(what="power-down", robot="F")
+    complaints = Complaints("F")
+    complaints.hear(low, 0.0)
+    complaints.hear(low, 60.0)
+    assert complaints.fault(60.1) == ""
+    for k in range(16):
+        complaints.hear(low, 60.0 + 0.2 * k)
+    assert complaints.fault(62.9) == ""
+    complaints.hear(low, 63.1)
+    assert complaints.fault(63.2) == "power-down"
+    assert complaints.fault(64.2) == ""
+
+
+def test_an_obstacle_clears_after_half_a_second():
+    """And another robot's is none of ours."""
+    complaints = Complaints("F")
+    complaints.hear(Said(what="obstacle", robot="A"), 0.9)
+    assert complaints.fault(1.0) == ""
+    complaints.hear(Said(what="obstacle", robot="F"), 1.0)
+    assert complaints.fault(1.49) == "obstacle"
+    assert complaints.fault(1.51) == ""
