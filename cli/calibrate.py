@@ -6,40 +6,15 @@ from typing import Any
 
 import click
 
-from .durations import seconds, span
-from .options import PLACE, makes_artifacts, seed_option, speaks, takes_trials
+from .calibration import round_options
+from .durations import span
+from .options import PLACE, makes_artifacts, speaks, takes_trials
 from .output import Output
 
 
 @click.command("calibrate")
 @takes_trials
-@click.option("--generations", type=click.IntRange(min=0), help="Per round.  [default: 15]")
-@click.option(
-    "--budget",
-    "budget_s",
-    type=seconds,
-    metavar="TIME",
-    help="Wall-clock time per round, such as 50s.",
-)
-@click.option("--population", type=int, default=60, show_default=True, help="A multiple of four.")
-@click.option("--runs", type=int, default=1, show_default=True, help="Simulations an evaluation.")
-@click.option("--steps", type=int, default=3000, show_default=True, help="Steps of each of them.")
-@click.option(
-    "--optimiser",
-    type=click.Choice(["zfcal", "deap"]),
-    default="zfcal",
-    show_default=True,
-    help="NSGA-II as arrays, or with DEAP's operators.",
-)
-@click.option(
-    "--seed-likelihood/--no-seed-likelihood",
-    default=True,
-    show_default=True,
-    help="Let the maximum-likelihood estimate join the first population.",
-)
-@click.option("--baselines", is_flag=True, help="Score random search and the last model too.")
-@seed_option("Seed of the random numbers.  [default: the trial's]")
-@click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
+@round_options(generations="  [default: 15]")
 @click.option("--cluster", metavar="ADDRESS", help="Simulate there, such as tcp://host:8786.")
 @click.option("--window", type=span, metavar="START:END", help="One pooled window instead.")
 @click.option("--held-out", type=span, metavar="START:END", help="Score the model there as well.")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .durations import seconds
+from .options import Command, seed_option
 from .output import Output
 from .streams import STDIN, each_trial, trials_together
 
@@ -21,6 +23,53 @@ if TYPE_CHECKING:
     from zfcal.online.streams import Work
 
     MakeTask = Callable[[frozenset[int] | None], Task]
+
+
+def round_options(*, generations: str = "", budget: str = "") -> Callable[[Command], Command]:
+    """Add how a round is done; the texts say which of generations and budget is the default."""
+    optimisers = click.Choice(["zfcal", "deap"])
+    options = (
+        click.option("--generations", type=click.IntRange(min=0), help=f"Per round.{generations}"),
+        click.option(
+            "--budget",
+            "budget_s",
+            type=seconds,
+            metavar="TIME",
+            help=f"Wall-clock time per round, such as 50s.{budget}",
+        ),
+        click.option(
+            "--population", type=int, default=60, show_default=True, help="A multiple of four."
+        ),
+        click.option(
+            "--runs", type=int, default=1, show_default=True, help="Simulations an evaluation."
+        ),
+        click.option(
+            "--steps", type=int, default=3000, show_default=True, help="Steps of each of them."
+        ),
+        click.option(
+            "--optimiser",
+            type=optimisers,
+            default="zfcal",
+            show_default=True,
+            help="NSGA-II as arrays, or with DEAP's operators.",
+        ),
+        click.option(
+            "--seed-likelihood/--no-seed-likelihood",
+            default=True,
+            show_default=True,
+            help="Let the maximum-likelihood estimate join the first population.",
+        ),
+        click.option(
+            "--baselines", is_flag=True, help="Score random search and the last model too."
+        ),
+        seed_option("Seed of the random numbers.  [default: the trial's]"),
+        click.option(
+            "--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]"
+        ),
+    )
+    return lambda command: functools.reduce(
+        lambda made, option: option(made), reversed(options), command
+    )
 
 
 def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:

@@ -33,6 +33,7 @@ COMMANDS = {
     "track": "track",
     "analyse": "analyse",
     "calibrate": "calibrate",
+    "watch": "watch",
     "diagnose": "diagnose",
     "extend": "extend",
     "report": "report",

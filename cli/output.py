@@ -73,6 +73,8 @@ class Output:
     ----------
     bare
         Whether a single result is the JSON document, as it stands in its file.
+    in_lines
+        Whether the command writes JSON lines itself, in place of the document.
     """
 
     def __init__(self, command: str, *, as_json: bool, verbose: int, quiet: bool) -> None:
@@ -82,6 +84,7 @@ class Output:
         self.quiet = quiet
         self.exit_code = 0
         self.bare = False
+        self.in_lines = False
         self._bars = Bars(shown=sys.stderr.isatty() and not quiet)
         self._artifacts: dict[Path, dict[str, str]] = {}
         self._left_out: dict[tuple[str, str], dict[str, str]] = {}
@@ -109,7 +112,7 @@ class Output:
             raise ReaderGoneError from error
         if error is not None:
             self._record(error)
-        if self.as_json:
+        if self.as_json and not self.in_lines:
             self._print_document()
         if error is None and not self.quiet:
             self._summarise()

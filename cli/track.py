@@ -15,6 +15,7 @@ from .tracking import track_options, tracking_options
 @click.command("track")
 @click.argument("trial", type=PLACE)
 @tracking_options
+@click.option("--trajectories", type=PLACE, help="Draw paths and ids into this PNG.")
 @makes_artifacts
 @speaks
 def command(

@@ -47,7 +47,6 @@ _OPTIONS = (
         "--record", type=click.Choice(["jpeg", "png"]), help="Keep a live camera's images."
     ),
     click.option("--overlay", type=PLACE, help="Draw what was found into this video (.mp4)."),
-    click.option("--trajectories", type=PLACE, help="Draw paths and ids into this PNG."),
     click.option("--contact-sheet", type=PLACE, help="Draw the worst frames into this PNG."),
 )
 

@@ -1,5 +1,6 @@
 """Commands, in this process and as processes of their own."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -100,3 +101,26 @@ def trial(tmp_path, tracks_csv, monkeypatch):
     assert run(["init", *words]) == 0
     assert run(["import", "tracks.csv", "trial", "--format", "csv", "-q"]) == 0
     return tmp_path / "trial"
+
+
+class WatchTools:
+    """What tests of watch need."""
+
+    def __init__(self, module):
+        self._module = module
+        self.quick = module.QUICK
+        self.contents = module.contents
+
+    def start(self, *words, **options):
+        """Start ``zfcal watch --json``; leaving its block kills it."""
+        return self._module.Watching(COMMAND, *words, **options)
+
+
+@pytest.fixture(scope="session")
+def watching(repository):
+    """Return what starts a watch and reads its lines."""
+    path = repository / "tests" / "watching.py"
+    spec = importlib.util.spec_from_file_location("watching", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return WatchTools(module)

@@ -308,9 +308,12 @@ def _check_camera(_: _Place, path: Path) -> Iterator[Finding]:
     yield from ()
 
 
-def _check_findings(_: _Place, path: Path) -> Iterator[Finding]:
-    check(read_json(path), "findings", path)
-    yield from ()
+def _json_checker(schema: str) -> Callable[[_Place, Path], Iterator[Finding]]:
+    def check_document(_: _Place, path: Path) -> Iterator[Finding]:
+        check(read_json(path), schema, path)
+        yield from ()
+
+    return check_document
 
 
 def _table_checker(schema: str) -> Callable[[_Place, Path], Iterator[Finding]]:
@@ -329,7 +332,8 @@ _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
     r"models/[^/]+\.toml": _check_model,
     r"(poses|drive|frames/(overhead|below))/\d{6,}\.mcap": _check_mcap,
     r"cameras/[^/]+\.toml": _check_camera,
-    r"diagnosis/([^/]+/)?findings\.json": _check_findings,
+    r"models/\d{6,}\.skipped\.json": _json_checker("skipped"),
+    r"diagnosis/([^/]+/)?findings\.json": _json_checker("findings"),
 }
 
 

@@ -41,6 +41,7 @@ from zfcal.online.rounds import (
     score_table,
     write_round,
 )
+from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
 from zfcal.trial import second_of
 
@@ -227,7 +228,9 @@ def _ends(run: _Run) -> list[int]:
         )
         run.tell(Note(text=text))
     wanted = run.task.ends_s
-    return ends if wanted is None else [end for end in ends if end <= max(wanted)]
+    if wanted is not None:
+        ends = [end for end in ends if end <= max(wanted, default=0)]
+    return without_skipped(run.root, ends, run.task, run.tell)
 
 
 def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken: bool) -> bool:
@@ -264,6 +267,8 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
     lineages = {schema: replace(made, schema=schema) for _, schema in places.artifacts}
     baselines = baseline_scores(round_task, run.options, result)
     likelihood = None if estimated is None else estimated.table
+    # First, so that no window is ever both passed over and calibrated.
+    skipped_path(run.root, places.end_s).unlink(missing_ok=True)
     write_round(places, result, lineages, result_table(result, baselines, likelihood))
     places.checkpoint.unlink(missing_ok=True)
     for path, _ in places.artifacts:

@@ -120,7 +120,11 @@ class Following:
             raise
         finally:
             self._close(overhead, below)
-        self._minutes.finish(self._end_s)
+        if plan.is_live and overhead.source.problems:
+            # The camera went away: run again, the recording goes on, so it has no end yet.
+            self._minutes.interrupt(self._end_s)
+        else:
+            self._minutes.finish(self._end_s)
         drawing.finish(self._tell)
         self._outcome.finish()
 

@@ -119,6 +119,17 @@ def starts_of_recording(root: Path) -> list[int]:
     return []
 
 
+def stretch_of(path: Path) -> tuple[float, float] | None:
+    """Return from where to where a segment says that its recording goes; None for no word."""
+    try:
+        said = read_extra(path).get(STRETCH_KEY)
+    except (DamagedError, InputError):
+        return None
+    if not isinstance(said, list) or len(said) != 2:
+        return None
+    return float(str(said[0])), float(str(said[1]))
+
+
 def starts_between(first_s: float, end_s: float) -> list[int]:
     """Return the starts of the segments that a stretch of time touches, in seconds.
 

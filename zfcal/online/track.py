@@ -7,13 +7,11 @@ from pathlib import Path
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import POSES
-from zfcal.artifacts.tables import read_extra
-from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import Planned, Tell, UpToDate
 from zfcal.online.following import Following
 from zfcal.online.minutes import Origins, pose_files, poses_reason
 from zfcal.online.opening import Task, at_work, open_trial, reason_to_make, tell_version
-from zfcal.online.recording import STRETCH_KEY, check_same_source, starts_between
+from zfcal.online.recording import check_same_source, starts_between, stretch_of
 from zfcal.online.resuming import Resumed, begin_anew, resume
 from zfcal.online.segments import segment_path, segment_starts
 from zfcal.online.sources import source_of
@@ -70,7 +68,7 @@ def is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
     paths = [segment_path(trial.root, start) for start in starts]
     if any(reason_to_make(path, origins.tracks, Task(), told.append) for path in paths):
         return False
-    stretch = _stretch(paths[-1])
+    stretch = stretch_of(paths[-1])
     known = pose_files(trial.root)
     if stretch is None or starts[-1] != starts_between(*stretch)[-1] or set(known) != set(starts):
         return False
@@ -81,17 +79,6 @@ def is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
         tell(UpToDate(path=path))
         tell(UpToDate(path=known[start]))
     return True
-
-
-def _stretch(path: Path) -> tuple[float, float] | None:
-    """Return from where to where a recording goes, which its last segment alone states."""
-    try:
-        said = read_extra(path).get(STRETCH_KEY)
-    except (DamagedError, InputError):
-        return None
-    if not isinstance(said, list) or len(said) != 2:
-        return None
-    return float(str(said[0])), float(str(said[1]))
 
 
 def _tell_plan(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> None:

@@ -1,0 +1,67 @@
+"""`zfcal watch`: the stages on each new segment, until the trial ends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .calibration import round_options
+from .durations import seconds
+from .options import EXISTING, PLACE, speaks
+from .output import Output
+from .tracking import tracking_options
+
+
+@click.command("watch")
+@click.argument("trial", type=PLACE)
+@click.option(
+    "--stages",
+    metavar="STAGE,...",
+    help="Of track, analyse, calibrate.  [default: analyse,calibrate; track where a source is "
+    "given]",
+)
+@click.option("--poll", is_flag=True, help="Look again and again; automatic on network disks.")
+@click.option("--once", is_flag=True, help="Make all that can be made now, and leave.")
+@click.option(
+    "--until-idle",
+    "until_idle_s",
+    type=seconds,
+    metavar="TIME",
+    help="Leave when nothing has changed for so long.",
+)
+@round_options(budget="  [default: 50s]")
+@click.option(
+    "--control",
+    type=EXISTING,
+    multiple=True,
+    metavar="TRIAL",
+    help="A robot-free trial whose fish are the control; repeat it to pool several.",
+)
+@tracking_options
+@speaks
+def command(out: Output, trial: Path, **options: Any) -> None:
+    r"""Run the stages on each new segment until the trial ends.
+
+    Each new minute of tracks is analysed at once and calibrated within the
+    minute. A round that overruns makes the next ones shorter; windows that
+    would come too late are passed over, which is written down. On one computer
+    of several, --stages says which part it does; rsync brings the rest.
+
+    \b
+    Example:
+        zfcal watch trial
+        zfcal watch trial --overhead 0 --below 1 --budget 50s
+        zfcal watch trial --stages calibrate --json
+        zfcal watch trial --once --generations 20
+    """
+    from zfcal.online.watch import watch
+
+    from .watching import Voice, watch_options
+
+    chosen = watch_options(trial, options)
+    out.in_lines = True
+    with Voice(out) as voice:
+        for left in watch(trial, chosen, voice.hear):
+            out.tell(left)

@@ -1,0 +1,179 @@
+"""What the options of `zfcal watch` come to, and how it speaks."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, final
+
+import click
+from click.core import ParameterSource
+
+from .calibration import choose
+from .output import Output
+from .status_line import StatusLine
+from .tracking import track_options
+
+if TYPE_CHECKING:
+    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.watch_events import Happened, Status
+    from zfcal.online.watch_stages import WatchOptions
+
+DEFAULT_BUDGET_S = 50.0
+
+_OWN = {"trial", "stages", "poll", "once", "until_idle_s"}
+_OF_CALIBRATE = {
+    "generations", "budget_s", "population", "runs", "steps", "optimiser", "seed_likelihood",
+    "baselines", "seed", "workers",
+}  # fmt: skip
+_NOT_HERE = {"window": None, "held_out": None, "output": None, "cluster": None}
+
+
+def watch_options(trial: Path, options: Mapping[str, Any]) -> WatchOptions:
+    """Return what the options ask for.
+
+    Raises
+    ------
+    click.UsageError
+        One belongs to a stage that does not run, or two contradict each other.
+    """
+    from zfcal.online.analyse import AnalyseOptions
+    from zfcal.online.watch_stages import WatchOptions
+
+    stages = _stages(trial, options)
+    _check_together(options, stages)
+    return WatchOptions(
+        track=track_options(dict(options)) if "track" in stages else None,
+        analyse=AnalyseOptions(control=options["control"]) if "analyse" in stages else None,
+        calibrate=_round(options) if "calibrate" in stages else None,
+        poll=options["poll"],
+        once=options["once"],
+        until_idle_s=options["until_idle_s"],
+    )
+
+
+def _round(options: Mapping[str, Any]) -> CalibrateOptions:
+    asked = {**options, **_NOT_HERE, "dry_run": False, "force": False}
+    if asked["generations"] is None and asked["budget_s"] is None:
+        asked["budget_s"] = DEFAULT_BUDGET_S
+    return choose(asked)[0]
+
+
+def _stages(trial: Path, options: Mapping[str, Any]) -> tuple[str, ...]:
+    from zfcal.artifacts.settings import read_trial
+    from zfcal.online.watch_stages import ANALYSE, CALIBRATE, STAGES
+
+    if options["stages"] is None:
+        cameras = read_trial(trial).cameras or {}
+        has_source = options["overhead"] or "source" in cameras.get("overhead", {})
+        return STAGES if has_source else (ANALYSE, CALIBRATE)
+    asked = {word.strip() for word in options["stages"].split(",")}
+    if unknown := asked - set(STAGES):
+        named = ", ".join(sorted(repr(word) for word in unknown))
+        raise click.UsageError(f"--stages: {named} is none of {', '.join(STAGES)}.")
+    return tuple(name for name in STAGES if name in asked)
+
+
+def _check_together(options: Mapping[str, Any], stages: tuple[str, ...]) -> None:
+    """Refuse options that could not take effect."""
+    context = click.get_current_context()
+    if options["once"] and options["until_idle_s"] is not None:
+        raise click.UsageError("--once leaves at once, --until-idle later: give one.")
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if name in _OWN or name not in options:
+            continue
+        stage = "calibrate" if name in _OF_CALIBRATE else "track"
+        stage = "analyse" if name == "control" else stage
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if given and stage not in stages:
+            raise click.UsageError(
+                f"{parameter.opts[0]} belongs to {stage}, which is none of the stages "
+                f"{', '.join(stages)}."
+            )
+
+
+@final
+class Voice:
+    """Tells what a watch does: as lines, as JSON lines, and on the status line.
+
+    Parameters
+    ----------
+    out
+        The command's own voice.
+    """
+
+    def __init__(self, out: Output) -> None:
+        self._out = out
+        self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._line.clear()
+
+    def hear(self, told: Happened | Status) -> None:
+        """Take what the watch tells."""
+        from zfcal.online.watch_events import Status
+
+        if isinstance(told, Status):
+            self._line.show(told)
+            return
+        if self._out.as_json:
+            self._line.clear()
+            click.echo(json.dumps(told.as_dict(), ensure_ascii=False))
+            sys.stdout.flush()
+        self._say(told)
+
+    def _say(self, told: Happened) -> None:
+        from zfcal.online import events as of
+
+        event = told.event
+        if isinstance(event, of.LeftOut):
+            # It may be mended yet: what still is left out at the end counts.
+            event = dataclasses.replace(event, damaged=False)
+        text = _WORDS.get(told.kind, "").format_map(_Words(told))
+        if text and (told.kind not in _DETAILS or self._out.verbose):
+            event = of.Note(text=text, warning=told.kind in _WARNINGS)
+        if event is not None:
+            self._line.clear()
+            self._out.tell(event)
+
+
+_WORDS = {
+    "began": "watch: {stages} of {trial}{polling}.",
+    "started": "{stage}: process {process}.",
+    "arrived": "{path}: arrived.",
+    "unfinished": "{problem} It is passed over until it is.",
+    "skipped": "calibrate: the window to {window_end_s} s is passed over, {went_on_with_s} s is "
+    "next. {because}",
+    "finished": "{stage}: window to {window_end_s} s in {took_s:.1f} s, {lag_s:.1f} s after its "
+    "tracks.",
+    "failed": "{stage}: {problem} {hint} Tries again.",
+    "gone": "{path}: the trial is gone ({problem}); waits for it.",
+    "back": "{path}: is back.",
+    "ended": "watch: ends, {because}.",
+}
+_DETAILS = {"started", "arrived"}
+_WARNINGS = {"unfinished", "skipped", "failed", "gone"}
+
+
+class _Words(dict[str, Any]):
+    """The values of an event, as its text needs them."""
+
+    def __init__(self, told: Happened) -> None:
+        super().__init__(told.values, stage=told.stage)
+        if told.kind == "began":
+            polls = self["polls"]
+            self["stages"] = ", ".join(self["stages"])
+            self["polling"] = f"; polls: {polls}" if polls else ""

@@ -1,0 +1,243 @@
+"""What the stages of a watch do with an order; the functions are those of the commands.
+
+Each loads what it needs when it begins: a process that analyses has no use for a compiler.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from zfcal.online.events import LeftOut, Planned, Tell, UpToDate
+from zfcal.online.opening import Task
+from zfcal.online.recording import starts_between, stretch_of
+from zfcal.online.segments import Segments, segment_path, segment_starts
+from zfcal.online.skipping import write_skipped
+from zfcal.online.turns import budget_of, choose
+from zfcal.online.watch_events import Skipped, Takes
+from zfcal.online.worker import Job
+
+if TYPE_CHECKING:
+    from zfcal.online.analyse import AnalyseOptions
+    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.track_plan import TrackOptions
+
+TRACK, ANALYSE, CALIBRATE = STAGES = ("track", "analyse", "calibrate")
+
+NICENESS = {TRACK: 0, ANALYSE: 0, CALIBRATE: 10}
+"""The processor serves the robot, the tracker and the statistics before the search."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """An order to analyse or to calibrate.
+
+    Parameters
+    ----------
+    seen_s
+        By the window's end, when its data were there, on the monotonic clock.
+    due_after_s
+        How long a window may wait; None for as long as it takes.
+    """
+
+    seen_s: Mapping[int, float]
+    due_after_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What came of an order.
+
+    Parameters
+    ----------
+    end_s
+        End of the window that was made, after which there may be more to do; None
+        for no more.
+    left_out
+        What had to be left out, by path.
+    """
+
+    end_s: int | None = None
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
+
+
+@dataclass(slots=True, kw_only=True)
+class _Ear:
+    """Hands events on, and remembers what was left out."""
+
+    tell: Tell
+    left_out: dict[str, LeftOut] = field(default_factory=dict)
+
+    def hear(self, event: object) -> None:
+        if isinstance(event, LeftOut) and event.damaged:
+            self.left_out[str(event.path)] = event
+        self.tell(event)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackStage:
+    """Tracks until the recording or the camera ends."""
+
+    root: Path
+    options: TrackOptions
+
+    def __call__(self, _: object, tell: Tell) -> Outcome:
+        """Track, or go on tracking."""
+        from zfcal.online.track import track
+
+        ear = _Ear(tell=tell)
+        track(self.root, self.options, ear.hear)
+        return Outcome(left_out=ear.left_out)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalyseStage:
+    """Analyses all windows that are there, oldest first: each takes a moment."""
+
+    root: Path
+    options: AnalyseOptions
+    segments: Segments = field(default_factory=Segments)
+
+    def __call__(self, turn: Turn, tell: Tell) -> Outcome:
+        """Make what is missing or stale."""
+        from zfcal.online.analyse import analyse
+
+        ear = _Ear(tell=tell)
+        task = Task(ends_s=frozenset(turn.seen_s))
+        analyse(self.root, self.options, ear.hear, task=task, segments=self.segments)
+        return Outcome(left_out=ear.left_out)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrateStage:
+    """Calibrates one window at a time, since a round is long and the world goes on.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    options
+        How; its budget is that of a round which starts in time.
+    clock
+        The one of the orders.
+    """
+
+    root: Path
+    options: CalibrateOptions
+    clock: Callable[[], float] = time.monotonic
+
+    def __call__(self, turn: Turn, tell: Tell) -> Outcome:
+        """Choose a window, write down which are passed over, and make its round."""
+        from zfcal.online.calibrate import calibrate
+
+        ear = _Ear(tell=tell)
+        waiting = {end: turn.seen_s[end] for end in self._planned(turn, ear)}
+        now_s = self.clock()
+        choice = choose(waiting, now_s=now_s, due_after_s=turn.due_after_s)
+        if choice.end_s is None:
+            return Outcome(left_out=ear.left_out)
+        for end in choice.passed_over:
+            ear.hear(self._pass_over(end, choice.end_s, waited_s=now_s - waiting[end]))
+        options = self.options
+        if options.budget_s is not None and turn.due_after_s is not None:
+            seen_s = waiting[choice.end_s]
+            budget_s = budget_of(options.budget_s, seen_s=seen_s, now_s=now_s)
+            options = dataclasses.replace(options, budget_s=budget_s)
+        ear.hear(Takes(end_s=choice.end_s, budget_s=options.budget_s))
+        task = Task(ends_s=frozenset({choice.end_s}))
+        calibrate(self.root, options, ear.hear, task=task)
+        return Outcome(end_s=choice.end_s, left_out=ear.left_out)
+
+    def _planned(self, turn: Turn, ear: _Ear) -> list[int]:
+        """Return the windows whose rounds are to be made.
+
+        A round with a budget is made once: made again it would differ, and it is
+        the record of what the robot was driven by.
+        """
+        from zfcal.online.calibrate import calibrate
+
+        planned: dict[int, str] = {}
+
+        def hear(event: object) -> None:
+            if isinstance(event, Planned) and event.path.suffix == ".toml":
+                planned[int(event.path.stem)] = event.reason
+            elif isinstance(event, LeftOut | UpToDate):
+                ear.hear(event)
+
+        task = Task(dry_run=True, ends_s=frozenset(turn.seen_s))
+        calibrate(self.root, self.options, hear, task=task)
+        once = self.options.budget_s is not None
+        return [
+            end
+            for end, reason in planned.items()
+            if end in turn.seen_s and not (once and not reason.startswith(("missing", "damaged")))
+        ]
+
+    def _pass_over(self, end_s: int, instead_s: int, *, waited_s: float) -> Skipped:
+        because = f"It waited for {waited_s:.0f} s while a round before it overran."
+        path = None
+        if not (self.root / "models" / f"{end_s:06d}.toml").exists():
+            path = write_skipped(self.root, end_s, went_on_with_s=instead_s, because=because)
+        return Skipped(end_s=end_s, went_on_with_s=instead_s, because=because, path=path)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchOptions:
+    """What to run, and until when.
+
+    Parameters
+    ----------
+    track, analyse, calibrate
+        How to run these stages; None for one that does not run here.
+    poll
+        Whether to do without the file system's notifications.
+    once
+        Make all that can be made now, and leave.
+    until_idle_s
+        Leave when nothing has changed for so long; None for never.
+    """
+
+    track: TrackOptions | None = None
+    analyse: AnalyseOptions | None = None
+    calibrate: CalibrateOptions | None = None
+    poll: bool = False
+    once: bool = False
+    until_idle_s: float | None = None
+
+    def jobs(self, root: Path) -> dict[str, Job]:
+        """Return what each of the stages does, in their order."""
+        jobs: dict[str, Job] = {}
+        if self.track is not None:
+            jobs[TRACK] = TrackStage(root=root, options=self.track)
+        if self.analyse is not None:
+            jobs[ANALYSE] = AnalyseStage(root=root, options=self.analyse)
+        if self.calibrate is not None:
+            jobs[CALIBRATE] = CalibrateStage(root=root, options=self.calibrate)
+        return jobs
+
+
+def has_ended(root: Path, whole: Mapping[int, float]) -> bool:
+    """Return whether a recording is there to its end.
+
+    The last segment of a recording says from where to where it goes; that of a
+    camera which may come back does not.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    whole
+        The segments that are there, by their starts.
+    """
+    for start in reversed(segment_starts(root)):
+        if start not in whole:
+            return False
+        stretch = stretch_of(segment_path(root, start))
+        if stretch is not None:
+            needed = starts_between(*stretch)
+            return needed[-1] == max(whole) and set(needed) <= whole.keys()
+    return False
