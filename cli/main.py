@@ -33,6 +33,7 @@ COMMANDS = {
     "track": "track",
     "analyse": "analyse",
     "calibrate": "calibrate",
+    "drive": "drive",
     "watch": "watch",
     "diagnose": "diagnose",
     "extend": "extend",

@@ -167,11 +167,24 @@ class PoseFollower:
     ----------
     root
         The trial's directory.
+    newest
+        Whether to begin with the last file rather than the first.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, *, newest: bool = False) -> None:
         self._folder = root / "poses"
         self._tail: Tail | None = None
+        self._newest = newest
+
+    @property
+    def path(self) -> Path | None:
+        """The file that is followed; None before there is any."""
+        return None if self._tail is None else self._tail.path
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the file that is followed has its footer: only a later file can bring more."""
+        return self._tail is not None and self._tail.is_closed
 
     def poll(self) -> list[FramePoses]:
         """Return the poses that were added since the last question, maybe none.
@@ -196,7 +209,9 @@ class PoseFollower:
         known = -1 if self._tail is None else second_of(self._tail.path, ".mcap") or 0
         files = {second_of(path, ".mcap"): path for path in self._folder.glob("*.mcap")}
         later = [second for second in files if second is not None and second > known]
-        return files[min(later)] if later else None
+        if not later:
+            return None
+        return files[max(later) if self._newest and self._tail is None else min(later)]
 
 
 def _register(writer: Writer) -> dict[str, int]:

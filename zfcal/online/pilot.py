@@ -126,6 +126,7 @@ class Pilot:
     def __init__(self, opened: OpenTrial, manner: Manner, robot: FishBot) -> None:
         trial = opened.trial
         self._seed = trial.seed
+        self._arena = opened.arena
         self._dt_s = trial.dt_s
         self._stride = round(trial.dt_s * trial.fps)
         self._manner = manner
@@ -150,6 +151,14 @@ class Pilot:
         if self._step is None:
             return frame % self._stride == 0
         return frame // self._stride > self._step
+
+    def warm_up(self, model: InForce) -> None:
+        """Draw a step that nobody follows: the first one compiles, or loads what is compiled."""
+        spare = Among(self._arena, self._seats.kinds, dt_s=self._dt_s)
+        x, y = self._confines.inner.representative_point().coords[0]
+        spare.measure(0.0, np.full((len(self._seats.kinds), 3), np.nan))
+        spare.place(x, y, 0.0)
+        spare.step(model.packed, 0)
 
     def see(self, poses: FramePoses, model: InForce) -> Target | None:
         """Take the next frame; return the new target where a step is due and one is found."""

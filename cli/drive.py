@@ -1,0 +1,96 @@
+"""`zfcal drive`: a robot that swims by the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .durations import seconds
+from .options import PLACE, speaks
+from .output import Output
+
+_LETTERS = tuple("ABCDEFGHIJ")
+
+
+@click.command("drive")
+@click.argument("trial", type=PLACE)
+@click.option("--port", metavar="DEV|virtual", help="Serial port of the robot, or a virtual one.")
+@click.option(
+    "--pattern",
+    type=click.Choice(["fish", "pid"]),
+    default="fish",
+    show_default=True,
+    help="Burst and coast, or the published controller alone.",
+)
+@click.option("--free-running", is_flag=True, help="The model's agent runs; the robot chases it.")
+@click.option(
+    "--robot", type=click.Choice(_LETTERS), default="F", show_default=True, help="Its letter."
+)
+@click.option("--radius-mm", type=click.FloatRange(min=0), default=15.0, show_default=True)
+@click.option(
+    "--clock",
+    type=click.Choice(["wall", "poses"]),
+    default="wall",
+    show_default=True,
+    help="Tick by this computer's clock, or by the times of the poses.",
+)
+@click.option("--duration", "duration_s", type=seconds, metavar="TIME", help="End after so long.")
+@click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
+@click.option("--force", is_flag=True, help="Remove what an earlier drive left.")
+@speaks
+def command(
+    out: Output,
+    trial: Path,
+    *,
+    port: str | None,
+    pattern: str,
+    free_running: bool,
+    robot: str,
+    radius_mm: float,
+    clock: str,
+    duration_s: float | None,
+    replay: bool,
+    force: bool,
+) -> None:
+    r"""Drive the robot by the newest model while the poses grow.
+
+    Each step of the model sets a target, ten times a second the wheels are told. All
+    that decides is logged in drive/. The robot is stopped when it is not seen for half
+    a second, when the port or its supply has gone, and at the end, whatever ends it.
+
+    \b
+    Example:
+        zfcal drive trial --port /dev/rfcomm5
+        zfcal drive trial --port virtual --pattern pid --duration 30min
+        zfcal drive trial --replay
+    """
+    if replay:
+        _replay(out, trial)
+        return
+    from zfcal.online.drive import DriveOptions, drive
+    from zfcal.online.opening import Task
+    from zfcal.online.pilot import Manner
+
+    if port is None:
+        raise click.UsageError("Missing option '--port': a serial port, or virtual.")
+    manner = Manner(
+        pattern=pattern, free_running=free_running, letter=robot, radius_m=radius_mm / 1000
+    )
+    options = DriveOptions(
+        port=port, manner=manner, clock=clock, duration_s=duration_s, verbose=out.verbose > 0
+    )
+    out.attempt(lambda: drive(trial, options, out.tell, task=Task(force=force)))
+
+
+def _replay(out: Output, trial: Path) -> None:
+    """Work the log out anew; of all options only those of talking can take effect."""
+    from zfcal.online.drive_replay import replay
+
+    context = click.get_current_context()
+    idle = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "duration_s", "force"}
+    for name in sorted(idle):
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            option = next(each for each in context.command.params if each.name == name)
+            raise click.UsageError(f"{option.opts[0]} cannot be given with --replay: the log says.")
+    out.attempt(lambda: replay(trial, out.tell))

@@ -1,0 +1,324 @@
+"""From poses to wheel speeds: the stage behind ``zfcal drive``."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import gc
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from zfcal.artifacts.drive_files import DRIVE, drive_files
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.pose_files import PoseFollower
+from zfcal.errors import DamagedError, InputError
+from zfcal.online.drive_clock import DriveClock, PoseClock, WallClock
+from zfcal.online.drive_log import DriveLog
+from zfcal.online.drive_models import DriveModels
+from zfcal.online.driving import Crew, Driver
+from zfcal.online.events import LeftOut, Note, Progress, Result, Tell
+from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
+from zfcal.online.pilot import Manner
+from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.port import SerialLine
+from zfcal.robot.virtual_process import VirtualProcess
+
+VIRTUAL = "virtual"
+"""The port behind which a virtual robot is started."""
+
+NICENESS = -10
+_LOOK_S = 0.003
+_FOLDER_S = 0.02
+"""How often the folder is searched for the next minute; a file that grows is seen at once."""
+
+_OPENING_S = 3.0
+_ANSWER_S = 2.0
+_END_S = 2.0
+"""On the poses' clock: when so long after the last file's end none follows, that was it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveOptions:
+    """What is asked of the driver.
+
+    Parameters
+    ----------
+    port
+        A serial port, or ``virtual``.
+    manner
+        How to drive.
+    clock
+        ``wall`` or ``poses``.
+    duration_s
+        Seconds of the trial after which to end; None for no end.
+    verbose
+        Whether to say what only bears on how quick it is.
+    """
+
+    port: str
+    manner: Manner = field(default_factory=Manner)
+    clock: str = "wall"
+    duration_s: float | None = None
+    verbose: bool = False
+
+
+def drive(root: Path, options: DriveOptions, tell: Tell, *, task: Task | None = None) -> None:
+    """Drive a robot by the model of a trial, until the poses end or somebody stops it.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    options
+        What is asked.
+    tell
+        Hears of faults, of models, and of every file when it is closed.
+    task
+        Whether to remove what an earlier drive left.
+
+    Raises
+    ------
+    InputError
+        The trial has no robot, the port cannot be opened, or logs of another drive are in
+        the way.
+    """
+    task = task or Task()
+    opened = open_trial(root)
+    if opened.trial.n_robots < 1:
+        raise InputError(
+            f"{opened.trial.config}: n_robots is 0: there is nobody to drive.",
+            hint="Set n_robots = 1 in trial.toml, and track the robot with --below.",
+        )
+    if options.clock not in {"wall", "poses"}:
+        raise InputError(f"The clock must be 'wall' or 'poses', got {options.clock!r}.")
+    with at_work(root, "drive", task):
+        _make_room(opened, options, tell, task)
+        with contextlib.ExitStack() as stack:
+            _drive(opened, options, tell, stack)
+
+
+def lineage_of(opened: OpenTrial, options: DriveOptions) -> Lineage:
+    """Return where the log of a drive comes from; which models drove, it says itself."""
+    manner = dataclasses.asdict(options.manner)
+    return Lineage(
+        schema=DRIVE,
+        command="drive",
+        options={**opened.clock_options, "clock": options.clock, **manner},
+        seed=opened.trial.seed,
+        inputs=hash_inputs(opened.trial.root, opened.arena_files),
+    )
+
+
+def _make_room(opened: OpenTrial, options: DriveOptions, tell: Tell, task: Task) -> None:
+    """Remove logs of an earlier drive if that is asked for; refuse to mix two."""
+    known = drive_files(opened.trial.root)
+    if task.force:
+        for path in known.values():
+            path.unlink()
+        if known:
+            tell(Note(text=f"{len(known)} files of an earlier drive were removed."))
+    elif known and options.clock == "poses":
+        raise InputError(
+            f"{opened.trial.root / 'drive'}: holds the log of an earlier drive.",
+            hint="Check it with --replay, or drive anew with --force.",
+        )
+
+
+def _drive(
+    opened: OpenTrial, options: DriveOptions, tell: Tell, stack: contextlib.ExitStack
+) -> None:
+    is_live = options.clock == "wall"
+    robot, virtual = _robot(opened, options, stack)
+    clock: DriveClock = WallClock() if is_live else PoseClock(opened.trial.fps)
+    log = DriveLog(opened.trial, lineage_of(opened, options), tell)
+    watchdog = Watchdog(robot) if is_live else None
+    crew = Crew(
+        robot=robot,
+        clock=clock,
+        models=DriveModels(opened),
+        log=log,
+        tell=tell,
+        watchdog=watchdog,
+    )
+    driver = Driver(opened, options.manner, crew)
+    driver.warm_up()
+    _hurry(options, tell)
+    follower = PoseFollower(opened.trial.root, newest=is_live)
+    # The robot's own end comes first on the way out: whatever fails later, it stands.
+    stack.callback(lambda: _conclude(driver, log, tell))
+    stack.callback(robot.close)
+    if watchdog is not None:
+        stack.enter_context(watchdog)
+    _Loop(opened, options, driver, crew, follower, virtual).run()
+
+
+def _robot(
+    opened: OpenTrial, options: DriveOptions, stack: contextlib.ExitStack
+) -> tuple[FishBot, VirtualProcess | None]:
+    port, virtual = options.port, None
+    if port == VIRTUAL:
+        rings = json.dumps([ring.tolist() for ring in opened.arena.rings_m])
+        x, y = opened.arena.outline.representative_point().coords[0]
+        words = ["--robot", options.manner.letter, "--seed", str(opened.trial.seed)]
+        words += ["--walls", rings, "--pose", f"{x},{y},0"]
+        words += ["--stepped"] if options.clock == "poses" else []
+        virtual = stack.enter_context(VirtualProcess(words))
+        port = str(virtual.port)
+    line = SerialLine(port)
+    robot = FishBot(options.manner.letter, line)
+    if not line.wait(_OPENING_S):
+        line.close()
+        raise InputError(
+            f"{port}: the port cannot be opened ({line.problem or 'no answer'}).",
+            hint="Check that it exists (rfcomm bind), that nobody else uses it, and your rights.",
+        )
+    return robot, virtual
+
+
+def _hurry(options: DriveOptions, tell: Tell) -> None:
+    """Ask for a high priority, and keep the collector of garbage away from what is there."""
+    gc.collect()
+    gc.freeze()
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    except OSError as error:
+        if options.verbose:
+            tell(Note(text=f"No higher priority: {error.strerror}; other work may delay ticks."))
+
+
+def _conclude(driver: Driver, log: DriveLog, tell: Tell) -> None:
+    """Close the log and say how it went."""
+    log.close()
+    found = log.latencies()
+    result = {
+        "targets": driver.n_targets,
+        "commands": driver.n_commands,
+        "models": driver.models_used,
+        "latency": found,
+    }
+    tell(Result(value=result))
+    words = [f"{driver.n_targets} targets, {driver.n_commands} commands"]
+    words += [f"{found['steps_missed']} steps missed, {found['ticks_skipped']} ticks skipped"]
+    names = {"pose_to_state_s": "pose to state", "tick_to_byte_s": "tick to last byte"}
+    for name, says in names.items():
+        if name in found:
+            median, p95, most = (1e3 * found[name][key] for key in ("median", "p95", "max"))
+            words.append(f"{says} {median:.1f} ms (95 %: {p95:.1f}, most: {most:.1f})")
+    tell(Note(text="; ".join(words) + "."))
+
+
+class _Loop:
+    """Waits for frames and for ticks, whichever comes first."""
+
+    def __init__(  # noqa: PLR0913, PLR0917 - everything that a run consists of
+        self,
+        opened: OpenTrial,
+        options: DriveOptions,
+        driver: Driver,
+        crew: Crew,
+        follower: PoseFollower,
+        virtual: VirtualProcess | None,
+    ) -> None:
+        self._opened, self._options = opened, options
+        self._driver, self._crew = driver, crew
+        self._follower, self._virtual = follower, virtual
+        self._size = (-1, -1)
+        self._searched_s = 0.0
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self._quiet_since_s = time.monotonic()
+        self._asked_s = time.monotonic()
+
+    def run(self) -> None:
+        for batch in self._batches():
+            self._driver.listen()
+            self._greet()
+            # On the poses' clock each frame has its own ticks; a live one has the newest frame's.
+            for frames in [batch] if self._crew.clock.is_live else [[f] for f in batch]:
+                self._driver.take(frames, age_s=self._age_s() if frames else None)
+                self._driver.tick()
+                self._crew.log.flush()
+                self._step_virtual()
+            if batch and self._is_over(batch[-1].time_s):
+                return
+
+    def _batches(self) -> Iterator[list[Any]]:
+        """Yield what has come, again and again; often nothing."""
+        while True:
+            frames = self._poll()
+            if frames:
+                self._quiet_since_s = time.monotonic()
+            elif self._is_finished():
+                return
+            yield frames
+            if not frames:
+                time.sleep(min(_LOOK_S, self._crew.clock.rest_s()))
+
+    def _poll(self) -> list[Any]:
+        """Read on where the file has grown; the folder is searched now and then."""
+        now_s = time.monotonic()
+        size = self._stat()
+        if size == self._size and now_s - self._searched_s < _FOLDER_S:
+            return []
+        self._size, self._searched_s = size, now_s
+        try:
+            return self._follower.poll()
+        except DamagedError as error:
+            path = self._follower.path or self._opened.trial.root / "poses"
+            self._crew.tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+            return []
+
+    def _stat(self) -> tuple[int, int]:
+        try:
+            found = None if self._follower.path is None else self._follower.path.stat()
+        except OSError:
+            found = None
+        return (-1, -1) if found is None else (found.st_ino, found.st_size)
+
+    def _age_s(self) -> float | None:
+        """Return how long ago the file of poses was written, by the same clock; None if unknown."""
+        if not self._crew.clock.is_live or self._follower.path is None:
+            return None
+        with contextlib.suppress(OSError):
+            age_s = time.time() - self._follower.path.stat().st_mtime
+            # A clock that was set, or another computer's, says nothing.
+            return max(0.0, age_s) if -0.1 < age_s < 5.0 else None
+        return None
+
+    def _step_virtual(self) -> None:
+        if self._virtual is not None and not self._crew.clock.is_live:
+            to_s = self._crew.clock.now_s()
+            self._virtual.control.ask("advance", to_s=to_s, received=self._crew.robot.line.n_sent)
+
+    def _is_over(self, time_s: float) -> bool:
+        duration_s = self._options.duration_s
+        self._first_s = time_s if self._first_s is None else self._first_s
+        if duration_s is None:
+            return False
+        done_s = time_s - self._first_s
+        if int(done_s) > int(self._last_s):
+            total = round(duration_s)
+            self._crew.tell(Progress(stage="drive", done=min(int(done_s), total), total=total))
+        self._last_s = done_s
+        return done_s >= duration_s - 1e-6
+
+    def _is_finished(self) -> bool:
+        if self._crew.clock.is_live:
+            return False
+        quiet_s = time.monotonic() - self._quiet_since_s
+        return self._follower.is_closed and quiet_s > _END_S
+
+    def _greet(self) -> None:
+        """Say once if nobody answers by the robot's name."""
+        if self._asked_s and time.monotonic() - self._asked_s > _ANSWER_S:
+            if not self._driver.is_answered:
+                letter = self._options.manner.letter
+                says = f"No FishBot {letter} answers; what is sent may be heard by nobody."
+                self._crew.tell(Note(text=says, warning=True))
+            self._asked_s = 0.0

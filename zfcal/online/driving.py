@@ -1,0 +1,223 @@
+"""One run of the driver: frames in, wheel speeds out, all of it logged."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Any, final
+
+from zfcal.online.drive_clock import DriveClock, WallClock
+from zfcal.online.drive_log import POSE_TO_STATE, TICK_TO_BYTE, DriveLog
+from zfcal.online.drive_models import DriveModels
+from zfcal.online.events import Note, Tell
+from zfcal.online.opening import OpenTrial
+from zfcal.online.pilot import InForce, Manner, Pilot, Target, command_item, target_item
+from zfcal.robot.faults import Complaints
+from zfcal.robot.fishbot import PATIENCE_S, FishBot, Watchdog
+from zfcal.tracks import FramePoses
+
+_SAYS = {
+    "stale-pose": "The robot has not been seen for 0.5 s: it was stopped.",
+    "port-lost": "The port has gone: nothing can be sent until it is back.",
+    "power-down": "The robot has lost its supply (PowerDown for 3 s): it was stopped.",
+    "obstacle": "The robot met an obstacle: it turns, and does not go on.",
+    "refused": "A wheel speed was refused: it is beyond what the robot can do.",
+    "watchdog": "The driver itself was held up: its watchdog stopped the robot.",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crew:
+    """What a driver works with.
+
+    Parameters
+    ----------
+    robot
+        The robot and the line to it.
+    clock
+        What its ticks are timed by.
+    models
+        Where models come from.
+    log
+        Where all of it is written.
+    tell
+        Hears of faults and of models.
+    watchdog
+        Stops the robot where nothing fresh comes; None for a clock that is not live.
+    """
+
+    robot: FishBot
+    clock: DriveClock
+    models: DriveModels
+    log: DriveLog
+    tell: Tell
+    watchdog: Watchdog | None = None
+
+
+@final
+class Driver:
+    """Drives a robot by a model, frame by frame.
+
+    Parameters
+    ----------
+    opened
+        The trial.
+    manner
+        How to drive.
+    crew
+        What it works with.
+    """
+
+    def __init__(self, opened: OpenTrial, manner: Manner, crew: Crew) -> None:
+        self.pilot = Pilot(opened, manner, crew.robot)
+        self._crew = crew
+        self._letter = manner.letter
+        self._complaints = Complaints(manner.letter)
+        self._model = crew.models.first()
+        self._begun = False
+        self._seen_s = -math.inf
+        self._held = ""
+        self._n_bites = 0
+        self.n_targets = 0
+        self.n_commands = 0
+        self.is_answered = False
+        self.models_used: list[str] = []
+
+    def warm_up(self) -> None:
+        """Do what takes long the first time, before anything moves."""
+        # The step's kernels are compiled or loaded by a pilot that nobody follows.
+        self.pilot.warm_up(self._model)
+
+    def take(self, frames: list[FramePoses], *, age_s: float | None = None) -> None:
+        """Take frames that have come, oldest first.
+
+        Parameters
+        ----------
+        frames
+            None is left out: each step that falls on one is done.
+        age_s
+            Seconds since the last one was written, where that is known.
+        """
+        for poses in frames:
+            self._crew.clock.take_frame(poses.time_s)
+            if not self._begun:
+                self._begin(poses.time_s)
+            self._take(poses)
+        if frames and age_s is not None:
+            self._crew.log.measure(POSE_TO_STATE, age_s)
+
+    def tick(self) -> None:
+        """Do the ticks that are due."""
+        began_s = time.perf_counter()
+        for time_s in self._crew.clock.due():
+            late_s = max(0.0, self._crew.clock.now_s() - time_s) if self._crew.clock.is_live else 0
+            self._tick(time_s, began_s - late_s)
+            began_s = time.perf_counter()
+        if isinstance(self._crew.clock, WallClock):
+            self._crew.log.n_ticks_skipped = self._crew.clock.n_skipped
+        self._crew.log.n_steps_missed = self.pilot.n_missed
+
+    def listen(self) -> None:
+        """Hear what the robot says."""
+        now_s = self._time_s()
+        for said in self._crew.robot.listen():
+            self._complaints.hear(said, now_s)
+            if said.what == "described" and said.robot == self._letter:
+                self.is_answered = True
+
+    def _begin(self, time_s: float) -> None:
+        self._begun = True
+        self._log_model(time_s, self._model, begins=True)
+
+    def _take(self, poses: FramePoses) -> None:
+        if self.pilot.is_due(poses.frame):
+            self._look_for_model(poses.time_s)
+        before = self.pilot.pose
+        target = self.pilot.see(poses, self._model)
+        pose = self.pilot.pose
+        seen = pose is not None and pose is not before
+        if seen:
+            self._seen_s = self._time_s()
+            if self._crew.watchdog is not None:
+                self._crew.watchdog.fresh()
+        place: dict[str, float | None] = {"x_m": None, "y_m": None, "heading_rad": None}
+        if seen and pose is not None:
+            place = {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad}
+        agents = len(poses.agents) - seen
+        item = {"what": "pose", "time_s": poses.time_s, "frame": poses.frame, "agents": agents}
+        self._crew.log.add(item | place)
+        self._note(target)
+
+    def _note(self, target: Target | None) -> None:
+        if target is not None:
+            self.n_targets += 1
+            self._crew.log.add(target_item(target))
+
+    def _tick(self, time_s: float, due_s: float) -> None:
+        held = self._reason()
+        command = self.pilot.tick(time_s, held)
+        sent = self._crew.robot.send(command.message)
+        if sent and self._crew.clock.is_live:
+            self._crew.log.measure(TICK_TO_BYTE, time.perf_counter() - due_s)
+        self.n_commands += 1
+        self._tell_changes(time_s, held)
+        told = {"sent": sent, "n_sent": self._crew.robot.line.n_sent}
+        self._crew.log.add(command_item(command, self._letter) | told)
+
+    def _reason(self) -> str:
+        """Return why the robot may not be driven on; empty if it may."""
+        if not self._crew.robot.line.is_open:
+            return "port-lost"
+        fault = self._complaints.fault(self._time_s())
+        if fault == "power-down":
+            return fault
+        if self.pilot.pose is not None and self._time_s() - self._seen_s > PATIENCE_S:
+            return "stale-pose"
+        return fault
+
+    def _tell_changes(self, time_s: float, held: str) -> None:
+        watchdog = self._crew.watchdog
+        if watchdog is not None and watchdog.n_bites != self._n_bites:
+            self._n_bites = watchdog.n_bites
+            if held not in {"stale-pose", "port-lost"} and self.pilot.pose is not None:
+                self._fault(time_s, "watchdog", _SAYS["watchdog"])
+        if held == self._held:
+            return
+        if self._held:
+            self._fault(time_s, self._held, f"No more {self._held}.", ended=True)
+        if held:
+            self._fault(time_s, held, _SAYS[held])
+        self._held = held
+
+    def _fault(self, time_s: float, fault: str, says: str, *, ended: bool = False) -> None:
+        item = {"what": "fault", "time_s": time_s, "fault": fault, "says": says, "ended": ended}
+        self._crew.log.add(item)
+        self._crew.tell(Note(text=f"{time_s:.1f} s: {says}", warning=not ended))
+
+    def _look_for_model(self, time_s: float) -> None:
+        found = self._crew.models.look()
+        if self._crew.models.problem:
+            says = f"{self._crew.models.problem} The model before drives on."
+            self._fault(time_s, "model", says)
+        if found is not None:
+            self._model = found
+            self._log_model(time_s, found)
+
+    def _log_model(self, time_s: float, model: InForce, *, begins: bool = False) -> None:
+        self.models_used.append(model.name)
+        item: dict[str, Any] = {
+            "what": "model",
+            "time_s": time_s,
+            "model": model.name,
+            "sha256": model.sha256,
+            "parameters": model.text,
+            "begins": begins,
+        }
+        self._crew.log.add(item)
+        self._crew.tell(Note(text=f"{time_s:.1f} s: {model.name} drives."))
+
+    def _time_s(self) -> float:
+        """Return the time by which silence is measured."""
+        clock = self._crew.clock
+        return time.monotonic() if clock.is_live else clock.now_s()
