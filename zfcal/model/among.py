@@ -13,7 +13,7 @@ from zfcal.arena import Arena
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import Tank, zone_of
 from zfcal.model.kernels.heading import draw_move
-from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
+from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
 from zfcal.model.kernels.world import (
@@ -93,7 +93,8 @@ class Among:
         self._state[DT_S], self._state[KIND, :-1], self._state[KIND, -1] = dt_s, kinds, 1.0
         self._state[[X, Y], :-1] = np.nan
         self._state[LEFT_AT_S], self._state[LEFT_S] = -NEVER_S, NEVER_S
-        self._sight = make_sight(in_vectors(n * n))
+        # As many as `in_vectors` says, which alone would have to be compiled.
+        self._sight = make_sight(-(-n * n // 8) * 8)
         self._work = make_work(n, 0, GRID)
 
     @property
