@@ -1,39 +1,81 @@
-"""`zfcal demo`: a whole small trial from nothing."""
+"""`zfcal demo`: a whole small trial from nothing, or a whole experiment."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from .closed_loop_options import closed_loop_options
 from .options import PLACE, speaks
 from .output import Output
 from .report import write_page
 
+if TYPE_CHECKING:
+    from zfcal.online.opening import Task
+
 
 @click.command("demo")
 @click.argument("folder", metavar="[DIR]", type=PLACE, default=Path("zfcal-demo"))
+@closed_loop_options
 @click.option("--force", is_flag=True, help="Make it again, even if it is up to date.")
 @speaks
-def command(out: Output, folder: Path, *, force: bool) -> None:
+def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bool) -> None:
     r"""Simulate a tank and its cameras, track, analyse, calibrate and report.
 
     DIR gets tank/ (the simulated truth and the images of it), trial/ (all that
     is made from these images) and a contact sheet of the worst frames. Takes a
     minute or two.
 
+    With --closed-loop the fish react to a robot, which is driven by what is
+    calibrated meanwhile: cameras, tracker, analysis, calibration, drive and a
+    virtual FishBot at a serial port, in lock-step. tank/ holds the truth.
+
     \b
     Example:
         zfcal demo
         zfcal demo /tmp/demo --force
+        zfcal demo loop --closed-loop --duration 10min
+        zfcal demo baseline --closed-loop --no-video --swims random --seed 3
     """
     from zfcal.online.demo import run_demo
     from zfcal.online.opening import Task
 
+    task = Task(force=force)
+
     def work() -> None:
-        task = Task(force=force)
-        trial = run_demo(folder, out.tell, task=task)
+        if loop is None:
+            trial = run_demo(folder, out.tell, task=task)
+        else:
+            trial = _closed_loop(out, folder, loop, task)
         write_page(out, [trial], None, task)
         out.note(f"Figures: {trial / 'report'} (open {trial / 'report' / 'index.html'})")
 
     out.attempt(work)
+
+
+def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -> Path:
+    from zfcal.calibrate.task import Settings
+    from zfcal.online.closed_loop import LoopOptions, closed_loop
+    from zfcal.online.virtual_fish import FishOptions
+    from zfcal.units import M_PER_MM
+
+    given = {name: value for name, value in asked.items() if value is not None}
+    fish: dict[str, float] = {
+        name: given[name]
+        for name in ("wariness", "between_sd", "drift_sd", "drift_s")
+        if name in given
+    }
+    if "noise_mm" in given:
+        fish["noise_m"] = given["noise_mm"] * M_PER_MM
+    loop: dict[str, Any] = {
+        name: given[name] for name in ("duration_s", "robot", "seed") if name in given
+    }
+    options = LoopOptions(
+        **loop,
+        video=not asked["no_video"],
+        fish=FishOptions(**fish),
+        settings=Settings(generations=given.get("generations", 30)),
+    )
+    return closed_loop(folder, options, out.tell, task=task)

@@ -78,7 +78,7 @@ class Following:
         self._minutes = Minutes(
             plan.opened,
             origins,
-            lambda tracks: measured(plan, tracks),
+            lambda tracks: measured(plan.opened.trial, tracks),
             tell,
             task=task,
         )

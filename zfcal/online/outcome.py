@@ -18,6 +18,7 @@ from zfcal.online.stretch import NOISE_KEY
 from zfcal.online.track_plan import Plan
 from zfcal.online.tracker_noise import losses, tracker_noise
 from zfcal.tracks import FISH, FramePoses, Tracks
+from zfcal.trial import Trial
 from zfcal.vision.frames import Frame, Image
 from zfcal.vision.robot import RobotSeen
 from zfcal.vision.stamps import Tally
@@ -40,9 +41,8 @@ _LATENCIES = 100_000
 """Latencies that are kept at most: two hours at 15 Hz."""
 
 
-def measured(plan: Plan, tracks: Tracks) -> Mapping[str, JSON]:
+def measured(trial: Trial, tracks: Tracks) -> Mapping[str, JSON]:
     """Return what is known of a segment's tracks: losses, and noise where it can be told."""
-    trial = plan.opened.trial
     fish = tracks.take(tracks.kind == FISH)
     sd_m = tracker_noise(fish, fps=trial.fps, dt_s=trial.dt_s)
     noise: Mapping[str, JSON] = {} if sd_m is None else {NOISE_KEY: sd_m}

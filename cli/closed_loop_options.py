@@ -1,0 +1,69 @@
+"""The options of `zfcal demo --closed-loop`."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import click
+
+from .durations import seconds
+from .options import Command
+
+_PRESENT = (
+    "no_video", "duration_s", "generations", "robot", "seed",
+    "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
+)  # fmt: skip
+
+_FLAGS = {name: f"--{name.replace('_', '-')}" for name in _PRESENT} | {
+    "duration_s": "--duration",
+    "robot": "--swims",
+}
+
+
+def closed_loop_options(command: Command) -> Command:
+    """Add --closed-loop and what goes with it, handed over as ``loop``; None without it."""
+
+    @functools.wraps(command)
+    def run(*args: Any, closed_loop: bool, **options: Any) -> None:
+        asked = {name: options.pop(name) for name in _PRESENT}
+        if not closed_loop:
+            given = [name for name, value in asked.items() if value not in (None, False)]
+            if given:
+                raise click.UsageError(f"{_FLAGS[given[0]]} is for --closed-loop.")
+        command(*args, loop=asked if closed_loop else None, **options)
+
+    decorated: Command = run
+    for option in reversed(_OPTIONS):
+        decorated = option(decorated)
+    return decorated
+
+
+_OPTIONS = (
+    click.option(
+        "--closed-loop",
+        is_flag=True,
+        help="Let virtual fish and the driven robot react to each other.",
+    ),
+    click.option("--no-video", is_flag=True, help="Tracks with the tracker's noise, no images."),
+    click.option(
+        "--duration", "duration_s", type=seconds, metavar="TIME", help="How long.  [default: 10min]"
+    ),
+    click.option("--generations", type=click.IntRange(min=0), help="Of a round.  [default: 30]"),
+    click.option(
+        "--swims",
+        "robot",
+        type=click.Choice(["calibrated", "fixed", "random"]),
+        help="What the robot swims by.  [default: calibrated]",
+    ),
+    click.option("--seed", type=click.IntRange(min=0), help="Of everything.  [default: 1]"),
+    click.option(
+        "--wariness", type=float, help="Log of the attention that the robot loses.  [default: 0.3]"
+    ),
+    click.option("--between-sd", type=float, help="How trials differ, sd of logs.  [default: 0.2]"),
+    click.option(
+        "--drift-sd", type=float, help="How parameters drift, sd of logs.  [default: 0.1]"
+    ),
+    click.option("--drift-s", type=float, help="Correlation time of the drift.  [default: 600]"),
+    click.option("--noise-mm", type=float, help="Position noise of the tracker.  [default: 0.4]"),
+)

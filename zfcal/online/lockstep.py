@@ -1,0 +1,75 @@
+"""A driver that is handed each frame in turn: no waiting, no watchdog, the poses' clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import final
+
+from zfcal.errors import InputError
+from zfcal.online.drive import DriveOptions, lineage_of
+from zfcal.online.drive_clock import PoseClock
+from zfcal.online.drive_log import DriveLog
+from zfcal.online.drive_models import DriveModels
+from zfcal.online.driving import Crew, Driver
+from zfcal.online.events import Tell
+from zfcal.online.opening import OpenTrial
+from zfcal.robot.fishbot import FishBot
+from zfcal.robot.port import SerialLine
+from zfcal.tracks import FramePoses
+
+_OPENING_S = 5.0
+
+
+@final
+class LockstepDriver:
+    """Does at each frame what ``zfcal drive --clock poses`` does, and logs it likewise.
+
+    Parameters
+    ----------
+    opened
+        The trial, whose newest model drives.
+    port
+        The robot's serial port.
+    tell
+        Hears of models and faults.
+
+    Raises
+    ------
+    InputError
+        The port cannot be opened.
+    """
+
+    def __init__(self, opened: OpenTrial, port: Path, tell: Tell) -> None:
+        options = DriveOptions(port=str(port), clock="poses")
+        line = SerialLine(str(port))
+        if not line.wait(_OPENING_S):
+            line.close()
+            raise InputError(f"{port}: the port cannot be opened ({line.problem or 'no answer'}).")
+        self._robot = FishBot(options.manner.letter, line)
+        self._log = DriveLog(opened.trial, lineage_of(opened, options), tell)
+        crew = Crew(
+            robot=self._robot,
+            clock=PoseClock(opened.trial.fps),
+            models=DriveModels(opened),
+            log=self._log,
+            tell=tell,
+        )
+        self._driver = Driver(opened, options.manner, crew)
+        self._driver.warm_up()
+
+    @property
+    def n_sent(self) -> int:
+        """Bytes that went to the serial port until now."""
+        return self._robot.line.n_sent
+
+    def take(self, poses: FramePoses) -> None:
+        """Do all that is due at a frame."""
+        self._driver.listen()
+        self._driver.take([poses])
+        self._driver.tick()
+        self._log.flush()
+
+    def close(self) -> None:
+        """Stop the robot and close the log."""
+        self._robot.close()
+        self._log.close()

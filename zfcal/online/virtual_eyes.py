@@ -1,0 +1,95 @@
+"""Two virtual cameras over and under a virtual tank, and the tracker that looks through them."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import final
+
+import cv2
+import numpy as np
+
+from zfcal.online.film import encoded
+from zfcal.online.opening import OpenTrial
+from zfcal.tracks import FramePoses, tracks_of
+from zfcal.vision.background import background_of
+from zfcal.vision.bodies import Bodies
+from zfcal.vision.frames import Frame, Image
+from zfcal.vision.fusing import Fuser
+from zfcal.vision.look import USUAL, look_of
+from zfcal.vision.region import region_of
+from zfcal.vision.render import OverheadPainter
+from zfcal.vision.render_below import BelowPainter
+from zfcal.vision.rig import below_camera, overhead_camera
+from zfcal.vision.robot import LedOptions, RobotFinder
+from zfcal.vision.seen import TrackerOptions
+from zfcal.vision.swimming import Moment, swimming
+from zfcal.vision.tracker import FishTracker
+
+_PAST = 12
+"""Frames from which a posture follows: a fish turns within four."""
+
+
+@final
+class VirtualEyes:
+    """Draws each frame as both cameras would take it, and tracks what they show.
+
+    Parameters
+    ----------
+    opened
+        The trial: its arena, agents, frame rate and seed.
+    """
+
+    def __init__(self, opened: OpenTrial) -> None:
+        trial, arena = opened.trial, opened.arena
+        self._fps, self._seed, self._look = trial.fps, trial.seed, look_of(USUAL)
+        above, under = overhead_camera(arena), below_camera(arena)
+        self._above = OverheadPainter(arena, above, self._look, seed=trial.seed)
+        self._under = BelowPainter(arena, under, self._look, seed=trial.seed)
+        self._tracker = FishTracker(
+            TrackerOptions(n_agents=trial.n_agents),
+            above,
+            background=background_of(self._taken(self._above, _nobody())),
+            region=region_of(arena, above),
+        )
+        mask = (region_of(arena, under) * np.uint8(255)).astype(np.uint8)
+        self._finder = RobotFinder(LedOptions(), under, mask=mask)
+        self._fuser = Fuser()
+        self._past: deque[FramePoses] = deque(maxlen=_PAST)
+
+    @property
+    def next_agent(self) -> int:
+        """The first id that is free."""
+        return self._fuser.next_agent
+
+    def see(self, truth: FramePoses) -> FramePoses:
+        """Return what the tracker makes of the images of a frame."""
+        self._past.append(truth)
+        swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
+        moment = swum.at(len(swum) - 1)
+        above, under = (
+            Frame(number=truth.frame, time_s=truth.time_s, image=self._taken(painter, moment))
+            for painter in (self._above, self._under)
+        )
+        seen = self._tracker.step(above)
+        agents = self._fuser.step(seen, self._finder.step(under), truth.time_s)
+        return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)
+
+    def take_bad(self) -> tuple[str, ...]:
+        """Return what was wrong with the last frame."""
+        return tuple(bad.reason for bad in self._tracker.take_bad_frames())
+
+    def _taken(self, painter: OverheadPainter | BelowPainter, moment: Moment) -> Image:
+        """Return an image as it comes over a cable: compressed."""
+        data = np.frombuffer(encoded(painter.paint(moment), self._look.jpeg_quality), np.uint8)
+        return np.asarray(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), np.uint8)
+
+
+def _nobody() -> Moment:
+    none = np.empty(0)
+    places = np.empty((0, 2))
+    bodies = Bodies(
+        xy_m=places, heading_rad=none, length_m=none, bend_rad=none, wave_rad=none, phase_rad=none
+    )
+    return Moment(
+        number=0, time_s=0.0, is_robot=np.empty(0, bool), bodies=bodies, velocity_m_s=places
+    )
