@@ -33,14 +33,17 @@ from zfcal.model.extended import (
     components_of,
     constants,
     factors_of,
+    harmonics,
+    late_sight,
     spin_of,
-    view_of,
     with_effect,
     without_effects,
 )
 from zfcal.model.kernels.extended import (
     component_score,
     factor_score,
+    late_score,
+    mean_waves,
     mixture_score,
     social_score,
 )
@@ -57,6 +60,8 @@ _FLOOR = 0.01
 
 _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""
+
+_MOST_HARMONICS = 2
 
 _LATE_SHARE = 0.3
 """Share of a late response that is asked for: all fish that respond late are seldom seen."""
@@ -245,10 +250,31 @@ class Screen:
         if effect.calls("rotation", shape):
             total += self._turned_scores(scene, at(effect.probe)) / effect.probe
         if effect.calls("factor", shape):
-            tilt, tilt_taken = factors_of(scene, at(effect.probe), angle, tables.probability)
-            factor_score(tilt, tilt_taken, tables.probability, some)
-            total += some * fitted.weight / effect.probe
+            tilted = self._tilted_scores(scene, at(effect.probe), effect.harmonics)
+            total += tilted * fitted.weight / effect.probe
         return total
+
+    def _tilted_scores(self, scene: Scene, packed: Packed, degree: int | None) -> Floats:
+        """Return the change of the log density by factors on headings."""
+        angle, probability = self.fitted.view.seen_sr, self.probability
+        scores = np.empty(len(scene.turns))
+        if degree is None:
+            tilt, tilt_taken = factors_of(scene, packed, angle, probability)
+            factor_score(tilt, tilt_taken, probability, scores)
+            return scores
+        waves, zones, log_taken = harmonics(scene, packed, angle, degree)
+        expected, lands = self._mean_waves
+        scores[:] = log_taken - (waves * expected[:, : waves.shape[1]]).sum(axis=1)
+        return scores - (zones * lands).sum(axis=1)
+
+    @cached_property
+    def _mean_waves(self) -> tuple[Floats, Floats]:
+        """Return what the model expects of cosines and sines, and of the landing zones."""
+        turns = self.scene.turns
+        waves = np.empty((len(turns), 1 + 2 * _MOST_HARMONICS))
+        zones = np.empty((len(turns), turns.share.shape[2]))
+        mean_waves(self.probability, turns.share, waves, zones)
+        return waves, zones
 
     def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
         fitted, turns = self.fitted, scene.turns
@@ -288,14 +314,22 @@ class Screen:
 
     def _late_scores(self, candidate: Candidate) -> Floats:
         """Return the scores of a mixture with the model that responds late."""
-        fitted, turns = self.fitted, self.scene.turns
-        late = with_effect(fitted.parameters, candidate.name, candidate.values(_LATE_SHARE))
-        other, _, other_taken = replace(
-            fitted, view=view_of(self.scene, late, fitted.view)
-        ).tables()
-        scores = np.empty(len(turns))
-        mixture_score(other, other_taken, *self._tables.mixtures(), scores)
-        return scores / _LATE_SHARE
+        fitted = self.fitted
+        values = candidate.values(_LATE_SHARE)
+        packed = pack([with_effect(fitted.parameters, candidate.name, values)], self.scene.arena)
+        toward, angle = late_sight(self.scene, packed, fitted.view.late)
+        tables, total = self._tables, np.zeros(len(self.scene.turns))
+        for x, zone in zip(fitted.x, fitted.turns, strict=True):
+            rows, own = zone.rows, x[:3] * SCALES
+            some = np.empty(len(rows))
+            late_score(
+                (fitted.view.toward[rows], fitted.view.angle_sr[rows]),
+                (toward[rows], angle[rows]), zone.taken,
+                own[1], constants(own[:2])[1], _LATE_SHARE * own[2],
+                *tables.mixtures(rows), some,
+            )  # fmt: skip
+            total[rows] = some
+        return total / _LATE_SHARE
 
     def _scatter(self, candidate: Candidate, steps: Floats) -> Score:
         """Return the scatter of individuals as a normal deviate (Q of Cochran 1954)."""

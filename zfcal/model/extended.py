@@ -31,19 +31,22 @@ from zfcal.model.kernels.extended import (
     SOCIAL_SLOPE,
     cell_table,
     extended_sums,
+    harmonic_tilt,
 )
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import (
     PART,
     ask_components,
     ask_factors,
+    ask_harmonics,
     ask_rotations,
     attend,
+    head_late,
     perceive,
 )
-from zfcal.model.kernels.world import ZONE, Packed, X, Y
+from zfcal.model.kernels.world import Packed
 from zfcal.model.packing import pack
-from zfcal.model.scene import Scene, cos_of
+from zfcal.model.scene import Scene
 from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters, ZoneParameters
 
@@ -109,27 +112,20 @@ def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> V
         A view of the model without effects, if there is one: sight is taken from it.
     """
     packed = pack([parameters], scene.arena)
-    lag, (share, felt_m, whole) = int(packed.lags[0]), packed.lates[0]
+    share, all_late = packed.lates[0, 0], sees_late(packed)
     known = {} if seen is None else seen.late
-    fov_rad = parameters.fov_rad
-
-    def perceived(late: int) -> tuple[Floats, Floats]:
-        if late not in known:
-            turns = scene.turns
-            known[late] = perceive(scene.states, turns.at, turns.who, late, cos_of(fov_rad))
-        toward, angle = known[late]
-        return toward, attended(scene, packed, angle)
-
-    toward, angle = perceived(sees_late(packed))
+    toward, angle = _perceived(scene, packed, known, all_late)
     own = angle
-    if lag > 0 and share > 0.0 and not sees_late(packed):
-        late_toward, late_angle = perceived(lag) if whole > 0.0 else (toward, angle)
-        if not whole > 0.0:
-            late_toward = _headed_late(scene, toward, lag, felt_m)
+    if packed.lags[0] > 0 and share > 0.0 and not all_late:
+        late_toward, late_angle = late_sight(scene, packed, known)
         toward = np.concatenate([toward, late_toward], axis=1)
         angle = np.concatenate([(1 - share) * angle, share * late_angle], axis=1)
     parts = components_of(scene, packed, own)
-    tilt, tilt_taken = factors_of(scene, packed, own)
+    degree = harmonics_of(parameters)
+    if degree is None:
+        tilt, tilt_taken = factors_of(scene, packed, own)
+    else:
+        tilt, tilt_taken = smooth_factors_of(scene, packed, own, degree)
     return View(
         toward=toward,
         angle_sr=angle,
@@ -157,19 +153,30 @@ def sees_late(packed: Packed) -> int:
     return int(packed.lags[0]) if share >= 1.0 and whole > 0.0 else 0
 
 
-def _headed_late(scene: Scene, toward: Floats, lag: int, felt_m: float) -> Floats:
-    """Return unit vectors to where others were; to where they are who are near enough."""
-    turns, states = scene.turns, scene.states
-    then = states[np.maximum(turns.at - lag, 0)]
-    own = states[turns.at][:, [X, Y]][np.arange(len(turns)), :, turns.who]
-    away = then[:, [X, Y]] - own[:, :, None]
-    length = np.hypot(away[:, 0], away[:, 1])
-    near = states[turns.at][:, [X, Y]] - own[:, :, None]
-    near_m = np.hypot(near[:, 0], near[:, 1])
-    late = (near_m > max(felt_m, REPULSION_M)) & (length > 0.0) & (then[:, ZONE] > 0)
-    made = toward.copy()
-    made[late] = (away / np.maximum(length, 1e-12)[:, None]).transpose(0, 2, 1)[late]
-    return made
+def late_sight(
+    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]]
+) -> tuple[Floats, Floats]:
+    """Return unit vectors and solid angles of neighbours as a model sees them that is late."""
+    lag, (_, felt_m, whole) = int(packed.lags[0]), packed.lates[0]
+    if whole > 0.0:
+        return _perceived(scene, packed, known, lag)
+    toward, angle = _perceived(scene, packed, known, 0)
+    turns, made = scene.turns, np.empty_like(toward)
+    near_m = max(float(felt_m), REPULSION_M)
+    head_late(scene.states, turns.at, turns.who, lag, near_m, toward, made)
+    return made, angle
+
+
+def _perceived(
+    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]], late: int
+) -> tuple[Floats, Floats]:
+    """Return what is seen so many steps late, with a model's effects on sight."""
+    if late not in known:
+        turns = scene.turns
+        cos_fov = float(packed.cos_fov[0])
+        known[late] = perceive(scene.states, turns.at, turns.who, late, cos_fov)
+    toward, angle = known[late]
+    return toward, attended(scene, packed, angle)
 
 
 def attended(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
@@ -220,6 +227,46 @@ def factors_of(
         tilt, taken,
     )  # fmt: skip
     return tilt, taken
+
+
+def harmonics_of(parameters: Parameters) -> int | None:
+    """Return the degree of the polynomial that a model's factors are; None where one is none."""
+    effects = [find_effect(name) for name in parameters.effects]
+    degrees = [effect.harmonics for effect in effects if effect.factor is not None]
+    known = [degree for degree in degrees if degree is not None]
+    return max(known, default=0) if len(known) == len(degrees) else None
+
+
+def harmonics(
+    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return the log of the effects' factors as a polynomial, and at the heading taken.
+
+    Returns
+    -------
+    waves, zones, log_taken
+        As `zfcal.model.kernels.scene.ask_harmonics` has them.
+    """
+    turns, n = scene.turns, len(scene.turns)
+    waves, log_taken = np.empty((n, 1 + 2 * degree)), np.empty(n)
+    zones = np.empty((n, turns.share.shape[2]))
+    ask_harmonics(
+        scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
+        turns.landing, waves, zones, log_taken,
+    )  # fmt: skip
+    return waves, zones, log_taken
+
+
+def smooth_factors_of(
+    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+) -> tuple[Floats, Floats]:
+    """Return what `factors_of` does, of factors that are polynomials in their log."""
+    if not len(packed.factors):
+        return np.zeros((0, ANGLES)), np.zeros(0)
+    waves, zones, log_taken = harmonics(scene, packed, angle_sr, degree)
+    tilt = np.empty((len(scene.turns), ANGLES))
+    harmonic_tilt(waves, zones, scene.turns.share, tilt)
+    return tilt, np.exp(log_taken)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

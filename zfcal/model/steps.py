@@ -205,8 +205,13 @@ def landing_shares(
         if reach[s] < clearance(x, y, tank):  # no border is that near
             share[s, :, zone_of(x, y, tank) - 1] = per_cell
             continue
+        until, zone, step = 0, 0, reach[s] * 2.0 * math.pi / places
         for p in range(places):
-            zone = zone_of(x + reach[s] * ux[p], y + reach[s] * uy[p], tank)
+            if p >= until:
+                to_x, to_y = x + reach[s] * ux[p], y + reach[s] * uy[p]
+                zone, until = zone_of(to_x, to_y, tank), p + 1
+                if zone > 0:  # those after it are in the same zone, as far as it is clear
+                    until += int(min(clearance(to_x, to_y, tank) / step, float(places)))
             if zone > 0:
                 share[s, p // per_cell, zone - 1] += 1
     return share

@@ -131,6 +131,7 @@ EFFECT = Effect(
     probe=0.5,
     component=component,
     factor=factor,
+    harmonics=1,
     rotation=rotation,
     shapes=lambda _arena: (
         {"kappa": 3.0, "grading": 1.0},

@@ -113,6 +113,10 @@ class Effect:
         A strength so small that the effect is proportional to it.
     component, factor, speed, sight, rotation
         Compiled functions (`numba.cfunc`), None for what it does not touch.
+    harmonics
+        The log of its factor is a trigonometric polynomial of the heading, of this degree,
+        plus a number of the landing zone; None where it is not, or where there is no factor.
+        So few headings are asked instead of all.
     lag
         Name of a parameter in seconds by which agents respond late; the strength is the
         share of what they see that is late, and ``felt_m`` and ``whole`` say of whom and
@@ -149,6 +153,7 @@ class Effect:
     speed: Any = None
     sight: Any = None
     rotation: Any = None
+    harmonics: int | None = None
     lag: str | None = None
     shapes: Callable[[Arena], Shapes] = _as_it_is
     lacks: Callable[[Company], str | None] = _always

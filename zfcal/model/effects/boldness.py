@@ -56,6 +56,7 @@ EFFECT = Effect(
     strength="spread",
     probe=0.01,
     factor=factor,
+    harmonics=1,
     shapes=_shapes,
     lacks=_lacks,
     identity_s=300.0,

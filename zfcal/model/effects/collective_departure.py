@@ -53,6 +53,7 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=1,
     shapes=lambda _arena: tuple(
         {"memory_s": memory_s, "heading_share": share}
         for share in (1.0, 0.0)

@@ -40,5 +40,6 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=1,
     shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
 )

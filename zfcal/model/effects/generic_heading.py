@@ -144,6 +144,10 @@ def own_speed(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: 
     return tilt(parameters[0], off * straight, abs(off))
 
 
+_HARMONICS = 2
+"""Along a wall either way; all others have one."""
+
+
 def _needs_wall(company: Company) -> str | None:
     return None if company.follows_walls else "a zone that follows walls"
 
@@ -195,6 +199,7 @@ def _effect(
             *parameters,
         ),
         factor=factor,
+        harmonics=_HARMONICS,
         shapes=shapes,
         lacks=lacks,
         fixed=tuple(own.name for own in parameters if own.name in FIXED),

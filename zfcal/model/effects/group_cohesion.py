@@ -92,6 +92,7 @@ EFFECT = Effect(
     probe=0.005,
     component=component,
     factor=factor,
+    harmonics=1,
     shapes=lambda _arena: (
         {"kappa": 2.0, "full_m": 0.0},
         {"kappa": 8.0, "full_m": 0.0},

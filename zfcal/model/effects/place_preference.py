@@ -54,5 +54,6 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=1,
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
 )

@@ -67,6 +67,7 @@ EFFECT = Effect(
     probe=0.01,
     sight=sight,
     factor=factor,
+    harmonics=1,
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
     lacks=_lacks,
     fixed=("flight",),

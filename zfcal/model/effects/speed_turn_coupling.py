@@ -45,5 +45,6 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=1,
     fixed=("usual_m_s",),
 )

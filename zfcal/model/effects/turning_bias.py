@@ -39,6 +39,7 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=2,
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
     fixed=("along_walls",),
 )

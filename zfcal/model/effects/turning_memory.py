@@ -51,6 +51,7 @@ EFFECT = Effect(
     ),
     probe=0.01,
     factor=factor,
+    harmonics=2,
     shapes=lambda _arena: tuple(
         {"along_walls": along, "forgets_wide": wide} for along in (0.0, 1.0) for wide in (0.0, 1.0)
     ),

@@ -311,6 +311,46 @@ def social_score(
 
 
 @kernel
+def late_score(
+    sight: tuple[Floats, Floats], late: tuple[Floats, Floats], taken: Floats, kappa: float,
+    scale: float, alpha: float, mixture: Floats, probability: Floats, mixture_taken: Floats,
+    floor: Floats, score: Floats,
+) -> None:  # fmt: skip
+    """Write the scores of neighbours that are seen where they were; see `social_score`.
+
+    Parameters
+    ----------
+    sight, late
+        Unit vectors, shape (step, other, 2), and solid angles, shape (step, other).
+    """
+    cells = make_cells(mixture.shape[1])
+    more = np.empty(mixture.shape[1] + 1)
+    for s in range(taken.shape[0]):
+        cells.gx[-1], cells.gy[-1] = taken[s, 0], taken[s, 1]
+        more[:] = 0.0
+        there = False
+        for j in range(sight[1].shape[1]):
+            now, then = sight[0][s, j], late[0][s, j]
+            by, less = late[1][s, j], sight[1][s, j]
+            if by == less and (by == 0.0 or (now[0] == then[0] and now[1] == then[1])):
+                continue
+            there = True
+            if by > 0.0:
+                _bell(
+                    then[0], then[1], kappa, alpha * scale * by, cells.gx, cells.gy,
+                    cells.cosine, cells.value, more,
+                )  # fmt: skip
+            if less > 0.0:
+                _bell(
+                    now[0], now[1], kappa, -alpha * scale * less, cells.gx, cells.gy,
+                    cells.cosine, cells.value, more,
+                )  # fmt: skip
+        score[s] = 0.0
+        if there:
+            score[s] = _relative(more, mixture[s], probability[s], mixture_taken[s], floor[s])
+
+
+@kernel
 def _relative(
     more: Floats, mixture: Floats, probability: Floats, taken: float, floor: float
 ) -> float:
@@ -373,6 +413,83 @@ def mixture_score(
             mean += probability[s, g] * (other[s, g] - mixture[s, g]) / middle
         middle = 0.5 * (other_taken[s] + mixture_taken[s]) + floor[s]
         score[s] = (other_taken[s] - mixture_taken[s]) / middle - mean
+
+
+@kernel
+def _harmonic(waves: Floats, gx: Floats, gy: Floats, total: Floats) -> None:
+    """Write a trigonometric polynomial at the cells of headings."""
+    cells = gx.size
+    for g in range(cells):
+        total[g] = waves[0] + waves[1] * gx[g] + waves[2] * gy[g]
+    for d in range(2, waves.size // 2 + 1):
+        c, s = waves[2 * d - 1], waves[2 * d]
+        if c != 0.0 or s != 0.0:
+            for g in range(cells):
+                total[g] += c * gx[d * g % cells] + s * gy[d * g % cells]
+
+
+@kernel
+def harmonic_tilt(waves: Floats, zones: Floats, share: NDArray[np.uint8], tilt: Floats) -> None:
+    """Write factors on cells of headings from the harmonics of their logs.
+
+    Parameters
+    ----------
+    waves, zones
+        From `zfcal.model.kernels.scene.ask_harmonics`.
+    share : ndarray of uint8, shape (step, cell, zone)
+        A cell that several zones share counts as in the one with most of it.
+    tilt : ndarray, shape (step, cell)
+        Receives the factors; of no matter in a cell that lands nowhere.
+    """
+    cells = tilt.shape[1]
+    gx, gy = np.empty(cells), np.empty(cells)
+    for g in range(cells):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    total = np.empty(cells)
+    for s in range(waves.shape[0]):
+        _harmonic(waves[s], gx, gy, total)
+        if zones[s].any():
+            for g in range(cells):
+                zone, most = 0, 0
+                for z in range(zones.shape[1]):
+                    if share[s, g, z] > most:
+                        most, zone = share[s, g, z], z
+                total[g] += zones[s, zone]
+        for g in range(cells):
+            tilt[s, g] = _exponential(min(total[g], 0.0))
+
+
+@kernel
+def mean_waves(probability: Floats, share: NDArray[np.uint8], waves: Floats, zones: Floats) -> None:
+    """Write the means of cosines and sines of headings, and how likely each landing zone is.
+
+    Parameters
+    ----------
+    probability : ndarray, shape (step, cell)
+    share : ndarray of uint8, shape (step, cell, zone)
+    waves : ndarray, shape (step, 1 + 2 * degree)
+        Receives one, then the mean of cosine and sine of each multiple of the heading.
+    zones : ndarray, shape (step, zone)
+    """
+    cells = probability.shape[1]
+    gx, gy = np.empty(cells), np.empty(cells)
+    for g in range(cells):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    for s in range(waves.shape[0]):
+        waves[s], zones[s] = 0.0, 0.0
+        waves[s, 0] = 1.0
+        for g in range(cells):
+            p = probability[s, g]
+            if not p > 0.0:
+                continue
+            for d in range(1, waves.shape[1] // 2 + 1):
+                waves[s, 2 * d - 1] += p * gx[d * g % cells]
+                waves[s, 2 * d] += p * gy[d * g % cells]
+            zone, most = 0, 0
+            for z in range(zones.shape[1]):
+                if share[s, g, z] > most:
+                    most, zone = share[s, g, z], z
+            zones[s, zone] += p
 
 
 @kernel

@@ -151,6 +151,35 @@ def perceive(
 
 
 @kernel
+def head_late(
+    states: Floats, at: Ints, who: Ints, lag: int, felt_m: float, toward: Floats, made: Floats
+) -> None:  # fmt: skip
+    """Write unit vectors to where others were; to where they are who are near.
+
+    Parameters
+    ----------
+    lag
+        Steps by which others are late.
+    felt_m
+        Neighbours as near as that are felt at once.
+    toward, made : ndarray, shape (step, agent, 2)
+        As at once, and as received.
+    """
+    for s in range(at.size):
+        own, i = states[at[s]], who[s]
+        then = states[max(0, at[s] - lag)]
+        for j in range(states.shape[2]):
+            made[s, j, 0], made[s, j, 1] = toward[s, j, 0], toward[s, j, 1]
+            near_x, near_y = own[X, j] - own[X, i], own[Y, j] - own[Y, i]
+            if not then[ZONE, j] > 0.0 or near_x * near_x + near_y * near_y <= felt_m * felt_m:
+                continue
+            dx, dy = then[X, j] - own[X, i], then[Y, j] - own[Y, i]
+            away = math.sqrt(dx * dx + dy * dy)
+            if away > 0.0:
+                made[s, j, 0], made[s, j, 1] = dx / away, dy / away
+
+
+@kernel
 def attend(
     states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, changed: Floats
 ) -> None:
@@ -295,6 +324,78 @@ def ask_factors(
                 tilt[s, g] = product
             else:
                 tilt_taken[s] = product
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@inlined
+def _log_factor(
+    packed: Packed, state: int, row: int, at: tuple[int, int], heading: tuple[float, float],
+    speed_m_s: float, landing: int,
+) -> float:  # fmt: skip
+    """Return the log of the product of the effects' factors at one heading.
+
+    Parameters
+    ----------
+    state, row
+        Addresses of the agents' state and of what is seen.
+    at
+        Number of agents, and the agent.
+    """
+    product = 1.0
+    for h in range(packed.factors.shape[0]):
+        product *= call_factor(
+            packed.factors[h, 0], state, row, at[0], at[1],
+            packed.effects[0, packed.factors[h, 1]].ctypes.data,
+            heading[0], heading[1], speed_m_s, landing,
+        )  # fmt: skip
+    return math.log(max(product, 1e-300))
+
+
+@kernel
+def ask_harmonics(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
+    speed_m_s: Floats, landing: Ints, waves: Floats, zones: Floats, log_taken: Floats,
+) -> None:  # fmt: skip
+    """Write the log of the effects' factors, as a trigonometric polynomial of the heading.
+
+    Parameters
+    ----------
+    taken : ndarray, shape (step, 2)
+    speed_m_s, landing : ndarray, shape (step,)
+    waves : ndarray, shape (step, 1 + 2 * degree)
+        Receives the mean, then the cosine's and the sine's share of each degree, for
+        headings that land in the first zone.
+    zones : ndarray, shape (step, zone)
+        Receives by how much more it is for each landing zone.
+    log_taken : ndarray, shape (step,)
+        At the heading taken.
+    """
+    n, points = states.shape[2], waves.shape[1]
+    row = np.zeros(n * n)
+    gx, gy = np.empty(points), np.empty(points)
+    for p in range(points):
+        gx[p], gy[p] = math.cos(2 * math.pi * p / points), math.sin(2 * math.pi * p / points)
+    value = np.empty(points)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        state, seen, me = states[at[s]].ctypes.data, row.ctypes.data, (n, i)
+        for p in range(points):
+            value[p] = _log_factor(packed, state, seen, me, (gx[p], gy[p]), speed_m_s[s], 1)
+        waves[s] = 0.0
+        for p in range(points):
+            waves[s, 0] += value[p] / points
+            for d in range(1, points // 2 + 1):
+                waves[s, 2 * d - 1] += 2.0 * value[p] * gx[p * d % points] / points
+                waves[s, 2 * d] += 2.0 * value[p] * gy[p * d % points] / points
+        zones[s, 0] = 0.0
+        for z in range(1, zones.shape[1]):
+            there = _log_factor(packed, state, seen, me, (gx[0], gy[0]), speed_m_s[s], z + 1)
+            zones[s, z] = there - value[0]
+        own = (taken[s, 0], taken[s, 1])
+        log_taken[s] = _log_factor(packed, state, seen, me, own, speed_m_s[s], landing[s])
         for j in range(n):
             row[i * n + j] = 0.0
 

@@ -1,0 +1,103 @@
+"""What is worked out from few points is what all points give."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.model.effects import all_effects
+from zfcal.model.effects.generic import generic_effects
+from zfcal.model.extended import (
+    factors_of,
+    harmonics_of,
+    smooth_factors_of,
+    view_of,
+    with_effect,
+)
+from zfcal.model.geometry import zone_of
+from zfcal.model.kernels.extended import mixture_score
+from zfcal.model.kernels.world import TRAIT
+from zfcal.model.packing import pack
+from zfcal.model.scene import thin
+from zfcal.model.simulate import tank_of
+
+SMOOTH = [e for e in (*all_effects(), *generic_effects()) if e.harmonics is not None]
+
+A_PLACE = {"x_m": 0.22, "y_m": 0.77}
+
+
+@pytest.fixture(scope="module")
+def few(screen):
+    """Return a screen of fish and a robot, and some of its turns."""
+    own = screen(41, minutes=3.0, n_fish=3, n_robots=1)
+    rows = np.arange(len(own.scene.turns)) % 8 == 0
+    own.scene.states[:, TRAIT] = 1.0
+    return own, thin(own.scene, rows, np.zeros(len(own.scene.moves), dtype=bool))
+
+
+def packed_with(own, effect, arena):
+    """Return a model with an effect, each of its parameters well away from zero."""
+    middling = {p.name: p.default or min(0.7, p.high) for p in effect.parameters}
+    middling |= {name: at for name, at in A_PLACE.items() if name in middling}
+    model = with_effect(own.fitted.parameters, effect.name, middling)
+    return model, pack([model], arena)
+
+
+@pytest.mark.parametrize("effect", SMOOTH, ids=lambda effect: effect.name)
+def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, few, tank):
+    """An effect that says it is a polynomial of some degree is one, up to a common factor."""
+    own, scene = few
+    model, packed = packed_with(own, effect, tank)
+    angle_sr = view_of(scene, own.fitted.parameters).angle_sr
+    whole, at_taken = factors_of(scene, packed, angle_sr)
+    few_points, at_taken_again = smooth_factors_of(scene, packed, angle_sr, harmonics_of(model))
+    lands = scene.turns.share.any(axis=2)
+    np.testing.assert_allclose(few_points[lands], whole[lands], rtol=1e-5)
+    np.testing.assert_allclose(at_taken_again, at_taken, rtol=1e-9)
+
+
+def test_the_factors_differ_between_headings(few, tank):
+    """The test above would be idle if factors were one."""
+    own, scene = few
+    angle_sr = view_of(scene, own.fitted.parameters).angle_sr
+    flat = {
+        effect.name
+        for effect in SMOOTH
+        for whole, _ in [factors_of(scene, packed_with(own, effect, tank)[1], angle_sr)]
+        if np.ptp(whole, axis=1).max() < 0.01
+    }
+    assert flat <= {"collective-departure"}
+
+
+@pytest.mark.parametrize("whole", [1.0, 0.0])
+def test_the_score_of_a_late_response_is_that_of_the_late_mixture(few, candidate, whole):
+    """Only what is seen elsewhere is summed anew; the whole mixture says the same."""
+    own, _ = few
+    asked = candidate("reaction-delay", delay_s=0.4, felt_m=0.05, whole=whole)
+    late = with_effect(own.fitted.parameters, asked.name, asked.values(0.3))
+    fitted = own.fitted
+    other = dataclasses.replace(fitted, view=view_of(own.scene, late, fitted.view))
+    table, _, taken = other.tables()
+    expected = np.empty(len(own.scene.turns))
+    mixture_score(table, taken, *own._tables.mixtures(), expected)
+    found = own.heading_scores(own.scene, asked)
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(found, expected / 0.3, atol=1e-6)
+
+
+def test_landing_zones_are_those_of_every_place_on_the_circle(few, tank):
+    """Places that are passed over, being as far from a border as they are, land alike."""
+    _, scene = few
+    turns, made = scene.turns, tank_of(tank)
+    own = scene.states[turns.at, :, turns.who]
+    cells, n_zones = turns.share.shape[1:]
+    per = int(turns.share.sum(axis=2).max())
+    for s in range(0, len(turns), 3):
+        reach, share = turns.speed_m_s[s] * scene.dt_s, np.zeros((cells, n_zones))
+        for p in range(cells * per):
+            theta = 2 * math.pi * ((p + 0.5) / (cells * per) - 0.5 / cells)
+            x, y = own[s, 0] + reach * math.cos(theta), own[s, 1] + reach * math.sin(theta)
+            zone = zone_of(x, y, made)
+            share[p // per, zone - 1] += zone > 0
+        np.testing.assert_array_equal(turns.share[s], share)
