@@ -46,6 +46,10 @@ class Watching:
         return self
 
     def __exit__(self, *_):
+        self.kill()
+
+    def kill(self):
+        """Kill it, as kill -9 does, if it still runs."""
         self.process.kill()
         self.process.wait()
         for thread in self._threads:
@@ -62,7 +66,7 @@ class Watching:
         for line in self.process.stderr:
             self.said += line
 
-    def until(self, event, timeout_s=60, **values):
+    def until(self, event, timeout_s=150, **values):
         """Return the next event of a kind with these values; fail when it does not come."""
         ends_s = time.monotonic() + timeout_s
         while True:
@@ -76,17 +80,24 @@ class Watching:
                 return found
 
     def process_of(self, stage):
-        """Return the id of the process in which a stage runs now."""
-        return [
+        """Return the id of the process in which a stage runs, as far as was told by now."""
+        self._take_all()
+        found = [
             e["process"] for e in self.events if (e["event"], e.get("stage")) == ("started", stage)
-        ][-1]
+        ]
+        return found[-1] if found else None
 
-    def end(self, number=signal.SIGTERM, timeout_s=30):
+    def _take_all(self):
+        while not self._lines.empty():
+            if (found := self._lines.get()) is not None:
+                self.events.append(found)
+
+    def end(self, number=signal.SIGTERM, timeout_s=60):
         """Send a signal, and return the exit code."""
         self.process.send_signal(number)
         return self.wait(timeout_s)
 
-    def wait(self, timeout_s=60):
+    def wait(self, timeout_s=150):
         """Return the exit code, with all events read."""
         code = self.process.wait(timeout_s)
         for thread in self._threads:

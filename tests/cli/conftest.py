@@ -1,5 +1,6 @@
 """Commands, in this process and as processes of their own."""
 
+import contextlib
 import importlib.util
 import os
 import subprocess
@@ -70,10 +71,20 @@ def process(tmp_path):
 
 
 @pytest.fixture
-def tracks_csv(tmp_path):
-    """Write the tracks of 3 fish and a robot that wander in a square metre, 5 Hz, as CSV."""
+def tracks_csv(tmp_path, write_tracks):
+    """Return what writes such tracks into the folder of the test."""
 
     def write(name="tracks.csv", *, seconds=200, seed=1):
+        return write_tracks(tmp_path / name, seconds=seconds, seed=seed)
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def write_tracks():
+    """Write the tracks of 3 fish and a robot that wander in a square metre, 5 Hz, as CSV."""
+
+    def write(path, *, seconds=200, seed=1):
         rng = np.random.default_rng(seed)
         n = round(seconds * 5)
         steps = rng.normal(0, 0.02, size=(n, 4, 2)).cumsum(axis=0)
@@ -85,7 +96,6 @@ def tracks_csv(tmp_path):
                 kind = "robot" if agent == 3 else "fish"
                 x, y = xy_m[frame, agent]
                 lines.append(f"{frame / 5:.1f},{agent},{kind},{x:.4f},{y:.4f}")
-        path = tmp_path / name
         path.write_text("\n".join(lines) + "\n")
         return path
 
@@ -110,6 +120,10 @@ class WatchTools:
         self._module = module
         self.quick = module.QUICK
         self.contents = module.contents
+
+    def no_error(self):
+        """Return a block in which a process that is gone, or a full disk, is no error."""
+        return contextlib.suppress(OSError, TypeError)
 
     def start(self, *words, **options):
         """Start ``zfcal watch --json``; leaving its block kills it."""

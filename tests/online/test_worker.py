@@ -1,0 +1,111 @@
+"""A stage in a process of its own: orders, events, errors, death."""
+
+import importlib
+import os
+import signal
+import time
+
+import pytest
+
+from zfcal.online.events import Note
+from zfcal.online.worker import Done, Failure, Worker
+
+JOB = """
+import logging, os, time
+from zfcal.errors import InputError, LockedError
+from zfcal.online.events import Note
+
+def job(order, tell):
+    if order == "error":
+        raise InputError("It is wrong.", hint="Mend it.")
+    if order == "locked":
+        raise LockedError("It is locked.")
+    if order == "log":
+        logging.getLogger("zfcal.model").info("It compiles.")
+    if order == "sleep":
+        time.sleep(60)
+    if order == "nice":
+        return os.nice(0)
+    if order == "bug":
+        raise ZeroDivisionError
+    tell(Note(text=f"hears {order}"))
+    return order
+"""
+"""Does as it is told; in a module that another process finds by its name."""
+
+
+@pytest.fixture
+def worker(tmp_path, monkeypatch):
+    """Return a worker that is ended after the test."""
+    (tmp_path / "told_job.py").write_text(JOB)
+    monkeypatch.syspath_prepend(tmp_path)
+    made = Worker("test", importlib.import_module("told_job").job, niceness=3)
+    yield made
+    made.stop()
+
+
+def answer(worker, order):
+    """Give an order and return all that comes until the answer."""
+    worker.order(order)
+    assert worker.is_busy
+    told, ends_s = [], time.monotonic() + 20
+    while worker.is_busy:
+        assert time.monotonic() < ends_s
+        told += worker.take()
+        time.sleep(0.01)
+    return told
+
+
+def test_orders_are_carried_out_one_after_the_other(worker):
+    """What a job tells comes before its answer; what the library logs comes as notes."""
+    assert answer(worker, 1) == [Note(text="hears 1"), Done(result=1)]
+    assert answer(worker, "log")[0] == Note(text="It compiles.")
+    assert worker.take() == []
+
+
+def test_errors_come_with_hint_and_code_and_the_process_lives_on(worker):
+    """A person can mend them; the next order is carried out."""
+    process = worker.process
+    (wrong,) = answer(worker, "error")
+    assert wrong == Failure(message="It is wrong.", hint="Mend it.", exit_code=1)
+    assert answer(worker, "locked")[0].exit_code == 75
+    assert answer(worker, 2)[-1] == Done(result=2)
+    assert worker.process == process
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_process_that_dies_is_a_failure_without_a_code(worker, number):
+    """Also when it has nothing to do; orders to it fall on deaf ears."""
+    answer(worker, 1)
+    worker.order("sleep")
+    os.kill(worker.process, number)
+    ends_s = time.monotonic() + 20
+    while worker.is_busy:
+        assert time.monotonic() < ends_s
+        told = worker.take()
+        time.sleep(0.01)
+    assert told[-1].exit_code is None
+    assert "process of test ended" in told[-1].message
+    worker.order("more")
+    assert worker.take()[-1].exit_code is None
+
+
+def test_a_bug_ends_the_process_and_is_a_failure(worker):
+    """Its traceback goes to standard error; the watch starts the stage anew."""
+    assert answer(worker, "bug")[-1].exit_code is None
+
+
+def test_its_priority_is_lowered(worker):
+    """By as much as it was asked for, as far as the system has lower ones."""
+    assert answer(worker, "nice")[-1] == Done(result=min(os.nice(0) + 3, 19))
+
+
+def test_it_is_stopped_in_the_middle_of_its_work(worker):
+    """At once, and again without harm."""
+    answer(worker, 1)
+    worker.order("sleep")
+    began_s = time.monotonic()
+    worker.stop()
+    assert time.monotonic() - began_s < 5
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker.process, 0)
