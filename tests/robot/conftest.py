@@ -16,11 +16,6 @@ class MemoryLine:
         self.sent = []
         self.incoming = b""
 
-    @property
-    def n_sent(self):
-        """Bytes sent."""
-        return sum(map(len, self.sent))
-
     def write(self, data):
         """Keep bytes, unless the line has gone."""
         if self.is_open:

@@ -67,7 +67,7 @@ def test_a_robot_in_steps_moves_when_it_is_told(start_virtual, until):
         assert bot.send(frame)
         twin.receive(frame.encode())
         twin.advance(k / 10)
-        at = robot.control.ask("advance", to_s=k / 10, received=bot.line.n_sent)
+        at = robot.control.ask("advance", to_s=k / 10, received=bot.n_sent)
         assert (at["time_s"], at["x_m"], at["y_m"]) == (twin.time_s, twin.pose.x_m, twin.pose.y_m)
     bot.close()
 

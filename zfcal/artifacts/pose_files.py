@@ -199,10 +199,19 @@ class PoseFollower:
             # Looked for before reading: what is added meanwhile is not passed over.
             later = self._later()
             if self._tail is not None:
-                found += [_from_json(self._tail.path, data) for _, data in self._tail.poll()]
+                found += self._added(self._tail, later)
             if later is None:
                 return found
             self._tail = Tail(later, "/agents")
+
+    def _added(self, tail: Tail, later: Path | None) -> list[FramePoses]:
+        try:
+            return [_from_json(tail.path, data) for _, data in tail.poll()]
+        except DamagedError:
+            if later is not None:
+                # The next question goes on with the next file.
+                self._tail = Tail(later, "/agents")
+            raise
 
     def _later(self) -> Path | None:
         """Return the file after the one that is read; None if there is none."""

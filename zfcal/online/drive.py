@@ -28,6 +28,7 @@ from zfcal.online.pilot import Manner
 from zfcal.robot.fishbot import FishBot, Watchdog
 from zfcal.robot.port import SerialLine
 from zfcal.robot.virtual_process import VirtualProcess
+from zfcal.units import SEGMENT_S
 
 VIRTUAL = "virtual"
 """The port behind which a virtual robot is started."""
@@ -41,6 +42,9 @@ _OPENING_S = 3.0
 _ANSWER_S = 2.0
 _END_S = 2.0
 """On the poses' clock: when so long after the last file's end none follows, that was it."""
+
+_CUT_S = 60.0
+"""The same for a last file that was cut short, or whose writer is busy compiling."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,7 +152,7 @@ def _drive(
     )
     driver = Driver(opened, options.manner, crew)
     driver.warm_up()
-    _hurry(options, tell)
+    _hurry(options, tell, stack)
     follower = PoseFollower(opened.trial.root, newest=is_live)
     # The robot's own end comes first on the way out: whatever fails later, it stands.
     stack.callback(lambda: _conclude(driver, log, tell))
@@ -181,12 +185,17 @@ def _robot(
     return robot, virtual
 
 
-def _hurry(options: DriveOptions, tell: Tell) -> None:
+def _hurry(options: DriveOptions, tell: Tell, stack: contextlib.ExitStack) -> None:
     """Ask for a high priority, and keep the collector of garbage away from what is there."""
+    if options.clock != "wall":
+        return
     gc.collect()
     gc.freeze()
+    stack.callback(gc.unfreeze)
     try:
+        before = os.getpriority(os.PRIO_PROCESS, 0)
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+        stack.callback(os.setpriority, os.PRIO_PROCESS, 0, before)
     except OSError as error:
         if options.verbose:
             tell(Note(text=f"No higher priority: {error.strerror}; other work may delay ticks."))
@@ -239,6 +248,8 @@ class _Loop:
         for batch in self._batches():
             self._driver.listen()
             self._greet()
+            if batch and self._first_s is None:
+                self._check_logs(batch[-1].time_s)
             # On the poses' clock each frame has its own ticks; a live one has the newest frame's.
             for frames in [batch] if self._crew.clock.is_live else [[f] for f in batch]:
                 self._driver.take(frames, age_s=self._age_s() if frames else None)
@@ -294,7 +305,7 @@ class _Loop:
     def _step_virtual(self) -> None:
         if self._virtual is not None and not self._crew.clock.is_live:
             to_s = self._crew.clock.now_s()
-            self._virtual.control.ask("advance", to_s=to_s, received=self._crew.robot.line.n_sent)
+            self._virtual.control.ask("advance", to_s=to_s, received=self._crew.robot.n_sent)
 
     def _is_over(self, time_s: float) -> bool:
         duration_s = self._options.duration_s
@@ -308,11 +319,23 @@ class _Loop:
         self._last_s = done_s
         return done_s >= duration_s - 1e-6
 
+    def _check_logs(self, now_s: float) -> None:
+        """Refuse to write before what an earlier drive has written."""
+        later = [s for s in drive_files(self._opened.trial.root) if s > now_s + SEGMENT_S]
+        if later:
+            raise InputError(
+                f"{self._opened.trial.path('drive', max(later), '.mcap')}: an earlier drive got "
+                f"to {max(later)} s, the poses are at {now_s:.0f} s.",
+                hint="Remove what it left with --force, or drive another trial.",
+            )
+
     def _is_finished(self) -> bool:
         if self._crew.clock.is_live:
             return False
         quiet_s = time.monotonic() - self._quiet_since_s
-        return self._follower.is_closed and quiet_s > _END_S
+        if self._follower.is_closed:
+            return quiet_s > _END_S
+        return quiet_s > _CUT_S
 
     def _greet(self) -> None:
         """Say once if nobody answers by the robot's name."""

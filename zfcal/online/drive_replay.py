@@ -42,7 +42,6 @@ class _NoLine:
 
     is_open = False
     n_opened = 0
-    n_sent = 0
 
     def write(self, data: bytes) -> bool:  # noqa: ARG002 - a line's signature
         """Send nothing."""

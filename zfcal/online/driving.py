@@ -95,15 +95,17 @@ class Driver:
         Parameters
         ----------
         frames
-            None is left out: each step that falls on one is done.
+            All of them: each step of the model that falls on one is done.
         age_s
             Seconds since the last one was written, where that is known.
         """
+        # What was written before the driver came is history: it is seen, and not driven by.
+        fresh = self._begun or not self._crew.clock.is_live or (age_s or 1.0) <= PATIENCE_S
+        if frames and not self._begun:
+            self._begin(frames[0].time_s, now_s=frames[-1].time_s)
         for poses in frames:
             self._crew.clock.take_frame(poses.time_s)
-            if not self._begun:
-                self._begin(poses.time_s)
-            self._take(poses)
+            self._take(poses, fresh=fresh)
         if frames and age_s is not None:
             self._crew.log.measure(POSE_TO_STATE, age_s)
 
@@ -126,21 +128,21 @@ class Driver:
             if said.what == "described" and said.robot == self._letter:
                 self.is_answered = True
 
-    def _begin(self, time_s: float) -> None:
+    def _begin(self, time_s: float, *, now_s: float) -> None:
         self._begun = True
+        if self._crew.clock.is_live:
+            self._crew.clock.take_frame(now_s)
         self._log_model(time_s, self._model, begins=True)
 
-    def _take(self, poses: FramePoses) -> None:
+    def _take(self, poses: FramePoses, *, fresh: bool) -> None:
         if self.pilot.is_due(poses.frame):
             self._look_for_model(poses.time_s)
         before = self.pilot.pose
         target = self.pilot.see(poses, self._model)
         pose = self.pilot.pose
         seen = pose is not None and pose is not before
-        if seen:
-            self._seen_s = self._time_s()
-            if self._crew.watchdog is not None:
-                self._crew.watchdog.fresh()
+        if seen and fresh:
+            self._freshen()
         place: dict[str, float | None] = {"x_m": None, "y_m": None, "heading_rad": None}
         if seen and pose is not None:
             place = {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad}
@@ -148,6 +150,16 @@ class Driver:
         item = {"what": "pose", "time_s": poses.time_s, "frame": poses.frame, "agents": agents}
         self._crew.log.add(item | place)
         self._note(target)
+
+    def _freshen(self) -> None:
+        """Take what is known of the robot as known now."""
+        watchdog = self._crew.watchdog
+        if watchdog is not None:
+            if math.isinf(self._seen_s):
+                # Before the first pose it held the robot, as it should.
+                self._n_bites = watchdog.n_bites
+            watchdog.fresh()
+        self._seen_s = self._time_s()
 
     def _note(self, target: Target | None) -> None:
         if target is not None:
@@ -162,7 +174,7 @@ class Driver:
             self._crew.log.measure(TICK_TO_BYTE, time.perf_counter() - due_s)
         self.n_commands += 1
         self._tell_changes(time_s, held)
-        told = {"sent": sent, "n_sent": self._crew.robot.line.n_sent}
+        told = {"sent": sent, "n_sent": self._crew.robot.n_sent}
         self._crew.log.add(command_item(command, self._letter) | told)
 
     def _reason(self) -> str:

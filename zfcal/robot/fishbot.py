@@ -41,6 +41,8 @@ class FishBot:
     ----------
     is_held
         Whether the robot was stopped by its watchdog, and is to stay so.
+    n_sent
+        Events that went over the line, without those of the watchdog.
     """
 
     def __init__(self, letter: str, line: Line) -> None:
@@ -48,6 +50,7 @@ class FishBot:
         self.letter = letter
         self.line = line
         self.is_held = False
+        self.n_sent = 0
         self._lock = threading.Lock()
         self._decoder = Decoder()
         self._rest = [0.0, 0.0]
@@ -82,7 +85,9 @@ class FishBot:
         with self._lock:
             if self.is_held and frame.type != events.STOP:
                 return False
-            return self.line.write(frame.encode())
+            went = self.line.write(frame.encode())
+            self.n_sent += went
+            return went
 
     def hold(self) -> bool:
         """Stop, and send no wheel speeds from now on; return whether it was heard."""

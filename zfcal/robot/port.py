@@ -37,10 +37,6 @@ class Line(Protocol):
     def n_opened(self) -> int:
         """How often the line was opened: after each time everything is to be said anew."""
 
-    @property
-    def n_sent(self) -> int:
-        """Bytes sent since the line was opened last."""
-
     def write(self, data: bytes) -> bool:
         """Send bytes; return whether they went."""
 
@@ -67,7 +63,6 @@ class SerialLine:
     def __init__(self, port: str) -> None:
         self.port = port
         self.n_opened = 0
-        self.n_sent = 0
         self.problem = ""
         self._lock = threading.Lock()
         self._serial: serial.Serial | None = None
@@ -95,7 +90,7 @@ class SerialLine:
     def write(self, data: bytes) -> bool:
         """Send bytes; return whether they went."""
         with self._lock:
-            return self._attempt(lambda port: port.write(data)) == len(data) and self._count(data)
+            return self._attempt(lambda port: port.write(data)) == len(data)
 
     def read(self) -> bytes:
         """Return what has come, maybe nothing."""
@@ -108,10 +103,6 @@ class SerialLine:
         self._lost.set()
         with self._lock:
             self._leave()
-
-    def _count(self, data: bytes) -> bool:
-        self.n_sent += len(data)
-        return True
 
     def _attempt(self, use: Callable[[serial.Serial], T]) -> T | None:
         if self._serial is None:
@@ -161,7 +152,6 @@ class SerialLine:
                 opened.close()
                 return False
             self._guardian = _guardian_of(opened.fileno())
-            self.n_sent = 0
             self._serial = opened
             self.n_opened += 1
         return True

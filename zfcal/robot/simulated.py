@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 
 from zfcal.robot import events
-from zfcal.robot.aseba import Decoder, Frame
+from zfcal.robot.aseba import SYSTEM, Decoder, Frame
 from zfcal.robot.body import (
     ACCELERATION_M_S2,
     TICK_M,
@@ -78,7 +78,7 @@ class SimulatedFishBot:
     way_m
         How far its wheels have gone.
     n_received
-        Bytes that have come over the line.
+        Events that have come over the line; the network's own messages do not count.
     """
 
     def __init__(
@@ -114,9 +114,10 @@ class SimulatedFishBot:
 
     def receive(self, data: bytes) -> list[Frame]:
         """Take bytes from the line, now; return the frames that they complete."""
-        self.n_received += len(data)
         frames = self._decoder.feed(data)
         for frame in frames:
+            if frame.type < SYSTEM:
+                self.n_received += 1
             self._answer(frame)
             self._due.append((self.time_s + self.traits.lag_s, frame))
         return frames

@@ -27,7 +27,7 @@ from zfcal.robot.confines import Confines
 from zfcal.robot.simulated import STEP_S, SimulatedFishBot, Traits
 
 _PATIENCE_S = 5.0
-"""How long an advance waits for the bytes that are to come before it."""
+"""How long an advance waits for the events that are to come before it."""
 
 _HEARD = 100_000
 """Frames that are remembered."""
@@ -229,12 +229,12 @@ class VirtualRobot:
         }
 
     def _await(self, received: int) -> None:
-        """Read until so many bytes have come: a terminal passes them on in its own time."""
+        """Read until so many events have come: a terminal passes them on in its own time."""
         end_s = time.monotonic() + _PATIENCE_S
         while self._robot.n_received < received:
             self._hear_line()
             if time.monotonic() > end_s:
-                message = f"only {self._robot.n_received} of {received} bytes have come"
+                message = f"only {self._robot.n_received} of {received} events have come"
                 raise ValueError(message)
             time.sleep(0.0002)
 

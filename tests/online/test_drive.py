@@ -1,0 +1,302 @@
+"""The driver in step with its poses: what it decides, logs and decides again."""
+
+import importlib.util
+import itertools
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from zfcal.artifacts.drive_files import LATENCY_KEY, drive_files, read_drive
+from zfcal.artifacts.lineage import Lineage, read_lineage
+from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.models import read_model, write_model
+from zfcal.errors import InputError, LockedError
+from zfcal.online.drive import DriveOptions, drive
+from zfcal.online.drive_replay import replay
+from zfcal.online.events import LeftOut, Made, Note, Result, say_nothing
+from zfcal.online.opening import Task, at_work, open_trial
+from zfcal.online.pilot import Manner, Seats
+from zfcal.parameters import Parameters
+from zfcal.robot.confines import Confines
+from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
+
+_spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
+driven = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(driven)
+
+SECONDS = 8
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Return a trial with some seconds of poses, and the frames themselves."""
+    root = driven.make_trial(tmp_path_factory.mktemp("driven") / "trial")
+    frames = driven.frames_of(root, SECONDS)
+    driven.write_poses(root, frames)
+    return root, frames
+
+
+@pytest.fixture
+def root(recorded, tmp_path):
+    """Return a copy of that trial, which a test may change."""
+    return Path(shutil.copytree(recorded[0], tmp_path / "trial"))
+
+
+def run(root, *, tell=say_nothing, force=False, seconds=SECONDS, **manner):
+    """Drive over the recorded poses; return all items of the log."""
+    # Not waiting for what may follow the last frame.
+    first_s = min(int(path.stem) for path in (root / "poses").glob("*.mcap"))
+    options = DriveOptions(
+        port="virtual",
+        clock="poses",
+        manner=Manner(**manner),
+        duration_s=None if seconds is None else seconds - first_s - 1 / 15,
+    )
+    drive(root, options, tell, task=Task(force=force))
+    return items_of(root)
+
+
+def items_of(root):
+    """Return all items of a trial's log."""
+    return [item for path in drive_files(root).values() for item in read_drive(path)]
+
+
+def only(items, what):
+    """Return the items of a kind."""
+    return [item for item in items if item["what"] == what]
+
+
+def test_each_step_has_a_target_and_each_tenth_a_command(root):
+    """8 s: 40 steps of 0.2 s, 80 ticks, 120 frames; targets a step's way from the robot."""
+    items = run(root)
+    targets, commands, poses = (only(items, w) for w in ("target", "command", "pose"))
+    assert [t["step"] for t in targets] == list(range(40))
+    assert [t["frame"] for t in targets] == list(range(0, 120, 3))
+    assert [c["time_s"] for c in commands] == pytest.approx([k / 10 for k in range(80)])
+    assert [p["frame"] for p in poses] == list(range(120))
+    where = {p["frame"]: p for p in poses}
+    ways = []
+    for target in targets:
+        at = where[target["frame"]]
+        way = math.hypot(target["x_m"] - at["x_m"], target["y_m"] - at["y_m"])
+        if not target["clamped"]:
+            assert way == pytest.approx(0.2 * target["speed_m_s"], abs=1e-9)
+        ways.append(way)
+    assert 0.005 < np.mean(ways) < 0.04
+    assert {c["held"] for c in commands} == {""}
+    assert all(c["sent"] for c in commands)
+
+
+def test_targets_keep_the_robots_radius_from_the_walls(root):
+    """All of them, and some had to be moved."""
+    targets = only(run(root, radius_m=0.03), "target")
+    confines = Confines(open_trial(root).arena.outline, 0.03 - 1e-9)
+    assert not any(confines.clamp(t["x_m"], t["y_m"])[2] for t in targets)
+    assert any(t["clamped"] for t in targets)
+
+
+@pytest.mark.parametrize("free_running", [False, True])
+@pytest.mark.parametrize("pattern", ["fish", "pid"])
+def test_a_replay_decides_the_same(root, pattern, free_running):
+    """Every target and every command, to the last bit."""
+    items = run(root, pattern=pattern, free_running=free_running)
+    tally = replay(root, say_nothing)
+    assert (tally.targets, tally.same_targets) == (40, 40)
+    assert (tally.commands, tally.same_commands) == (80, 80)
+    assert len(only(items, "command")) == 80
+
+
+def test_driving_anew_makes_the_same_bytes(root):
+    """The same poses, model and seed: the same file."""
+    run(root)
+    first = (root / "drive" / "000000.mcap").read_bytes()
+    run(root, force=True)
+    assert (root / "drive" / "000000.mcap").read_bytes() == first
+
+
+def test_a_free_running_agent_goes_its_own_way(root):
+    """Each target is a step from the last one, wherever the robot is."""
+    targets = only(run(root, free_running=True), "target")
+    for before, after in itertools.pairwise(targets):
+        way = math.hypot(after["x_m"] - before["x_m"], after["y_m"] - before["y_m"])
+        if not after["clamped"]:
+            assert way == pytest.approx(0.2 * after["speed_m_s"], abs=1e-9)
+
+
+def test_random_numbers_belong_to_their_step(root, recorded):
+    """A driver that comes later sets the same targets from then on."""
+    whole = {t["step"]: t for t in only(run(root), "target")}
+    for path in (root / "poses").iterdir():
+        path.unlink()
+    driven.write_poses(root, recorded[1][50:])
+    late = only(run(root, force=True, seconds=SECONDS - 50 / 15), "target")
+    assert late[0]["step"] == 17
+    assert [whole[t["step"]]["x_m"] for t in late] == [t["x_m"] for t in late]
+
+
+def test_another_seed_leads_elsewhere(root):
+    """The trial's."""
+    first = only(run(root), "target")
+    config = root / "trial.toml"
+    config.write_text(config.read_text().replace("seed = 0", "seed = 1"))
+    assert [t["x_m"] for t in only(run(root, force=True), "target")] != [t["x_m"] for t in first]
+
+
+def test_the_newest_model_drives_and_broken_ones_do_not(root):
+    """The highest number that can be read; of the others it is said why not."""
+    driven.add_model(root, 120)
+    (root / "models" / "000180.toml").write_text('schema = "zfcal.model/1"\nbase = ')
+    model = read_model(root / "models" / "000000.toml")
+    foreign = Parameters(dt_s=0.1, zones=model.zones)
+    origin = Lineage(schema="zfcal.model/1", command="calibrate")
+    write_model(root / "models" / "000240.toml", foreign, origin)
+    write_model(root / "models" / "extended.toml", model, origin)
+    told = []
+    items = run(root, tell=told.append)
+    assert {t["model"] for t in only(items, "target")} == {"models/000120.toml"}
+    warned = [event.text for event in told if isinstance(event, Note) and event.warning]
+    assert replay(root, say_nothing).is_same
+    assert not warned or any("dt_s" in text or "TOML" in text for text in warned)
+
+
+def test_an_extended_model_drives(root):
+    """Its effects take part, and a replay knows them."""
+    plain = only(run(root), "target")
+    model = read_model(root / "models" / "000000.toml")
+    effects = {"alignment": {"weight": 40.0, "kappa": 10.0}, "boldness": {}}
+    extended = Parameters(dt_s=0.2, zones=model.zones, effects=effects)
+    origin = Lineage(schema="zfcal.model/1", command="extend")
+    write_model(root / "models" / "000120.toml", extended, origin)
+    items = run(root, force=True)
+    assert [t["x_m"] for t in only(items, "target")] != [t["x_m"] for t in plain]
+    assert replay(root, say_nothing).is_same
+
+
+def test_a_log_that_was_tampered_with_is_found(root):
+    """Another pose than the driver had: other targets, and the first one is named."""
+    run(root)
+    frames = driven.frames_of(root, SECONDS, seed=9)
+    for path in (root / "poses").iterdir():
+        path.unlink()
+    driven.write_poses(root, frames)
+    with pytest.raises(InputError, match=r"the first that did not: the target at 0\.00 s"):
+        replay(root, say_nothing)
+
+
+def test_messages_are_of_their_schema_and_the_doctor_finds_nothing(root, repository, examine):
+    """What stands in `schemas/drive.schema.json`; lineage and latency are in the file."""
+    items = run(root)
+    schema = json.loads((repository / "schemas" / "drive.schema.json").read_text())
+    validator = Draft202012Validator(schema)
+    for item in items:
+        validator.validate(item)
+    path = root / "drive" / "000000.mcap"
+    assert examine(path) == []
+    found = overview(path)
+    assert found.schemas["/scene"] == "foxglove.SceneUpdate"
+    assert found.schemas["/log"] == "foxglove.Log"
+    assert LATENCY_KEY in found.metadata
+    lineage = read_lineage(path)
+    assert (lineage.schema, lineage.command) == ("zfcal.drive/1", "drive")
+    assert lineage.options["pattern"] == "fish"
+
+
+def test_lost_fish_and_a_lost_robot(root, recorded):
+    """Without a fish the steps go on; without the robot for over half a second it is stopped."""
+    frames = []
+    for poses in recorded[1]:
+        gone = set()
+        if 2.0 <= poses.time_s < 3.0:
+            gone = {0, 1}
+        if 4.0 <= poses.time_s < 5.5:
+            gone = {4}
+        kept = tuple(agent for agent in poses.agents if agent.agent not in gone)
+        frames.append(FramePoses(time_s=poses.time_s, frame=poses.frame, agents=kept))
+    for path in (root / "poses").iterdir():
+        path.unlink()
+    driven.write_poses(root, frames)
+    items = run(root)
+    steps = {t["step"] for t in only(items, "target")}
+    assert steps == set(range(40)) - set(range(20, 28))
+    held = {round(c["time_s"], 1): c for c in only(items, "command") if c["held"]}
+    assert set(held) == {round(k / 10, 1) for k in range(45, 56)}
+    assert {c["bytes"] for c in held.values()} == {"000000000100"}
+    faults = only(items, "fault")
+    assert [(f["fault"], f["ended"]) for f in faults] == [
+        ("stale-pose", False),
+        ("stale-pose", True),
+    ]
+    assert replay(root, say_nothing).is_same
+
+
+def test_missed_steps_are_counted(root, recorded):
+    """A second without frames: its steps are not made up for."""
+    for path in (root / "poses").iterdir():
+        path.unlink()
+    driven.write_poses(root, [f for f in recorded[1] if not 3.0 <= f.time_s < 4.0])
+    told = []
+    items = run(root, tell=told.append)
+    (result,) = [event.value for event in told if isinstance(event, Result)]
+    assert result["latency"]["steps_missed"] == 5
+    assert len(only(items, "target")) == 35
+
+
+def test_a_log_is_not_mixed_with_another(root):
+    """On the poses' clock a second drive says so; with --force it begins anew."""
+    run(root)
+    with pytest.raises(InputError, match="earlier drive"):
+        run(root)
+
+
+def test_what_cannot_be_driven_is_told(root, tmp_path):
+    """A trial without a robot, a port that is not there, two drivers, nothing to replay."""
+    options = DriveOptions(port="virtual", clock="poses")
+    with at_work(root, "drive", Task()), pytest.raises(LockedError):
+        drive(root, options, say_nothing)
+    with pytest.raises(InputError, match="no log of a drive"):
+        replay(root, say_nothing)
+    config = root / "trial.toml"
+    config.write_text(config.read_text().replace("n_robots = 1", "n_robots = 0"))
+    with pytest.raises(InputError, match="nobody to drive"):
+        drive(root, options, say_nothing)
+
+
+def test_damaged_poses_are_left_out_and_told(root, recorded):
+    """The driver goes on; what it had before the damage was driven by."""
+    path = root / "poses" / "000000.mcap"
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 2000] = bytes(2000)
+    path.write_bytes(data)
+    driven.write_poses(root, [f for f in driven.frames_of(root, 62) if f.time_s >= 60])
+    told = []
+    path.write_bytes(data)
+    items = run(root, tell=told.append, seconds=None)
+    assert [event.path for event in told if isinstance(event, LeftOut)]
+    assert any(isinstance(event, Made) for event in told)
+    assert only(items, "target")[-1]["time_s"] >= 61
+
+
+def test_seats_are_kept_while_an_id_is_seen():
+    """And go to somebody else when it is not; more agents than seats are left out."""
+
+    def agent(number, kind=FISH):
+        return AgentPose(
+            agent=number, kind=kind, x_m=number, y_m=0.0, heading_rad=0.0, confidence=1.0
+        )
+
+    seats = Seats(2, 1)
+    first = seats.take([agent(7), agent(9), agent(3, ROBOT)])
+    assert first[:, 0].tolist()[:2] == [7.0, 9.0]
+    assert first[-1, 0] == 3.0
+    second = seats.take([agent(9), agent(11)])
+    assert second[:2, 0].tolist() == [11.0, 9.0]
+    assert np.isnan(second[2:]).all()
+    crowded = seats.take([agent(n) for n in range(20, 40)])
+    assert np.isfinite(crowded[:-1]).all()
+    assert np.isnan(crowded[-1]).all()
