@@ -17,14 +17,12 @@ from zfcal.model.extended import (
 )
 from zfcal.model.geometry import zone_of
 from zfcal.model.kernels.extended import mixture_score
-from zfcal.model.kernels.world import TRAIT
+from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
 from zfcal.model.simulate import tank_of
 
 SMOOTH = [e for e in (*all_effects(), *generic_effects()) if e.harmonics is not None]
-
-A_PLACE = {"x_m": 0.22, "y_m": 0.77}
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +37,9 @@ def few(screen):
 def packed_with(own, effect, arena):
     """Return a model with an effect, each of its parameters well away from zero."""
     middling = {p.name: p.default or min(0.7, p.high) for p in effect.parameters}
-    middling |= {name: at for name, at in A_PLACE.items() if name in middling}
+    here = own.scene.states[own.scene.turns.at[0], :, own.scene.turns.who[0]]
+    place = {"x_m": here[X] + 0.05, "y_m": here[Y]}
+    middling |= {name: at for name, at in place.items() if name in middling}
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return model, pack([model], arena)
 
