@@ -52,7 +52,10 @@ def test_new_segments_are_analysed_and_calibrated_until_the_recording_ends(watch
 
 
 def test_once_makes_what_offline_commands_make_and_leaves(process, trial, watching):
-    """The same bytes; run again, it does nothing and lists the same paths."""
+    """The same bytes; run again, it does nothing and lists the same paths.
+
+    Paths go to standard output, talk to standard error.
+    """
     other = shutil.copytree(trial, trial.parent / "other")
     first = process("watch", "trial", "--once", *watching.quick)
     assert first.code == 0, first.err
@@ -61,6 +64,10 @@ def test_once_makes_what_offline_commands_make_and_leaves(process, trial, watchi
     process("calibrate", "other", *watching.quick)
     assert watching.contents(trial) == watching.contents(other)
     assert len(first.lines) == 10
+    assert first.lines[0] == "trial/stats/000120.parquet"
+    assert "watch: analyse, calibrate of trial." in first.err
+    assert "calibrate: window to 120 s in" in first.err
+    assert "\x1b" not in first.err
     assert sorted(again.lines) == sorted(first.lines)
     assert "nothing to do, 10 up to date" in again.err
     assert "arrived" in again.err
@@ -79,15 +86,15 @@ def test_a_second_watch_ends_with_75(process, watching, live):
         assert watch.end() == 143
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signals_end_it_with_nothing_half_done(process, trial, watching, number, code):
+def test_signals_end_it_with_nothing_half_done(process, trial, watching):
     """In the middle of a round; run again, it goes on and ends in the same bytes."""
     slow = ["--generations", "30", *watching.quick[2:]]
     other = shutil.copytree(trial, trial.parent / "other")
-    with watching.start(trial, "--once", *slow) as watch:
-        watch.until("takes", window_end_s=120)
-        assert watch.end(number) == code
-    assert not list(trial.rglob(".*part-*"))
+    for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        with watching.start(trial, "--once", *slow) as watch:
+            watch.until("takes", window_end_s=120)
+            assert watch.end(number) == code
+        assert not list(trial.rglob(".*part-*"))
     for root in (trial, other):
         assert process("watch", root, "--once", *slow).code == 0
     assert watching.contents(trial) == watching.contents(other)
@@ -150,15 +157,6 @@ def test_what_fails_is_said_and_tried_again(watching, live):
         (root / "trial.toml").write_text(right)
         assert watch.wait() == 0
     assert (root / "models" / "000180.toml").exists()
-
-
-def test_lines_for_people(process, trial, watching):
-    """Paths on standard output, talk on standard error, with the time behind the tracks."""
-    done = process("watch", "trial", "--once", *watching.quick)
-    assert done.lines[0] == "trial/stats/000120.parquet"
-    assert "watch: analyse, calibrate of trial." in done.err
-    assert "calibrate: window to 120 s in" in done.err
-    assert "\x1b" not in done.err
 
 
 @pytest.mark.parametrize(
