@@ -146,3 +146,26 @@ def test_corners_are_eight_numbers(zfcal, tank, film, corners):
 def test_the_methods_are_those_of_the_tracker():
     """The command line knows them without loading it."""
     assert tracking.METHODS == METHODS
+
+
+def test_a_watch_tracks_analyses_and_calibrates_to_the_end(zfcal, tank, film, watching):
+    """It ends with the recording, in the files of one command after the other."""
+    source = words(film)[2:]
+    done = zfcal("watch", "trial", *source, *watching.quick)
+    assert done.code == 0, done.err
+    assert "watch: track, analyse, calibrate of trial." in done.err
+    assert "watch: ends, the recording has ended." in done.err
+    watched = watching.contents(tank)
+    assert "models/000120.toml" in watched
+    tank.rename(tank.with_name("watched"))
+    zfcal("init", "trial", "--side-m", 0.4, "--fish", 3, "--fps", 5, "-q")
+    for line in (words(film), ["analyse", "trial"], ["calibrate", "trial", *watching.quick]):
+        assert zfcal(*line, "-q").code == 0
+    assert watching.contents(tank) == watched
+
+
+def test_a_watch_without_a_camera_says_so_and_ends(zfcal, tank):
+    """A slip of the pen is not waited for."""
+    done = zfcal("watch", "trial", "--overhead", "no-such.avi", "--corners", CORNERS)
+    assert done.code == 1
+    assert "no-such.avi" in done.err

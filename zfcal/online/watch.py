@@ -334,7 +334,7 @@ class Watch:
             stage.worker = Worker(stage.name, stage.job, niceness=NICENESS[stage.name])
             self._log("started", stage.name, process=stage.worker.process)
         elif self._options.once or (
-            stage.name == TRACK and stage.status.total == 0 and failure.exit_code == 1
+            stage.name == TRACK and stage.status.last_s is None and failure.exit_code == 1
         ):
             error = LockedError if failure.exit_code == LockedError.exit_code else ZfcalError
             raise error(failure.message, hint=failure.hint)
