@@ -5,7 +5,7 @@ missing, or what was done by other code. The summary goes to ``build/benchmarks`
 ``--write`` to ``benchmarks/results`` and ``docs``.
 
     .venv/bin/python benchmarks/bench_diagnosis.py --workers 2
-    .venv/bin/python benchmarks/bench_diagnosis.py --quick --seeds 3 --nulls 40 --minutes 30
+    .venv/bin/python benchmarks/bench_diagnosis.py --quick --minutes 60
     .venv/bin/python benchmarks/bench_diagnosis.py --report
 """
 
@@ -201,7 +201,7 @@ def main() -> None:
     todo = [] if options.report else missing(jobs, desk, options.sections)
     alone = [job for job in todo if job.section == TIME]
     together = [job for job in todo if job.section != TIME]
-    for part, workers in ((together, options.workers), (alone, 1)):
+    for part, workers in ((alone, 1), (together, options.workers)):
         if part:
             work(part, desk, workers=workers, deadline_s=deadline_s)
     full = plan(Scale(), LISTED, UNLISTED, quick=options.quick)

@@ -104,9 +104,15 @@ def _completeness(found: Mapping[str, Any]) -> str:
     short = [section for section, n in planned.items() if full["n"].get(section, 0) < n]
     if not short and not found["lacking"]:
         return "A complete run with 39 replicates.\n"
+    of_mode = [
+        f"{sum(told['n'].get(section, 0) for section in planned)} with {MODES[mode]}"
+        for mode, told in _modes(found)
+    ]
+    done = " and ".join(of_mode) or "none"
     return _prose(
-        """**A partial run.** The numbers below are of the trials that the table counts, however
-        few; the intervals say how little some of them mean."""
+        f"""**A partial run.** Of {sum(planned.values())} planned trials {done} were run; the
+        others, however few these are, do not count below, and the intervals say how little
+        some of the numbers mean. Trials come in an order in which any first part is balanced."""
     )
 
 

@@ -1,15 +1,18 @@
 """Which trials the benchmark of the diagnosis makes, and in which order.
 
 Every trial has a seed of its own, from `FIRST_SEED` on: nobody has tuned anything on
-them. Trials are made in rounds, one of every kind, so that a run that was stopped early has
-a bit of everything.
+them. Sections take turns, each as often as its weight says, and within a section one trial of
+every kind comes before the second of any, so that a run that was stopped early is balanced.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 FIRST_SEED = 20_000
 
@@ -40,6 +43,12 @@ PAIRED = (
 
 FILMED = ("wall-persistence", "burst-and-coast", "turning-bias", None, None)
 """What the trials hide that are rendered to video and tracked."""
+
+WEIGHTS = {
+    LISTED_SECTION: 1.0, NULLS: 1.0, STRENGTHS: 0.5, LENGTHS: 0.5, OUTSIDE: 0.3, PAIRS: 0.25,
+    ALONE: 0.2, EXTEND: 0.04, VIDEO: 0.02,
+}  # fmt: skip
+"""How often a section's turn comes. An extension takes as long as a dozen others."""
 
 _NULLS_A_ROUND = 20
 _SEEDS_PER_KIND = 100
@@ -153,7 +162,24 @@ def plan(scale: Scale, listed: Sequence[str], unlisted: Sequence[str], *, quick:
         *_of_others(scale, unlisted, quick=quick),
         *_in_full(scale, listed, quick=quick),
     ]
-    return sorted(made, key=lambda job: (job.round, SECTIONS.index(job.section)))
+    return _in_turns(made)
+
+
+def _in_turns(jobs: Sequence[Job]) -> list[Job]:
+    """Return trials so that any first part of them is balanced; those that are timed last."""
+    sections: dict[str, list[Job]] = defaultdict(list)
+    for job in jobs:
+        sections[job.section].append(job)
+    due: list[tuple[float, int, Job]] = []
+    for section, weight in WEIGHTS.items():
+        own = sections.pop(section, [])
+        if section != NULLS:  # their kinds take turns as they are
+            shuffled = np.random.default_rng(0).permutation(len(own))
+            own = sorted((own[at] for at in shuffled), key=lambda job: job.round)
+        number = SECTIONS.index(section)
+        due += [((k + 0.5) / weight, number, job) for k, job in enumerate(own)]
+    ordered = [job for _, _, job in sorted(due, key=lambda each: each[:2])]
+    return [*ordered, *(job for rest in sections.values() for job in rest)]
 
 
 def _of_effects(scale: Scale, listed: Sequence[str], *, quick: bool) -> Iterator[Job]:
