@@ -27,7 +27,13 @@ _LETTERS = tuple("ABCDEFGHIJ")
 @click.option(
     "--robot", type=click.Choice(_LETTERS), default="F", show_default=True, help="Its letter."
 )
-@click.option("--radius-mm", type=click.FloatRange(min=0), default=15.0, show_default=True)
+@click.option(
+    "--radius-mm",
+    type=click.FloatRange(min=0),
+    default=15.0,
+    show_default=True,
+    help="Targets keep so far from the walls.",
+)
 @click.option(
     "--clock",
     type=click.Choice(["wall", "poses"]),
