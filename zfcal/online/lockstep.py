@@ -59,8 +59,8 @@ class LockstepDriver:
 
     @property
     def n_sent(self) -> int:
-        """Bytes that went to the serial port until now."""
-        return self._robot.line.n_sent
+        """Events that went to the robot until now."""
+        return self._robot.n_sent
 
     def take(self, poses: FramePoses) -> None:
         """Do all that is due at a frame."""
