@@ -221,3 +221,14 @@ def is_running(process):
     except OSError:
         return False
     return words.rpartition(")")[2].split()[0] != "Z"
+
+
+def test_a_stage_that_fails_to_the_last_is_exit_code_1(recording, watching):
+    """Without anything new for a while the watch leaves, and says what is wrong."""
+    (recording / "models" / "000000.toml").unlink()
+    bring(recording, 0, 60)
+    with watching.start(recording, "--until-idle", "4s", *ROUND) as watch:
+        assert "000000.toml" in watch.until("failed", stage="calibrate")["problem"]
+        assert watch.wait() == 1
+    assert "000000.toml" in watch.said
+    assert (recording / "stats" / "000120.parquet").exists()

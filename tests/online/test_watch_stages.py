@@ -191,3 +191,11 @@ def test_every_event_of_a_stage_has_a_line_that_fits_the_schema(tmp_path):
         assert line.as_dict()["at_s"] == 1.235
     assert told_by("calibrate", object(), 0.0) is None
     assert Happened(at_s=0.0, kind="back", values={"path": "x"}).as_dict()["event"] == "back"
+
+
+def test_an_order_without_windows_makes_the_stage_ready(trial, quicker, heard):
+    """The simulator is compiled before the first window comes; nothing is written or told."""
+    before = sorted(trial.rglob("*"))
+    assert stage(trial, quicker)(Turn(seen_s={}), heard.append).end_s is None
+    assert sorted(trial.rglob("*")) == before
+    assert heard == []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from zfcal.calibrate import evolve, evolve_deap
 from zfcal.calibrate.evolve import Evaluate, State, overall_score
 from zfcal.calibrate.history import Generation, describe
-from zfcal.calibrate.objective import Purpose
+from zfcal.calibrate.objective import Purpose, SeedSource, Simulator
 from zfcal.calibrate.pace import Deadline, Pace
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Previous, Settings, Task
 from zfcal.errors import InputError
@@ -109,7 +109,7 @@ def search(
     closing = task.closing_work(settings)
     pace = Pace(deadline)
     if deadline is not None:
-        _warm_up(task)
+        warm_up(task.simulator)
     pace.start()
     if resume is None:
         progress = begin(task, settings, evaluate)
@@ -138,12 +138,11 @@ def _show(watch: Watch | None, progress: Progress) -> None:
         watch(progress)
 
 
-def _warm_up(task: Task) -> None:
+def warm_up(simulator: Simulator) -> None:
     """Have the kernel compiled before the clock is asked how fast it is."""
-    n_zones = len(task.group.template.zones)
-    genes = np.full((1, n_genes(n_zones)), 0.5)
-    seeds = task.seeds.seeds(Purpose.EVALUATION, 1)
-    task.simulator.simulate(genes, n_counted=task.group.n_agents, n_steps=1, seeds=seeds)
+    genes = np.full((1, n_genes(len(simulator.template.zones))), 0.5)
+    seeds = SeedSource(trial_seed=0, window_end_s=0).seeds(Purpose.EVALUATION, 1)
+    simulator.simulate(genes, n_counted=simulator.n_agents, n_steps=1, seeds=seeds)
 
 
 def _take_pace(pace: Pace, task: Task, settings: Settings, evaluate: Evaluate) -> None:

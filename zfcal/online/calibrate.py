@@ -45,6 +45,8 @@ from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
 from zfcal.trial import second_of
 
+_INSTANT_S = 0.001
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrateOptions:
@@ -251,7 +253,9 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
             run.tell(Planned(path=path, reason=reason))
         return True
     estimated = None
-    if run.options.seed_likelihood:
+    options = run.options
+    began_s = time.monotonic()
+    if options.seed_likelihood:
         template = run.group.template
         estimated = estimate(run.opened, template, window_span(places.end_s), run.tell)
     round_task = RoundTask(
@@ -262,7 +266,11 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
         previous=None if previous is None else read_previous(previous),
     )
     key = checkpoint_key(expected)
-    result = run_search(round_task, run.options, places.checkpoint, run.tell, key=key)
+    if options.budget_s is not None:
+        # The estimate is a part of the round.
+        left_s = options.budget_s - (time.monotonic() - began_s)
+        options = replace(options, budget_s=max(left_s, _INSTANT_S))
+    result = run_search(round_task, options, places.checkpoint, run.tell, key=key)
     made = run.lineage(places, previous, result.generations)
     lineages = {schema: replace(made, schema=schema) for _, schema in places.artifacts}
     baselines = baseline_scores(round_task, run.options, result)

@@ -62,11 +62,13 @@ class Hints:
         if not polls:
             self._thread.start()
 
-    def clear(self) -> None:
-        """Take the hints that came."""
+    def clear(self) -> bool:
+        """Take the hints that came, and return whether there were any."""
+        found = False
         with contextlib.suppress(BlockingIOError):
             while os.read(self.pipe, 4096):
-                pass
+                found = True
+        return found
 
     def close(self) -> None:
         """End the thread."""

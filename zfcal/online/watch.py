@@ -35,6 +35,7 @@ from zfcal.online.watch_events import (
 from zfcal.online.watch_stages import (
     ANALYSE,
     CALIBRATE,
+    MAKES,
     NICENESS,
     TRACK,
     Outcome,
@@ -143,6 +144,7 @@ class Watch:
         self._clock = clock
         self._arrivals = Arrivals(root, clock)
         self._began_s = self._busy_s = clock()
+        self._look_s = 0.0
         self._told: set[str] = set()
         self._ended = False
         self._seen: Signature = frozenset()
@@ -154,33 +156,49 @@ class Watch:
         self._log("began", trial=str(self._root), stages=list(self._stages), polls=polls)
         for stage in self._stages.values():
             self._log("started", stage.name, process=stage.worker.process)
+        if CALIBRATE in self._stages and not self._options.once:
+            # What is to be compiled is, before the first window comes.
+            self._stages[CALIBRATE].worker.order(Turn(seen_s={}))
 
     def turn(self) -> None:
         """Look, give orders, and wait for what comes."""
-        self._look()
+        if self._clock() >= self._look_s or self._arrivals.unsettled:
+            self._look()
+            self._look_s = self._clock() + self._hints.rescan_s
         for stage in self._stages.values():
             self._give(stage)
         self._tell(self._snapshot())
         pipes = [stage.worker.pipe for stage in self._stages.values()]
         pause_s = _TICK_S if self._is_restless() else self._hints.rescan_s
         connection.wait([*pipes, self._hints.pipe], timeout=pause_s)
-        self._hints.clear()
+        if self._hints.clear():
+            self._look_s = 0.0
         for stage in self._stages.values():
             for told in stage.worker.take():
                 self._take(stage, told)
 
     def is_over(self) -> bool:
         """Return whether there is nothing more to do, and nothing more to come."""
-        if any(not self._is_at_rest(stage) for stage in self._stages.values()):
+        if any(stage.worker.is_busy for stage in self._stages.values()):
+            return False
+        if self._has_been_idle():
+            return True
+        if not all(map(self._is_at_rest, self._stages.values())):
             return False
         if self._status.is_gone or self._arrivals.unsettled:
-            return self._has_been_idle()
-        if self._options.once:
-            return self._seen == self._arrivals.signature
-        return (self._ended and self._has_all()) or self._has_been_idle()
+            return False
+        if self._seen != self._arrivals.signature:
+            return False
+        return self._options.once or (self._ended and self._has_all())
 
     def finish(self) -> list[of.LeftOut]:
-        """Say that it is over, and return what was left out."""
+        """Say that it is over, and return what was left out.
+
+        Raises
+        ------
+        ZfcalError
+            A stage failed to the last.
+        """
         left = {
             path: each for stage in self._stages.values() for path, each in stage.left_out.items()
         }
@@ -189,6 +207,9 @@ class Watch:
             hint = "Copy it again from where it was made, or remove it."
             left[str(path)] = of.LeftOut(path=path, problem=f"{path}: {problem}.", hint=hint)
         self._log("ended", because=self._because(), left_out=sorted(left))
+        for stage in self._stages.values():
+            if stage.failures:
+                raise ZfcalError(stage.said, hint="The same command again goes on.")
         return list(left.values())
 
     def close(self) -> None:
@@ -209,7 +230,8 @@ class Watch:
         for each in news:
             name = str(each.path)
             if isinstance(each, Arrived):
-                self._log("arrived", path=name)
+                if not any(each.path.parent.name in MAKES[stage] for stage in self._stages):
+                    self._log("arrived", path=name)
             else:
                 self._log("unfinished", path=name, problem=each.problem)
         if self._arrivals.signature != self._seen:
@@ -266,6 +288,8 @@ class Watch:
 
     def _take(self, stage: _Stage, told: of.Event | Done | Failure) -> None:
         """Take what a stage tells."""
+        if isinstance(told, Done | Failure):
+            self._look_s = 0.0
         if isinstance(told, Done):
             self._take_outcome(stage, told.result)
         elif isinstance(told, Failure):
@@ -328,7 +352,6 @@ class Watch:
 
     def _take_failure(self, stage: _Stage, failure: Failure) -> None:
         """Try again later; what a person must mend before anything can work ends the watch."""
-        self._busy_s = self._clock()
         if failure.exit_code is None:
             stage.worker.stop()
             stage.worker = Worker(stage.name, stage.job, niceness=NICENESS[stage.name])

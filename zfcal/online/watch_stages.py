@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from zfcal.online.events import LeftOut, Planned, Tell, UpToDate
-from zfcal.online.opening import Task
+from zfcal.online.opening import Task, open_trial
 from zfcal.online.recording import starts_between, stretch_of
 from zfcal.online.segments import Segments, segment_path, segment_starts
 from zfcal.online.skipping import write_skipped
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from zfcal.online.track_plan import TrackOptions
 
 TRACK, ANALYSE, CALIBRATE = STAGES = ("track", "analyse", "calibrate")
+
+MAKES = {TRACK: ("tracks",), ANALYSE: ("stats", "scores"), CALIBRATE: ("models",)}
+"""The folders that a stage fills: what appears there is not news from elsewhere."""
 
 NICENESS = {TRACK: 0, ANALYSE: 0, CALIBRATE: 10}
 """The processor serves the robot, the tracker and the statistics before the search."""
@@ -131,10 +134,16 @@ class CalibrateStage:
     clock: Callable[[], float] = time.monotonic
 
     def __call__(self, turn: Turn, tell: Tell) -> Outcome:
-        """Choose a window, write down which are passed over, and make its round."""
+        """Choose a window, write down which are passed over, and make its round.
+
+        Without any window it gets ready for the first.
+        """
         from zfcal.online.calibrate import calibrate
 
         ear = _Ear(tell=tell)
+        if not turn.seen_s:
+            self._get_ready()
+            return Outcome()
         waiting = {end: turn.seen_s[end] for end in self._planned(turn, ear)}
         now_s = self.clock()
         choice = choose(waiting, now_s=now_s, due_after_s=turn.due_after_s)
@@ -151,6 +160,13 @@ class CalibrateStage:
         task = Task(ends_s=frozenset({choice.end_s}))
         calibrate(self.root, options, ear.hear, task=task)
         return Outcome(end_s=choice.end_s, left_out=ear.left_out)
+
+    def _get_ready(self) -> None:
+        """Have the simulator compiled, or loaded."""
+        from zfcal.calibrate.search import warm_up
+        from zfcal.online.calibrate import make_group
+
+        warm_up(make_group(open_trial(self.root), self.options))
 
     def _planned(self, turn: Turn, ear: _Ear) -> list[int]:
         """Return the windows whose rounds are to be made.
