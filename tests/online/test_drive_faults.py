@@ -14,6 +14,7 @@ import pytest
 
 from zfcal.artifacts.drive_files import drive_files, read_drive
 from zfcal.artifacts.mcap_files import overview
+from zfcal.errors import LockedError
 from zfcal.online.drive_replay import replay
 from zfcal.online.events import say_nothing
 from zfcal.robot.virtual_process import VirtualProcess
@@ -76,6 +77,11 @@ class Rig:
         """Return how fast the wheels turn."""
         at = self.robot.control.ask("pose")
         return abs(at["left_m_s"]) + abs(at["right_m_s"])
+
+    def end(self):
+        """Let the driver end by itself."""
+        self.drivers[-1].send_signal(signal.SIGTERM)
+        assert self.drivers[-1].wait(10) == 143
 
     def close(self):
         """End everything."""
@@ -166,6 +172,7 @@ def test_unplugged_and_back(rig):
     lost = [c for c in rig.items("command") if c["held"] == "port-lost"]
     assert len(lost) >= 4
     assert not any(c["sent"] for c in lost)
+    rig.end()
     assert replay(rig.root, say_nothing).is_same
 
 
@@ -203,6 +210,7 @@ def test_what_the_robot_complains_of_is_heard(rig):
     began, ended = [f["time_s"] for f in rig.items("fault") if f["fault"] == "power-down"]
     assert 1.0 < ended - began < 3.0
     assert {c["bytes"] for c in rig.items("command") if c["held"] == "power-down"} == {STOP}
+    rig.end()
     assert replay(rig.root, say_nothing).is_same
 
 
@@ -238,6 +246,8 @@ def test_a_second_driver_is_refused_and_a_port_that_is_not_there(rig, tmp_path):
     rig.until(lambda: rig.moves() > 2)
     second = rig.start()
     assert second.wait(20) == 75
+    with pytest.raises(LockedError):
+        replay(rig.root, say_nothing)
     other = driven.make_trial(tmp_path / "other")
     words = [sys.executable, "-m", "zfcal_cli.main", "drive", str(other), "--port", "/dev/nobody"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -21,7 +21,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.model.packing import pack
 from zfcal.online.events import LeftOut, Note, Progress, Result, Tell, UpToDate
 from zfcal.online.minutes import pose_files
-from zfcal.online.opening import OpenTrial, open_trial
+from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.online.pilot import InForce, Manner, Pilot, Target, command_item, target_item
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import Gains
@@ -86,6 +86,8 @@ def replay(root: Path, tell: Tell) -> Tally:
     ------
     InputError
         There is no log, or what comes out is not what it says.
+    LockedError
+        A driver is at work on the trial.
     """
     opened = open_trial(root)
     files = drive_files(root)
@@ -95,10 +97,12 @@ def replay(root: Path, tell: Tell) -> Tally:
             hint=f"Make one with: zfcal drive {root} --port virtual --clock poses",
         )
     again = _Again(opened, tell)
-    for number, (start_s, path) in enumerate(files.items(), start=1):
-        again.file(start_s, path)
-        tell(UpToDate(path=path))
-        tell(Progress(stage="replay", done=number, total=len(files)))
+    # Not while a driver still writes: its log and its poses would not end together.
+    with at_work(root, "drive", Task()):
+        for number, (start_s, path) in enumerate(files.items(), start=1):
+            again.file(start_s, path)
+            tell(UpToDate(path=path))
+            tell(Progress(stage="replay", done=number, total=len(files)))
     tally = again.tally
     tell(Result(value={key: getattr(tally, key) for key in Tally.__slots__}))
     says = (
