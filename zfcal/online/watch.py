@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from multiprocessing import connection
 from pathlib import Path
 from typing import final
@@ -26,12 +25,12 @@ from zfcal.online.skipping import skipped_ends
 from zfcal.online.watch_events import (
     Happened,
     Skipped,
-    StageStatus,
     Status,
     Takes,
     WatchTell,
     told_by,
 )
+from zfcal.online.watch_running import Running, begin
 from zfcal.online.watch_stages import (
     ANALYSE,
     CALIBRATE,
@@ -44,7 +43,7 @@ from zfcal.online.watch_stages import (
     has_ended,
 )
 from zfcal.online.windows import window_ends
-from zfcal.online.worker import Done, Failure, Job, Worker
+from zfcal.online.worker import Done, Failure, Worker
 from zfcal.units import SEGMENT_S
 
 _TICK_S = 0.25
@@ -52,24 +51,6 @@ _TICK_S = 0.25
 
 _RETRY_S = (1.0, 2.0, 4.0, 8.0, 15.0)
 """After its first failure a stage waits so long, then longer, for the world to get better."""
-
-
-@dataclass(slots=True, kw_only=True)
-class _Stage:
-    """A stage as the loop knows it."""
-
-    name: str
-    job: Job
-    worker: Worker
-    asked_for: Signature = frozenset()
-    done_for: Signature | None = None
-    failures: int = 0
-    retry_s: float = 0.0
-    said: str = ""
-    is_over: bool = False
-    taken_s: float = 0.0
-    left_out: Mapping[str, of.LeftOut] = field(default_factory=dict)
-    status: StageStatus = field(default_factory=StageStatus)
 
 
 def watch(root: Path, options: WatchOptions, tell: WatchTell) -> list[of.LeftOut]:
@@ -149,7 +130,7 @@ class Watch:
         self._ended = False
         self._seen: Signature = frozenset()
         self._status = Status(stages={}, n_skipped=len(skipped_ends(root)))
-        self._stages = {name: _begin(name, job) for name, job in options.jobs(root).items()}
+        self._stages = {name: begin(name, job) for name, job in options.jobs(root).items()}
 
     def begin(self, polls: str | None) -> None:
         """Say what runs where; ``polls`` is why notifications are not used."""
@@ -249,7 +230,7 @@ class Watch:
             self._status = dataclasses.replace(self._status, is_gone=True)
             self._log("gone", path=str(self._root), problem=error.strerror or str(error))
 
-    def _give(self, stage: _Stage) -> None:
+    def _give(self, stage: Running) -> None:
         """Give a stage an order, if it is free and something has changed for it."""
         worker = stage.worker
         if worker.is_busy or self._status.is_gone or stage.is_over or self._clock() < stage.retry_s:
@@ -286,7 +267,7 @@ class Watch:
             if not each[0].startswith("models/") and not each[0].endswith("-model.parquet")
         )
 
-    def _take(self, stage: _Stage, told: of.Event | Done | Failure) -> None:
+    def _take(self, stage: Running, told: of.Event | Done | Failure) -> None:
         """Take what a stage tells."""
         if isinstance(told, Done | Failure):
             self._look_s = 0.0
@@ -297,7 +278,7 @@ class Watch:
         else:
             self._take_event(stage, told)
 
-    def _take_event(self, stage: _Stage, told: object) -> None:
+    def _take_event(self, stage: Running, told: object) -> None:
         if isinstance(told, of.Made | of.UpToDate) and told.path.parent.name in FOLDERS:
             self._arrivals.trust(told.path)
         if isinstance(told, of.UpToDate | of.LeftOut | of.Note):
@@ -310,7 +291,7 @@ class Watch:
         if logged is not None:
             self._tell(logged)
 
-    def _note_status(self, stage: _Stage, told: object) -> None:
+    def _note_status(self, stage: Running, told: object) -> None:
         match told:
             case Takes():
                 stage.taken_s = self._clock()
@@ -329,7 +310,7 @@ class Watch:
                 n_skipped = self._status.n_skipped + 1
                 self._status = dataclasses.replace(self._status, n_skipped=n_skipped)
 
-    def _take_outcome(self, stage: _Stage, outcome: Outcome) -> None:
+    def _take_outcome(self, stage: Running, outcome: Outcome) -> None:
         stage.failures, stage.said, stage.left_out = 0, "", outcome.left_out
         stage.status = dataclasses.replace(stage.status, now_s=None, done=0, problem="")
         self._busy_s = self._clock()
@@ -343,14 +324,14 @@ class Watch:
         else:
             self._log_round(stage, outcome.end_s)
 
-    def _log_round(self, stage: _Stage, end_s: int) -> None:
+    def _log_round(self, stage: Running, end_s: int) -> None:
         now_s = self._clock()
         seen_s = self._order(stage.name).seen_s.get(end_s, stage.taken_s)
         values = {"took_s": round(now_s - stage.taken_s, 3), "lag_s": round(now_s - seen_s, 3)}
         self._status = dataclasses.replace(self._status, lag_s=now_s - seen_s)
         self._log("finished", stage.name, window_end_s=end_s, **values)
 
-    def _take_failure(self, stage: _Stage, failure: Failure) -> None:
+    def _take_failure(self, stage: Running, failure: Failure) -> None:
         """Try again later; what a person must mend before anything can work ends the watch."""
         if failure.exit_code is None:
             stage.worker.stop()
@@ -370,7 +351,7 @@ class Watch:
             values = {"problem": failure.message, "hint": failure.hint, "retry_s": wait_s}
             self._log("failed", stage.name, **values)
 
-    def _is_at_rest(self, stage: _Stage) -> bool:
+    def _is_at_rest(self, stage: Running) -> bool:
         if stage.name == TRACK:
             return stage.is_over
         idle = not stage.worker.is_busy and stage.failures == 0
@@ -407,7 +388,3 @@ class Watch:
     def _log(self, kind: str, stage: str | None = None, **values: object) -> None:
         at_s = self._clock() - self._began_s
         self._tell(Happened(at_s=at_s, kind=kind, stage=stage, values=values))
-
-
-def _begin(name: str, job: Job) -> _Stage:
-    return _Stage(name=name, job=job, worker=Worker(name, job, niceness=NICENESS[name]))
