@@ -11,12 +11,13 @@ from .durations import seconds
 from .options import Command
 
 _PRESENT = (
-    "no_video", "duration_s", "generations", "robot", "seed",
+    "real_time", "no_video", "duration_s", "generations", "budget_s", "robot", "seed",
     "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
 )  # fmt: skip
 
 _FLAGS = {name: f"--{name.replace('_', '-')}" for name in _PRESENT} | {
     "duration_s": "--duration",
+    "budget_s": "--budget",
     "robot": "--swims",
 }
 
@@ -31,6 +32,10 @@ def closed_loop_options(command: Command) -> Command:
             given = [name for name, value in asked.items() if value not in (None, False)]
             if given:
                 raise click.UsageError(f"{_FLAGS[given[0]]} is for --closed-loop.")
+        if asked["real_time"] and asked["generations"] is not None:
+            raise click.UsageError("--real-time gives rounds a --budget, not --generations.")
+        if asked["budget_s"] is not None and not asked["real_time"]:
+            raise click.UsageError("--budget is for --real-time: time stands still in lock-step.")
         command(*args, loop=asked if closed_loop else None, **options)
 
     decorated: Command = run
@@ -44,6 +49,14 @@ _OPTIONS = (
         "--closed-loop",
         is_flag=True,
         help="Let virtual fish and the driven robot react to each other.",
+    ),
+    click.option(
+        "--real-time",
+        is_flag=True,
+        help="As on a rig: zfcal watch and zfcal drive beside the tank.",
+    ),
+    click.option(
+        "--budget", "budget_s", type=seconds, metavar="TIME", help="Of a round.  [default: 50s]"
     ),
     click.option("--no-video", is_flag=True, help="Tracks with the tracker's noise, no images."),
     click.option(

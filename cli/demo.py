@@ -30,7 +30,8 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
 
     With --closed-loop the fish react to a robot, which is driven by what is
     calibrated meanwhile: cameras, tracker, analysis, calibration, drive and a
-    virtual FishBot at a serial port, in lock-step. tank/ holds the truth.
+    virtual FishBot at a serial port, in lock-step; with --real-time they are
+    processes of their own, as on a rig. tank/ holds the truth.
 
     \b
     Example:
@@ -57,8 +58,9 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
 
 def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -> Path:
     from zfcal.calibrate.task import Settings
-    from zfcal.online.closed_loop import LoopOptions, closed_loop
+    from zfcal.online.closed_loop import closed_loop
     from zfcal.online.virtual_fish import FishOptions
+    from zfcal.online.virtual_trial import LoopOptions
     from zfcal.units import M_PER_MM
 
     given = {name: value for name, value in asked.items() if value is not None}
@@ -78,4 +80,8 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
         fish=FishOptions(**fish),
         settings=Settings(generations=given.get("generations", 30)),
     )
+    if asked["real_time"]:
+        from zfcal.online.live_loop import live_loop
+
+        return live_loop(folder, options, given.get("budget_s", 50.0), out.tell, task=task)
     return closed_loop(folder, options, out.tell, task=task)

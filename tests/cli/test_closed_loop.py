@@ -42,3 +42,17 @@ def test_impossible_fish_are_one_line(zfcal, tmp_path):
     assert "noise_m" in done.err
     assert "Traceback" not in done.err
     assert not (tmp_path / "loop").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--real-time", "--generations", "3"), "--budget, not --generations"),
+        (("--budget", "20s"), "--budget is for --real-time"),
+    ],
+)
+def test_rounds_are_bound_by_time_only_where_time_passes(zfcal, tmp_path, words, says):
+    """A budget means nothing in lock-step, generations nothing in real time."""
+    done = zfcal("demo", tmp_path / "loop", "--closed-loop", *words)
+    assert done.code == 2
+    assert says in done.err

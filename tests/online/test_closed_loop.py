@@ -13,11 +13,12 @@ from zfcal.artifacts.pose_files import read_poses
 from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
-from zfcal.online.closed_loop import LoopOptions, closed_loop, starting_model
+from zfcal.online.closed_loop import closed_loop
 from zfcal.online.events import Note, UpToDate
 from zfcal.online.opening import Task, open_trial
 from zfcal.online.virtual_eyes import VirtualEyes
 from zfcal.online.virtual_fish import FishOptions
+from zfcal.online.virtual_trial import LoopOptions, starting_model
 from zfcal.tracks import FISH, ROBOT
 
 LITTLE = Settings(

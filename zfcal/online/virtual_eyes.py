@@ -30,6 +30,48 @@ _PAST = 12
 
 
 @final
+class Drawn:
+    """Draws each frame as both cameras would take it.
+
+    Parameters
+    ----------
+    opened
+        The trial: its arena, frame rate and seed.
+
+    Attributes
+    ----------
+    nobody
+        Both images of the tank without anybody, as JPEG files.
+    empty
+        The one from above.
+    """
+
+    def __init__(self, opened: OpenTrial) -> None:
+        trial, arena = opened.trial, opened.arena
+        self._fps, self._seed, self._look = trial.fps, trial.seed, look_of(USUAL)
+        self._above = OverheadPainter(arena, overhead_camera(arena), self._look, seed=trial.seed)
+        self._under = BelowPainter(arena, below_camera(arena), self._look, seed=trial.seed)
+        self._past: deque[FramePoses] = deque(maxlen=_PAST)
+        self.nobody = (self._encoded(self._above, _nobody()), self._encoded(self._under, _nobody()))
+        self.empty = decoded(self.nobody[0])
+
+    def images(self, truth: FramePoses) -> tuple[bytes, bytes]:
+        """Return the images of a frame from above and from below, as JPEG files."""
+        self._past.append(truth)
+        swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
+        moment = swum.at(len(swum) - 1)
+        return self._encoded(self._above, moment), self._encoded(self._under, moment)
+
+    def _encoded(self, painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
+        return encoded(painter.paint(moment), self._look.jpeg_quality)
+
+
+def decoded(data: bytes) -> Image:
+    """Return an image from its file."""
+    return np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
+
+
+@final
 class VirtualEyes:
     """Draws each frame as both cameras would take it, and tracks what they show.
 
@@ -41,20 +83,17 @@ class VirtualEyes:
 
     def __init__(self, opened: OpenTrial) -> None:
         trial, arena = opened.trial, opened.arena
-        self._fps, self._seed, self._look = trial.fps, trial.seed, look_of(USUAL)
         above, under = overhead_camera(arena), below_camera(arena)
-        self._above = OverheadPainter(arena, above, self._look, seed=trial.seed)
-        self._under = BelowPainter(arena, under, self._look, seed=trial.seed)
+        self._drawn = Drawn(opened)
         self._tracker = FishTracker(
             TrackerOptions(n_agents=trial.n_agents),
             above,
-            background=background_of(self._taken(self._above, _nobody())),
+            background=background_of(self._drawn.empty),
             region=region_of(arena, above),
         )
         mask = (region_of(arena, under) * np.uint8(255)).astype(np.uint8)
         self._finder = RobotFinder(LedOptions(), under, mask=mask)
         self._fuser = Fuser()
-        self._past: deque[FramePoses] = deque(maxlen=_PAST)
 
     @property
     def next_agent(self) -> int:
@@ -63,12 +102,9 @@ class VirtualEyes:
 
     def see(self, truth: FramePoses) -> FramePoses:
         """Return what the tracker makes of the images of a frame."""
-        self._past.append(truth)
-        swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
-        moment = swum.at(len(swum) - 1)
         above, under = (
-            Frame(number=truth.frame, time_s=truth.time_s, image=self._taken(painter, moment))
-            for painter in (self._above, self._under)
+            Frame(number=truth.frame, time_s=truth.time_s, image=decoded(data))
+            for data in self._drawn.images(truth)
         )
         seen = self._tracker.step(above)
         agents = self._fuser.step(seen, self._finder.step(under), truth.time_s)
@@ -77,11 +113,6 @@ class VirtualEyes:
     def take_bad(self) -> tuple[str, ...]:
         """Return what was wrong with the last frame."""
         return tuple(bad.reason for bad in self._tracker.take_bad_frames())
-
-    def _taken(self, painter: OverheadPainter | BelowPainter, moment: Moment) -> Image:
-        """Return an image as it comes over a cable: compressed."""
-        data = np.frombuffer(encoded(painter.paint(moment), self._look.jpeg_quality), np.uint8)
-        return np.asarray(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), np.uint8)
 
 
 def _nobody() -> Moment:
