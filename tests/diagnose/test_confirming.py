@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from zfcal.diagnose.confirming import confirm, half_of, halves, halves_note
+from zfcal.diagnose.confirming import confirm, half_of, halves, halves_note, is_steady
 from zfcal.diagnose.naming import choose, refit
-from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.screening import Screen, summed
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene
@@ -91,3 +91,54 @@ def test_halves_that_differ_are_told(record, worlds, tank, fish):
     scene = make_scene(worlds.samples_of(xy), tank)
     note = halves_note(Screen(scene=scene, fitted=maximise(scene, fish)))
     assert note.values["largest"] > 6
+
+
+def scores_at(screen, candidate, when, strength=0.25, seed=5):
+    """Return scores of unit spread on a recording's turns, of a strength at some times."""
+    scene = screen(11).scene
+    draws = np.random.default_rng(seed).normal(size=len(scene.turns))
+    steps = draws + np.where(when(scene.time_s(scene.turns)), strength, 0.0)
+    return summed(candidate, steps), scene
+
+
+def test_an_effect_that_is_there_all_the_time_is_steady(screen, candidate):
+    """Clear or faint, and at a strength that halves on the way: in all of sixty."""
+    bias = candidate("turning-bias")
+    for seed in range(20):
+        for strength in (0.06, 0.5):
+            score, scene = scores_at(screen, bias, lambda t: t >= 0, strength, seed)
+            assert is_steady(score, scene)
+        steps = score.steps - 0.25 * (scene.time_s(scene.turns) > 300)
+        assert is_steady(summed(bias, steps), scene)
+
+
+@pytest.mark.parametrize(
+    "when",
+    [lambda t: t % 300 < 60, lambda t: t % 40 < 5, lambda t: (t > 150) & (t < 210)],
+    ids=["a minute in five", "five seconds in forty", "once"],
+)
+def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when):
+    """Whatever its times, if it is clear while it is there."""
+    score, scene = scores_at(screen, candidate("turning-bias"), when, strength=1.0)
+    assert score.z > 4
+    assert not is_steady(score, scene)
+
+
+@pytest.mark.parametrize("name", ["boldness", "freezing", "generic:heading:time"])
+def test_what_differs_between_times_by_nature_may_do_so(screen, candidate, name):
+    """Individuals are near a door at times, rests go on, and some effects have their times."""
+    score, scene = scores_at(screen, candidate(name), lambda t: t % 300 < 60, strength=1.0)
+    assert is_steady(score, scene)
+
+
+def test_what_comes_and_goes_is_not_named(screen, candidate):
+    """A confirmation says so, whatever the effect gains on held-out steps."""
+    own = screen(11)
+    step = added(own, candidate("turning-bias"))
+    late = own.scene.time_s(own.scene.turns) % 300 < 60
+    steps = np.where(late, np.abs(step.best.score.steps), step.best.score.steps)
+    wavering = dataclasses.replace(
+        step.best, score=dataclasses.replace(step.best.score, steps=steps)
+    )
+    assert confirm(step).steady
+    assert not confirm(dataclasses.replace(step, best=wavering)).steady

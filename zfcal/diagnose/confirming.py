@@ -1,19 +1,22 @@
-"""Whether what was found holds on steps that it was not fitted to.
+"""Whether what was found holds on steps that it was not fitted to, and all the time.
 
 Blocks of 60 s alternate between two halves. Both models are fitted to one half and
-judged on the other, and the other way round.
+judged on the other, and the other way round. A listed effect is there all the time: one
+whose strength differs between minutes, or seconds, by more than its mean is another one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.screening import Score, Screen
 from zfcal.diagnose.selection import Step
+from zfcal.model.effects.generic import PREFIX
 from zfcal.model.extended import MIN_STEPS, Fitted, maximise
 from zfcal.model.scene import Moves, Scene, thin
 
@@ -23,6 +26,10 @@ BLOCK_S = 60.0
 _ROUNDS = 6
 _SURE = 2.0
 _LEAST_VARIANCE = 1e-12
+
+_WAVERS_S = (60.0, 10.0)
+_WAVERS = 3e-3
+"""Chance at which the scores of blocks of so many seconds are no longer of one strength."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,11 +43,14 @@ class Confirmed:
         standard error of that mean.
     holds
         Whether the gain is more than two standard errors.
+    steady
+        Whether the effect is there all the time.
     """
 
     gain_nats_per_step: float
     gain_se: float
     holds: bool
+    steady: bool = True
 
 
 def half_of(scene: Scene, steps: Moves, which: int) -> NDArray[np.bool_]:
@@ -66,6 +76,11 @@ def confirm(step: Step) -> Confirmed:
     step
         The effect, and the model without it.
     """
+    told = _gained(step)
+    return replace(told, steady=is_steady(step.best.score, step.before.scene))
+
+
+def _gained(step: Step) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
         return _in_time(best.gain, len(best.screen.scene.moves))
@@ -74,6 +89,41 @@ def confirm(step: Step) -> Confirmed:
     gain = after - before
     gain = gain[~np.isnan(gain)]
     return _summary(gain)
+
+
+def is_steady(score: Score, scene: Scene) -> bool:
+    """Return whether the strength of an effect differs between blocks by less than its mean.
+
+    The spread of the strength is that of DerSimonian and Laird (1986, Controlled Clinical
+    Trials 7: 177-188). Individuals and rests differ between blocks by nature, and effects
+    beyond the list may have their times.
+
+    Parameters
+    ----------
+    score
+        Of the effect in the model without it.
+    scene
+        Whose steps the score is of.
+    """
+    effect = score.candidate.effect
+    if effect.individual or effect.stops or effect.name.startswith(PREFIX):
+        return True
+    times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
+    return all(_one_strength(score.steps, times_s // block_s) for block_s in _WAVERS_S)
+
+
+def _one_strength(steps: Floats, block: Floats) -> bool:
+    """Return whether blocks may have one strength, or spread by less than its mean."""
+    _, place = np.unique(block, return_inverse=True)
+    sums, information = np.bincount(place, weights=steps), np.bincount(place, weights=steps**2)
+    sums, information = sums[information > 0], information[information > 0]
+    if len(sums) < 2:
+        return True
+    total = float(information.sum())
+    mean = float(sums.sum()) / total
+    q, df = float(((sums - mean * information) ** 2 / information).sum()), len(sums) - 1
+    spread2 = (q - df) / (total - float((information**2).sum()) / total)
+    return bool(spread2 <= mean**2 or stats.chi2.sf(q, df) > _WAVERS)
 
 
 def _held_out(scene: Scene, fitted: Fitted) -> Floats:

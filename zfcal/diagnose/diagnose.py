@@ -164,7 +164,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         final = case.at_large(0, kept[-1].choice.best.screen)
         omnibus = judge(final[1], [row.at_large[1] for row in rows if row.at_large])
     where = _where(own[0], rows)
-    return _diagnosis(case, rows, selection, (kept, confirmed[: len(kept)]), (where, omnibus))
+    return _diagnosis(case, rows, selection, (kept, confirmed), (where, omnibus))
 
 
 def _is_suspicious(question: Question, omnibus: Omnibus) -> bool:
@@ -290,10 +290,10 @@ def _generic(scene: Scene) -> tuple[Effect, ...]:
 
 
 def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, ...]:
-    """Return the effects up to the first that held-out steps do not bear out."""
+    """Return the effects up to the first that held-out steps or times do not bear out."""
     kept = []
     for step, told in zip(steps, confirmed, strict=True):
-        if not told.holds:
+        if not (told.holds and told.steady):
             break
         kept.append(step)
     return tuple(kept)
@@ -307,11 +307,15 @@ def _diagnosis(
     at_large: tuple[tuple[Located, ...], Omnibus],
 ) -> Diagnosis:
     (steps, confirmed), (where, omnibus) = kept, at_large
-    effects = tuple(_effect(step, held) for step, held in zip(steps, confirmed, strict=True))
+    effects = tuple(_effect(step, held) for step, held in zip(steps, confirmed, strict=False))
+    # What is there at times is something, though nothing that is listed.
+    wavers = any(told.holds and not told.steady for told in confirmed)
     final = steps[-1].choice.best.screen if steps else case.screen
     screened = _screened(case, selection.screened)
     return Diagnosis(
-        verdict=_verdict(effects, screened, suspicious=_is_suspicious(case.question, omnibus)),
+        verdict=_verdict(
+            effects, screened, suspicious=wavers or _is_suspicious(case.question, omnibus)
+        ),
         where=where,
         effects=effects,
         screened=screened,
