@@ -17,7 +17,11 @@ from zfcal.model.rooms import Rooms
 ASK = 255
 """Mark of a cell that a border crosses."""
 
-_ON_WALL_M = 1e-9
+FINE = 8
+"""Such a cell is cut into so many rows and columns, most of which no border crosses."""
+
+ON_WALL_M = 1e-9
+"""So near to the wall the direction along it is the segment's own."""
 
 _TOUCH_M = 1e-12
 """A point so near to the wall is on it, hence inside; rounding is far smaller."""
@@ -45,6 +49,10 @@ class Tank(NamedTuple):
         Whether fish follow walls, by zone id.
     cells : ndarray of uint8, shape (row, column)
         Zone id of a cell, 255 where a border crosses it.
+    fine : ndarray of uint8
+        Likewise of the parts of cells that a border crosses, 64 for each such cell.
+    fine_at : ndarray of int32, shape (row, column)
+        Where those of a cell start.
     clear_m : ndarray of float32, shape (row, column)
         From no point of the cell is a border of a zone nearer than this.
     near_m : ndarray of float32, shape (row, column, zone + 1)
@@ -69,6 +77,8 @@ class Tank(NamedTuple):
     y0_m: float
     per_m: float
     cells: NDArray[np.uint8]
+    fine: NDArray[np.uint8]
+    fine_at: NDArray[np.int32]
     clear_m: NDArray[np.float32]
     near_m: NDArray[np.float32]
     nearest: NDArray[np.int32]
@@ -154,9 +164,13 @@ def zone_of(x: float, y: float, tank: Tank) -> int:
     u, v = (x - tank.x0_m) * tank.per_m, (y - tank.y0_m) * tank.per_m
     zone = 0
     if 0.0 <= u < tank.cells.shape[1] and 0.0 <= v < tank.cells.shape[0]:
-        zone = int(tank.cells[int(v), int(u)])
+        row, column = int(v), int(u)
+        zone = int(tank.cells[row, column])
         if zone == ASK:
-            zone = zone_exact(x, y, tank)
+            part = int(FINE * (v - row)) * FINE + int(FINE * (u - column))
+            zone = int(tank.fine[tank.fine_at[row, column] + part])
+            if zone == ASK:
+                zone = zone_exact(x, y, tank)
     return zone
 
 
@@ -184,6 +198,18 @@ def best_within(x: float, y: float, reach_m: float, gain: Floats, tank: Tank) ->
 
 
 @inlined
+def nearest_listed(x: float, y: float, place: int, walls: Floats, lists: NDArray[np.int32]) -> int:
+    """Return the nearest of the segments of a list, which starts at a place."""
+    best2, near = math.inf, 0
+    for k in range(lists[place]):
+        s = lists[place + 1 + k]
+        away2 = segment_distance2(x, y, walls, s)
+        if away2 < best2:
+            best2, near = away2, int(s)
+    return near
+
+
+@inlined
 def nearest_wall(x: float, y: float, tank: Tank) -> tuple[float, float, float]:
     """Return the distance to the wall of a point inside, and the direction along it.
 
@@ -196,25 +222,14 @@ def nearest_wall(x: float, y: float, tank: Tank) -> tuple[float, float, float]:
     """
     near = tank.nearest[int((y - tank.y0_m) * tank.per_m), int((x - tank.x0_m) * tank.per_m)]
     if near < 0:
-        near = _nearest_listed(x, y, -near - 1, tank)
+        near = nearest_listed(x, y, -near - 1, tank.walls, tank.lists)
     along_x, along_y = tank.walls[near, 2], tank.walls[near, 3]
     px, py = x - tank.walls[near, 0], y - tank.walls[near, 1]
     t = min(1.0, max(0.0, (px * along_x + py * along_y) * tank.walls[near, 4]))
     ex, ey = px - t * along_x, py - t * along_y
     distance = math.sqrt(ex * ex + ey * ey)
-    if distance < _ON_WALL_M:
+    if distance < ON_WALL_M:
         tau_x, tau_y = along_x / tank.walls[near, 5], along_y / tank.walls[near, 5]
     else:
         tau_x, tau_y = -ey / distance, ex / distance
     return distance, tau_x, tau_y
-
-
-@kernel
-def _nearest_listed(x: float, y: float, place: int, tank: Tank) -> int:
-    best2, near = math.inf, 0
-    for k in range(tank.lists[place]):
-        s = tank.lists[place + 1 + k]
-        away2 = segment_distance2(x, y, tank.walls, s)
-        if away2 < best2:
-            best2, near = away2, s
-    return near

@@ -5,7 +5,8 @@ from its centre to every border of a zone exceeds its half diagonal, so that the
 whole cell lies in that zone (distances are 1-Lipschitz); elsewhere the exact
 test runs. Likewise a cell lists each piece of wall that is the nearest one for
 any of its points, and the zones that it may hold are those whose inside or border
-is within the half diagonal of its centre.
+is within the half diagonal of its centre. Cells that a border crosses are cut into
+parts, marked by the same rule.
 """
 
 from __future__ import annotations
@@ -18,13 +19,15 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.model.compiled import kernel
-from zfcal.model.geometry import ASK, Tank, crosses, segment_distance2, zone_exact
+from zfcal.model.geometry import ASK, FINE, Tank, crosses, segment_distance2, zone_exact
 from zfcal.model.rooms import make_rooms
 
 _CELLS_LONG_SIDE = 480
 _BLOCK = 16
 _SINGLE_M = 1e-6
 """More than what a length in a tank loses in single precision."""
+_ROUNDING_M = 1e-12
+"""More than what a place in a tank loses where it is looked up in parts of cells."""
 
 Floats = NDArray[np.float64]
 
@@ -195,6 +198,43 @@ def _look_along(
         down[row, column] = min(down[row, column], down[row + 1, column] + 1)
 
 
+@kernel
+def _fill_fine(tank: Tank, half_diagonal_m: float) -> NDArray[np.uint8]:
+    """Write where each crossed cell's parts start, and return their zones.
+
+    As cells are marked, a part is where no border can cross it.
+    """
+    rows, columns = tank.cells.shape
+    found = 0
+    for row in range(rows):
+        for column in range(columns):
+            tank.fine_at[row, column] = FINE * FINE * found
+            found += tank.cells[row, column] == ASK
+    fine = np.full(FINE * FINE * found, ASK, dtype=np.uint8)
+    walls_near = np.empty(tank.walls.shape[0], dtype=np.int32)
+    edges_near = np.empty(tank.edges.shape[0], dtype=np.int32)
+    rest = tank.near_zone > 0 or tank.far_zone > 0
+    for row in range(rows):
+        for column in range(columns):
+            if tank.cells[row, column] != ASK:
+                continue
+            x, y = tank.x0_m + (column + 0.5) / tank.per_m, tank.y0_m + (row + 0.5) / tank.per_m
+            n_walls = _among(x, y, tank.walls, half_diagonal_m, walls_near)
+            n_edges = _among(x, y, tank.edges, half_diagonal_m, edges_near)
+            for part in range(FINE * FINE):
+                x = tank.x0_m + (column + (part % FINE + 0.5) / FINE) / tank.per_m
+                y = tank.y0_m + (row + (part // FINE + 0.5) / FINE) / tank.per_m
+                near = _least(x, y, tank.walls, walls_near, n_walls)
+                border = min(near, _least(x, y, tank.edges, edges_near, n_edges))
+                if rest:
+                    border = min(border, abs(near - tank.wall_zone_m))
+                if border > half_diagonal_m / FINE + _ROUNDING_M:
+                    at = tank.fine_at[row, column] + part
+                    left = fine[at - 1] if part % FINE > 0 else ASK
+                    fine[at] = left if left != ASK else zone_exact(x, y, tank)
+    return fine
+
+
 def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:
     """Return the arrays of an arena, with the grid filled.
 
@@ -223,6 +263,8 @@ def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:
         y0_m=y0,
         per_m=per_m,
         cells=np.full(shape, ASK, dtype=np.uint8),
+        fine=np.empty(0, dtype=np.uint8),
+        fine_at=np.zeros(shape, dtype=np.int32),
         clear_m=np.zeros(shape, dtype=np.float32),
         near_m=np.full((*shape, len(arena.zones) + 1), np.inf, dtype=np.float32),
         nearest=np.zeros(shape, dtype=np.int32),
@@ -238,7 +280,7 @@ def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:
     half_diagonal_m = math.sqrt(0.5) / per_m * (1 + 1e-9) + 1e-12
     tank = tank._replace(lists=_fill(tank, half_diagonal_m))
     _find_near(tank, half_diagonal_m)
-    return tank
+    return tank._replace(fine=_fill_fine(tank, half_diagonal_m))
 
 
 def _pieces(segments: Floats) -> Floats:
