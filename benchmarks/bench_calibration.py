@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import naive
 import numpy as np
 from measuring import load, machine, table
 from regressions import Ratio, conclude, parser
@@ -30,6 +31,7 @@ from zfcal.calibrate.evolve import Evaluate
 from zfcal.calibrate.objective import Group, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.search import advance, begin
 from zfcal.calibrate.task import Settings, Task
+from zfcal.model.simulate import pack, tank_of
 from zfcal.online.rounds import Checkpoint
 
 ZFCAL = [sys.executable, "-m", "zfcal_cli.main"]
@@ -38,6 +40,8 @@ SCHEDULES = {"default, 1 x 3000 steps": (1, 3000), "authors', 10 x 1800 steps": 
 TARGETS = {"default, 1 x 3000 steps": 300, "authors', 10 x 1800 steps": 45}
 """Generations of 60 individuals in 50 s on two cores."""
 OVERHEAD_MS = 3.0
+REFERENCE_NS = 1600.0
+"""Of the plainly written sampler on the machine that the targets were set for."""
 FEWEST = 3
 """Of fewer generations a round says nothing about the time of one."""
 
@@ -146,6 +150,20 @@ def _simulations_s(evaluate: Evaluate) -> float:
     return statistics.median(times)
 
 
+def naive_ns() -> float:
+    """Return processor time per agent-step of ``naive.py``: how fast the machine is, right now."""
+    arena, template = two_rooms()
+    speeds = np.array([zone.speed_frequency for zone in template.zones])
+    speeds /= speeds.sum(axis=1, keepdims=True)
+    packed, tank, times = pack([template], arena), tank_of(arena), []
+    naive.run(5, 2, 1, packed, speeds, tank)
+    for _ in range(5):
+        begun = time.process_time()
+        naive.run(5, 20_001, 1, packed, speeds, tank)
+        times.append((time.process_time() - begun) / 1e5)
+    return 1e9 * statistics.median(times)
+
+
 def _task() -> Task:
     arena, template = two_rooms()
     group = Group(arena=arena, template=template, n_fish=4, n_robots=1)
@@ -163,22 +181,32 @@ def measure(effort: Effort) -> dict[str, Any]:
         "budget_s": effort.budget_s,
         "load_before": load(),
         "overhead": overhead(effort.bred),
+        "naive_before_ns": naive_ns(),
     }
     with tempfile.TemporaryDirectory() as folder:
         root = make_trial(Path(folder) / "trial")
         found["rounds"] = {
             name: a_round(root, *size, effort.budget_s) for name, size in SCHEDULES.items()
         }
+    found["naive_after_ns"] = naive_ns()
     return found
 
 
-def on_a_quiet_machine(row: dict[str, float], found: dict[str, Any]) -> float:
+def on_a_quiet_machine(
+    row: dict[str, float], found: dict[str, Any], *, slower: float = 1.0
+) -> float:
     """Return the generations that the processor time allows where all cores are the round's own.
 
-    An estimate: what begins and ends a round is taken to run on one core.
+    An estimate: what begins and ends a round is taken to run on one core. On a machine that
+    is so many times slower than this one all processor time is taken to be longer by that.
     """
-    left_s = found["budget_s"] - row["no_generation_processor_s"]
-    return max(0.0, left_s) * found["cores"] / row["processor_s_per_generation"]
+    left_s = found["budget_s"] - slower * row["no_generation_processor_s"]
+    return max(0.0, left_s) * found["cores"] / (slower * row["processor_s_per_generation"])
+
+
+def slower_reference(found: dict[str, Any]) -> float:
+    """Return how many times slower the reference machine is than this one was."""
+    return 2 * REFERENCE_NS / (found["naive_before_ns"] + found["naive_after_ns"])
 
 
 def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
@@ -208,6 +236,7 @@ def markdown(found: dict[str, Any]) -> str:
             1e3 * row["processor_s_per_generation"],
             row["load_after"],
             f"{on_a_quiet_machine(row, found):.0f}",
+            f"{on_a_quiet_machine(row, found, slower=slower_reference(found)):.0f}",
         ]
         for name, row in found["rounds"].items()
     ]
@@ -233,7 +262,12 @@ def markdown(found: dict[str, Any]) -> str:
                 included. The load is that after the round: above {found["cores"]} others were at
                 work, and a wall-clock budget is shared with them. The last column says how many
                 generations the processor time allows where {found["cores"]} cores are the round's
-                own, with all that comes before and after the search on one of them."""
+                own, with all that comes before and after the search on one of them. Machines, and
+                this one from hour to hour, differ: the same law written plainly
+                (`benchmarks/naive.py`) took {found["naive_before_ns"]:,.0f} ns per agent-step
+                before and {found["naive_after_ns"]:,.0f} ns after, on the machine that the targets
+                were set for {REFERENCE_NS:,.0f} ns; "scaled" is the column before it with all processor
+                times multiplied by that ratio, {slower_reference(found):.2f}."""
             ),
             table(
                 (
@@ -243,6 +277,7 @@ def markdown(found: dict[str, Any]) -> str:
                     "processor time (ms per generation)",
                     "load",
                     "on a quiet machine",
+                    "scaled to the reference machine",
                 ),
                 rows,
             ),
