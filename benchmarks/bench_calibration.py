@@ -260,14 +260,14 @@ def markdown(found: dict[str, Any]) -> str:
                 f"""`zfcal calibrate --budget {found["budget_s"]}s`, generations of 60 individuals,
                 from the start of the process to the written model, confirmation and ceiling
                 included. The load is that after the round: above {found["cores"]} others were at
-                work, and a wall-clock budget is shared with them. The last column says how many
-                generations the processor time allows where {found["cores"]} cores are the round's
+                work, and a wall-clock budget is shared with them. "On a quiet machine" says how
+                many generations the processor time allows where {found["cores"]} cores are its
                 own, with all that comes before and after the search on one of them. Machines, and
                 this one from hour to hour, differ: the same law written plainly
                 (`benchmarks/naive.py`) took {found["naive_before_ns"]:,.0f} ns per agent-step
                 before and {found["naive_after_ns"]:,.0f} ns after, on the machine that the targets
-                were set for {REFERENCE_NS:,.0f} ns; "scaled" is the column before it with all processor
-                times multiplied by that ratio, {slower_reference(found):.2f}."""
+                were set for {REFERENCE_NS:,.0f} ns; "scaled" is the column before it with all
+                processor times multiplied by that ratio, {slower_reference(found):.2f}."""
             ),
             table(
                 (
