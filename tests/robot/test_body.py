@@ -4,7 +4,7 @@ import math
 
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from zfcal.errors import InputError
@@ -58,6 +58,7 @@ def test_a_quarter_of_a_circle():
 
 
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-3, 3))
+@example(left=0.0, right=5e-324, heading=0.0)
 def test_two_halves_make_a_whole(left, right, heading):
     """An arc does not depend on how time is cut."""
     start, wheels = Pose(x_m=1, y_m=2, heading_rad=heading), Wheels(left_m_s=left, right_m_s=right)

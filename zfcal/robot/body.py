@@ -80,11 +80,11 @@ def check_wheels(wheels: Wheels) -> None:
 
 def roll(pose: Pose, wheels: Wheels, dt_s: float) -> Pose:
     """Return where wheel speeds lead in a moment, along the arc that they describe."""
-    turn = wheels.turn_rad_s * dt_s
+    half = wheels.turn_rad_s * dt_s / 2
     # The chord of the arc: exact, also for a turn of next to nothing.
-    way = wheels.speed_m_s * dt_s * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)
+    way = wheels.speed_m_s * dt_s * (math.sin(half) / half if half else 1.0)
     return Pose(
-        x_m=pose.x_m + way * math.cos(pose.heading_rad + turn / 2),
-        y_m=pose.y_m + way * math.sin(pose.heading_rad + turn / 2),
-        heading_rad=wrap_angle(pose.heading_rad + turn),
+        x_m=pose.x_m + way * math.cos(pose.heading_rad + half),
+        y_m=pose.y_m + way * math.sin(pose.heading_rad + half),
+        heading_rad=wrap_angle(pose.heading_rad + 2 * half),
     )
