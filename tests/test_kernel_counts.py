@@ -13,7 +13,7 @@ from zfcal.arena import Bins, Zone, make_arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import measure
 from zfcal.model.kernels.crowd_runs import record_crowd_run
-from zfcal.model.kernels.flock_runs import record_flock_run
+from zfcal.model.kernels.run import record_run
 from zfcal.model.packing import pack
 from zfcal.model.simulate import (
     burn_in_steps,
@@ -53,7 +53,7 @@ def recorded(model, arena, *, n_agents, n_steps):
     """Record the run of ``SEED`` and return it as samples."""
     packed, people, tank = pack([model], arena), individuals(n_agents, 0), tank_of(arena)
     rest = (SEED, people, burn_in_steps(model.dt_s), n_steps, packed, tank)
-    record = record_crowd_run(*rest) if is_crowd(n_agents, packed) else record_flock_run(*rest)
+    record = record_crowd_run(*rest) if is_crowd(n_agents, packed) else record_run(*rest, 0)
     return Samples(
         dt_s=model.dt_s,
         k=np.arange(n_steps, dtype=np.int64),

@@ -14,7 +14,6 @@ from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.geometry import Tank
 from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
-from zfcal.model.kernels.flock_runs import count_flock_runs
 from zfcal.model.kernels.run import Counts, count_runs, record_run
 from zfcal.model.kernels.world import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
@@ -42,9 +41,6 @@ MOST_IN_FULL = 32
 
 _JOB_STEPS = 20_000
 """Agent-steps in a piece of work: some milliseconds, much more than a call costs."""
-
-_MOST_ABREAST = 160
-"""Agents of a piece of work abreast: more leave the first caches, fewer wait for one another."""
 
 
 def tank_of(arena: Arena) -> Tank:
@@ -108,30 +104,19 @@ def simulate_counts(
     counts = empty_counts(len(packed.zones), len(seeds), len(arena.zones))
     sizes = (n_agents, counted, burn_in_steps(packed.dt_s), n_steps)
     jobs = len(packed.zones) * len(seeds)
-    words = np.array(seeds, dtype=np.uint64)
-    people = individuals(n_agents, n_robots)
-    threads = n_threads or os.cpu_count() or 1
     # Pieces of some milliseconds, so that the last one is short on every core.
     per_piece = max(1, _JOB_STEPS // (n_agents * (n_steps + sizes[2])))
-    run = count_runs
-    if is_crowd(n_agents, packed):
-        run = count_crowd_runs
-    elif packed.effects.shape[1] == 0:
-        run, per_piece = count_flock_runs, _abreast(jobs, n_agents, threads)
+    words = np.array(seeds, dtype=np.uint64)
+    people = individuals(n_agents, n_robots)
+
+    run = count_crowd_runs if is_crowd(n_agents, packed) else count_runs
 
     def work(first: int) -> None:
         run(first, min(first + per_piece, jobs), words, sizes, people, packed, tank, counts)
 
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
         list(pool.map(work, range(0, jobs, per_piece)))
     return counts
-
-
-def _abreast(jobs: int, n_agents: int, threads: int) -> int:
-    """Return how many simulations go abreast: as many as fit, and alike for each thread."""
-    most = max(1, _MOST_ABREAST // n_agents)
-    rounds = -(-jobs // (most * threads))
-    return -(-jobs // (rounds * threads))
 
 
 def is_crowd(n_agents: int, packed: Packed) -> bool:

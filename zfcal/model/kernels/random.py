@@ -70,19 +70,6 @@ def uniform(state: State) -> float:
 
 
 @inlined
-def word_at(key: np.uint64, count: int) -> np.uint64:
-    """Return 64 random bits for a key and a count: SplitMix64, entered anywhere.
-
-    Source: Steele, Lea and Flood 2014, Fast splittable pseudorandom number
-    generators, OOPSLA. Its state is a count, so that no order is kept.
-    """
-    word = key + np.uint64(count) * _GOLDEN
-    word = (word ^ (word >> np.uint64(30))) * _MIX_1
-    word = (word ^ (word >> np.uint64(27))) * _MIX_2
-    return word ^ (word >> np.uint64(31))
-
-
-@inlined
 def sine(t: float) -> float:
     """Return the sine for t in [-pi/2, pi/2] by its series to the 17th power, error < 1e-12."""
     s = t * t
