@@ -16,7 +16,7 @@ from zfcal.model.extended import (
     with_effect,
 )
 from zfcal.model.geometry import zone_of
-from zfcal.model.kernels.extended import mixture_score
+from zfcal.model.kernels.extended import factor_score, mixture_score
 from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
@@ -101,3 +101,16 @@ def test_landing_zones_are_those_of_every_place_on_the_circle(few, tank):
             zone = zone_of(x, y, made)
             share[p // per, zone - 1] += zone > 0
         np.testing.assert_array_equal(turns.share[s], share)
+
+
+def test_the_score_of_a_factor_has_no_bias_of_the_size_of_its_probe():
+    """At a probe of a hundredth: the slope at zero, not that of a step whose variance counts."""
+    rng = np.random.default_rng(4)
+    probability = rng.dirichlet(np.ones(16), size=50)
+    slope, taken = rng.standard_normal((50, 16)), rng.standard_normal(50)
+    score, probe = np.empty(50), 0.01
+    factor_score(np.exp(probe * slope), np.exp(probe * taken), probability, score)
+    exact = taken - (probability * slope).sum(axis=1)
+    np.testing.assert_allclose(score / probe, exact, atol=0.001)
+    # What a difference of logarithms would be off by.
+    assert 0.5 * probe * np.var(slope) > 0.004

@@ -56,16 +56,21 @@ def test_a_change_to_other_effects_or_another_step_is_refused(model, two_rooms):
 
 
 def test_fish_keep_near_a_robot_that_they_attend_to(model, two_rooms):
-    """A robot that stands still holds the fish that take it for one of them."""
+    """A robot that stands still holds a fish that takes it for one of its own.
+
+    Twenty minutes of one fish, six times: within 5 cm of it for 9 to 18 % of the time; for
+    less than 1 % where the robot has lost all but e^-5 of the attention.
+    """
     place = np.array([[0.225, 0.775, 0.0]])
-    away = {}
+    near = {}
     for wariness in (0.0, 5.0):
         effects = {"robot-avoidance": {"strength": wariness, "flight": 0.0}}
         wary = dataclasses.replace(model, effects=effects)
         shoal = Shoal(wary, two_rooms, n_fish=1, n_robots=1, seed=3)
         places = swum(shoal, 6000, place)[:, 0]
-        away[wariness] = np.median(np.hypot(*(places - place[0, :2]).T))
-    assert away[0.0] < 0.8 * away[5.0], away
+        near[wariness] = np.mean(np.hypot(*(places - place[0, :2]).T) < 0.05)
+    assert near[0.0] > 0.05, near
+    assert near[5.0] < 0.02, near
 
 
 def test_a_robot_that_is_not_there_is_not_seen(model, two_rooms):

@@ -160,7 +160,10 @@ def read_parquet(path: Path, hint: str) -> pa.Table:
     try:
         with path.open("rb") as file:
             # Not read_table: it loads pyarrow.dataset and with it pandas, a fifth of a second.
-            return pq.ParquetFile(file, page_checksum_verification=True).read()
+            whole = pq.ParquetFile(file, page_checksum_verification=True)
+            # Threads of pyarrow that read a Python file abort a process now and then as it ends
+            # (apache/arrow issues 34314 and 50482).
+            return whole.read(use_threads=False)
     except (pa.ArrowException, OSError, ValueError, KeyError, NotImplementedError) as error:
         raise DamagedError(f"{path}: is damaged ({first_line(error)}).", hint=hint) from error
 

@@ -500,9 +500,11 @@ def factor_score(tilt: Floats, tilt_taken: Floats, probability: Floats, score: F
     ----------
     tilt : ndarray, shape (step, cell)
     tilt_taken, score : ndarray, shape (step,)
+        The logarithm of the factor at the heading taken, less its mean over headings.
     """
     for s in range(tilt.shape[0]):
-        mean = 0.0
+        mean, taken = 0.0, max(tilt_taken[s], 1e-300)
         for g in range(tilt.shape[1]):
-            mean += probability[s, g] * tilt[s, g]
-        score[s] = math.log(max(tilt_taken[s], 1e-300)) - math.log(max(mean, 1e-300))
+            # The logarithm of a ratio near one, to the third order.
+            mean += probability[s, g] * (tilt[s, g] - taken) / (tilt[s, g] + taken)
+        score[s] = -2.0 * mean
