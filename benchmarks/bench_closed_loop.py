@@ -1,6 +1,6 @@
 """Repeat the published experiment virtually: closed-loop trials, and the same without calibration.
 
-Makes ``closed-loop.json`` and ``benchmarks-closed-loop.md``: in ``build/benchmarks``, with
+Makes ``closed_loop.json`` and ``benchmarks-closed-loop.md``: in ``build/benchmarks``, with
 ``--write`` in ``benchmarks/results`` and ``docs``. Trials that are done stay in
 ``build/closed-loop`` and are not run again.
 
@@ -122,7 +122,7 @@ def markdown(found: dict[str, Any]) -> str:
     minutes, n = trials[0]["minutes"], len({t["seed"] for t in trials})
     how = "drawn and tracked" if trials[0]["video"] else "tracks with noise, no images"
     said = f"""Made by `benchmarks/bench_closed_loop.py`; numbers in
-        `benchmarks/results/closed-loop.json`. Machine: {found["machine"]}. {n} virtual trials
+        `benchmarks/results/closed_loop.json`. Machine: {found["machine"]}. {n} virtual trials
         of {minutes} min for each robot ({how}), four fish whose parameters differ from trial
         to trial and drift ([closed-loop.md](closed-loop.md)); seeds on which nothing
         was tuned; 30 generations a round."""
@@ -210,7 +210,7 @@ def main() -> None:
     if options.tiny:
         options.trials, options.minutes, options.kinds = 1, 3, "fixed"
     found = measure_all(options)
-    conclude("closed-loop", found, markdown(found), ratios=ratios, options=options)
+    conclude("closed_loop", found, markdown(found), ratios=ratios, options=options)
 
 
 if __name__ == "__main__":

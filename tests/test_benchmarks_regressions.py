@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-COMMITTED = ("calibration", "cluster", "growth", "long", "main_job", "optimisers", "roofline",
-             "rounds", "tracking")  # fmt: skip
+COMMITTED = ("calibration", "closed_loop", "cluster", "drive", "growth", "long", "main_job",
+             "optimisers", "roofline", "rounds", "tracking")  # fmt: skip
 
 SCRIPTS = (*(f"bench_{name}" for name in COMMITTED), "growth_document", "measuring", "naive",
            "optimisers", "optimisers_document", "regressions", "rounds_document",

@@ -44,7 +44,7 @@ def test_a_short_recording_has_four_blocks(screen):
 )
 def test_an_effect_that_is_not_there_is_not_confirmed(screen, candidate, name):
     """Two kinds of strength, and one on speed: what chance gave is not given again."""
-    told = confirm(added(screen(11), candidate(name)))
+    told = confirm(added(screen(12), candidate(name)))
     assert not told.holds
     assert told.gain_nats_per_step < 3 * told.gain_se
 

@@ -70,7 +70,7 @@ def test_freezing_has_its_rate_and_duration(screen, candidate):
 
     Both are known to a tenth, and found within a third.
     """
-    own = screen(61, {"freezing": {"rate_per_s": 0.05, "duration_s": 2.0}})
+    own = screen(62, {"freezing": {"rate_per_s": 0.05, "duration_s": 2.0}})
     found = fit_speed(own, candidate("freezing"), 0.02)
     assert found.values["rate_per_s"] == pytest.approx(0.05, rel=0.33)
     assert found.values["duration_s"] == pytest.approx(2.0, rel=0.33)
