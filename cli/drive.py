@@ -11,6 +11,7 @@ from .options import PLACE, speaks
 from .output import Output
 
 _LETTERS = tuple("ABCDEFGHIJ")
+_DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "force"}
 
 
 @click.command("drive")
@@ -42,6 +43,16 @@ _LETTERS = tuple("ABCDEFGHIJ")
     help="Tick by this computer's clock, or by the times of the poses.",
 )
 @click.option("--duration", "duration_s", type=seconds, metavar="TIME", help="End after so long.")
+@click.option(
+    "--publish",
+    metavar="cats2://HOST[:PORT]",
+    help="Send the parameters to a rig of the older software, which drives by itself.",
+)
+@click.option(
+    "--publish-zones",
+    metavar="ZONE,...",
+    help="For each zone of that rig one of the trial's.  [default: the trial's, in order]",
+)
 @click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
 @click.option("--force", is_flag=True, help="Remove what an earlier drive left.")
 @speaks
@@ -56,6 +67,8 @@ def command(
     radius_mm: float,
     clock: str,
     duration_s: float | None,
+    publish: str | None,
+    publish_zones: str | None,
     replay: bool,
     force: bool,
 ) -> None:
@@ -69,11 +82,17 @@ def command(
     Example:
         zfcal drive trial --port /dev/rfcomm5
         zfcal drive trial --port virtual --pattern pid --duration 30min
+        zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
     """
     if replay:
         _replay(out, trial)
         return
+    if publish is not None:
+        _publish(out, trial, publish, zones=publish_zones, duration_s=duration_s)
+        return
+    if publish_zones is not None:
+        raise click.UsageError("--publish-zones is for --publish.")
     from zfcal.online.drive import DriveOptions, drive
     from zfcal.online.opening import Task
     from zfcal.online.pilot import Manner
@@ -89,14 +108,31 @@ def command(
     out.attempt(lambda: drive(trial, options, out.tell, task=Task(force=force)))
 
 
+def _publish(
+    out: Output, trial: Path, address: str, *, zones: str | None, duration_s: float | None
+) -> None:
+    """Send models to a rig; nothing is driven from here."""
+    from zfcal.online.publish import PublishOptions, publish
+
+    _refuse(_DRIVING, "--publish: the rig drives its robot itself.")
+    chosen = tuple(zone.strip() for zone in zones.split(",")) if zones else ()
+    options = PublishOptions(address=address, zones=chosen, duration_s=duration_s)
+    out.attempt(lambda: publish(trial, options, out.tell))
+
+
 def _replay(out: Output, trial: Path) -> None:
     """Work the log out anew; of all options only those of talking can take effect."""
     from zfcal.online.drive_replay import replay
 
+    idle = {*_DRIVING, "duration_s", "publish", "publish_zones"}
+    _refuse(idle, "--replay: the log says.")
+    out.attempt(lambda: replay(trial, out.tell))
+
+
+def _refuse(idle: set[str], why: str) -> None:
+    """Refuse options that cannot take effect."""
     context = click.get_current_context()
-    idle = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "duration_s", "force"}
     for name in sorted(idle):
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             option = next(each for each in context.command.params if each.name == name)
-            raise click.UsageError(f"{option.opts[0]} cannot be given with --replay: the log says.")
-    out.attempt(lambda: replay(trial, out.tell))
+            raise click.UsageError(f"{option.opts[0]} cannot be given with {why}")

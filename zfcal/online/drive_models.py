@@ -92,6 +92,7 @@ class DriveModels:
             name=path.relative_to(opened.trial.root).as_posix(),
             sha256=hashlib.sha256(data).hexdigest(),
             text=data.decode(errors="replace"),
+            parameters=model,
             packed=packed,
         )
 

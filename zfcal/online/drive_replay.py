@@ -232,4 +232,6 @@ def _model_of(item: dict[str, Any], opened: OpenTrial) -> InForce:
         path.write_bytes(text.encode())
         model = read_model_for(path, opened.arena, dt_s=opened.trial.dt_s)
     packed = pack([model], opened.arena)
-    return InForce(name=item["model"], sha256=item["sha256"], text=text, packed=packed)
+    return InForce(
+        name=item["model"], sha256=item["sha256"], text=text, parameters=model, packed=packed
+    )

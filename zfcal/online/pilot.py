@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from zfcal.model.among import Among, Move
 from zfcal.model.kernels.world import Packed
 from zfcal.online.opening import OpenTrial
+from zfcal.parameters import Parameters
 from zfcal.robot.aseba import Frame
 from zfcal.robot.body import RADIUS_M, Pose, Wheels, wheels_for
 from zfcal.robot.confines import Confines
@@ -74,13 +75,16 @@ class InForce:
         Of that file.
     text
         The file itself.
-    packed
+    parameters
         The model.
+    packed
+        The same, as it is stepped.
     """
 
     name: str
     sha256: str
     text: str
+    parameters: Parameters
     packed: Packed
 
 
