@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from zfcal.errors import InputError
 from zfcal.robot.body import Pose, check_wheels, roll
+from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import FishPattern, Gains, Goal, Kicks, PidPattern, Steering, pattern_of
+from zfcal.robot.simulated import SimulatedFishBot, Traits
 
 HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 PLACES = st.builds(Goal, x_m=st.floats(-1, 1), y_m=st.floats(-1, 1), speed_m_s=st.floats(0, 0.2))
@@ -111,6 +113,57 @@ def test_fish_swim_as_fast_as_the_model_on_the_average(asked):
         seconds=30,
     )
     assert speeds.mean() == pytest.approx(asked, rel=0.1)
+
+
+def wander(pattern, line, *, asked, turn_rad, seconds=60):
+    """Let a simulated robot follow a model whose steps of 0.2 s turn a lot; return its speed."""
+    rng = np.random.default_rng(3)
+    driver, robot = FishBot("F", line), SimulatedFishBot(Traits(), HERE)
+    for k in range(round(10 * seconds)):
+        robot.advance(k / 10)
+        if k % 2 == 0:
+            at, angle = robot.pose, robot.pose.heading_rad + turn_rad * rng.standard_normal()
+            goal = Goal(
+                x_m=at.x_m + 0.2 * asked * math.cos(angle),
+                y_m=at.y_m + 0.2 * asked * math.sin(angle),
+                speed_m_s=asked,
+            )
+        robot.receive(driver.frame_for(pattern.command(robot.pose, goal, k / 10)).encode())
+    return robot.way_m / seconds
+
+
+@pytest.mark.parametrize("asked", [0.06, 0.085])
+def test_steps_that_turn_as_fish_do_cost_no_speed(line, asked):
+    """Seventy degrees on the average, every 0.2 s: it still goes as far as it is asked.
+
+    A robot that stood still to face each target came to half of that.
+    """
+    assert wander(FishPattern(), line, asked=asked, turn_rad=1.5) == pytest.approx(asked, rel=0.15)
+    slow = wander(FishPattern(kicks=Kicks(face_rad=0.5)), line, asked=asked, turn_rad=1.5)
+    assert slow < 0.8 * asked
+
+
+def test_a_kick_begins_when_the_target_is_faced():
+    """Its first speed is a kick's, however long the robot had to turn for it."""
+    _, speeds = swim(FishPattern(), lambda _: Goal(x_m=-0.5, y_m=0.0, speed_m_s=0.1), seconds=2)
+    moving = np.flatnonzero(speeds > 0)
+    assert moving[0] > 0
+    assert 0.14 <= speeds[moving[0]] <= 0.19
+
+
+def test_a_leap_of_the_tracker_is_not_taken_for_speed():
+    """A robot that is suddenly seen a metre farther on kicks as often as before."""
+    calm, leapt = FishPattern(), FishPattern()
+    kicks = {calm: 0, leapt: 0}
+    for pattern, leap_m in ((calm, 0.0), (leapt, 1.0)):
+        speed = 0.0
+        for k in range(100):
+            x_m = 0.08 * k / 10 + (leap_m if k > 50 else 0.0)
+            goal = Goal(x_m=x_m + 0.02, y_m=0.0, speed_m_s=0.1)
+            wheels = pattern.command(Pose(x_m=x_m, y_m=0.0, heading_rad=0.0), goal, k / 10)
+            kicks[pattern] += wheels.speed_m_s > speed + 0.02
+            speed = wheels.speed_m_s
+    assert abs(kicks[calm] - kicks[leapt]) <= 1
 
 
 def test_a_fish_faces_what_is_behind_it_first():
