@@ -26,7 +26,7 @@ from zfcal.robot.body import RADIUS_M, Pose
 from zfcal.robot.confines import Confines
 from zfcal.robot.simulated import STEP_S, SimulatedFishBot, Traits
 
-_PATIENCE_S = 5.0
+_PATIENCE_S = 60.0
 """How long an advance waits for the events that are to come before it."""
 
 _HEARD = 100_000

@@ -14,7 +14,8 @@ from typing import Any, Self, final
 
 from zfcal.errors import InputError
 
-_PATIENCE_S = 20.0
+_PATIENCE_S = 300.0
+"""One that has ended is noticed at once; one that is merely slow, on a busy computer, is waited for."""
 
 
 @final
