@@ -5,7 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.diagnose.naming import Refit, by_sample, choose, free_of, refit, with_traits
+from zfcal.diagnose.naming import (
+    Choice,
+    Refit,
+    by_sample,
+    choose,
+    free_of,
+    refit,
+    ties_of,
+    with_traits,
+)
 from zfcal.model.kernels.world import TRAIT
 from zfcal.model.simulate import individuals
 
@@ -84,6 +93,20 @@ def test_what_cannot_be_told_apart_is_a_tie(suspect, standing):
     assert choice.ties == (other,)
 
 
+@pytest.mark.parametrize(
+    ("beside", "ties"), [(0.24, ()), (0.05, ("boldness",)), (None, ("boldness",))],
+    ids=["worth as much", "a remnant", "not chosen"],
+)  # fmt: skip
+def test_what_is_chosen_as_well_is_no_other_name(suspect, beside, ties):
+    """Two that are both there tie at first, since each stands beside the other."""
+    best, other = suspect("rear-blind-zone", 0.26, scatter=0.5), suspect("boldness", 0.25)
+    first = choose([best, other], stands("rear-blind-zone", "boldness"))
+    assert first.ties == (other,)
+    later = [] if beside is None else [suspect("boldness", beside)]
+    choices = [Choice(best=each, ties=(), considered=()) for each in later]
+    assert ties_of(first, choices) == ties
+
+
 def test_one_suspect_is_itself(suspect):
     """There is nothing to tell it from."""
     only = suspect("freezing", 0.1)
@@ -116,6 +139,21 @@ def test_a_refit_finds_the_strength_again(screen, candidate):
     assert made.gain.sum() == pytest.approx(made.screen.fitted.nats - own.fitted.nats, abs=1e-6)
     assert made.nats > 50
     assert abs(made.screen.ask(candidate("turning-bias")).z) < 0.5
+
+
+def test_a_strength_errs_by_what_its_interval_says(screen, candidate):
+    """Biases of 0.4 in eight recordings, in their standard errors: without bias, and spread by one.
+
+    Both within what chance does once in a hundred times.
+    """
+    errors = []
+    for seed in range(60, 68):
+        own = screen(seed, {"turning-bias": {"strength": 0.4}}, minutes=3.0)
+        made = refit(own, own.ask(candidate("turning-bias")))
+        low, high = made.interval["strength"]
+        errors.append((made.values["strength"] - 0.4) / ((high - low) / 2 / 1.96))
+    assert abs(np.mean(errors)) < 2.6 / math.sqrt(8)
+    assert 1.6 < np.sum(np.square(errors)) < 20.1
 
 
 def test_a_refit_without_an_effect_gains_little(screen, candidate):

@@ -16,6 +16,7 @@ from scipy import stats
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.screening import Score, Screen
 from zfcal.diagnose.selection import Step
+from zfcal.diagnose.speeds import held_out_gain
 from zfcal.model.effects.generic import PREFIX
 from zfcal.model.extended import MIN_STEPS, Fitted, maximise
 from zfcal.model.scene import Moves, Scene, thin
@@ -83,11 +84,18 @@ def confirm(step: Step) -> Confirmed:
 def _gained(step: Step) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
-        return _in_time(best.gain, len(best.screen.scene.moves))
+        return _of_speeds(step)
     before = _held_out(step.before.scene, step.before.fitted)
     after = _held_out(best.screen.scene, best.screen.fitted)
-    gain = after - before
-    gain = gain[~np.isnan(gain)]
+    return _summary(after - before)
+
+
+def _of_speeds(step: Step) -> Confirmed:
+    best, scene = step.best.score, step.before.scene
+    gain = np.empty(len(scene.moves))
+    for which in (0, 1):
+        own = half_of(scene, scene.moves, which)
+        gain[own] = held_out_gain(step.before, best.candidate, best.strength, ~own)[own]
     return _summary(gain)
 
 
@@ -140,16 +148,9 @@ def _held_out(scene: Scene, fitted: Fitted) -> Floats:
 
 
 def _summary(gain: Floats) -> Confirmed:
+    gain = gain[~np.isnan(gain)]
     n = max(len(gain), 1)
     mean, error = float(gain.sum() / n), float(gain.std() / np.sqrt(n))
-    return Confirmed(gain_nats_per_step=mean, gain_se=error, holds=mean > _SURE * error)
-
-
-def _in_time(gain: Floats, n_steps: int) -> Confirmed:
-    """Return the gain of an effect on speed, whose one strength was fitted to all steps."""
-    n = max(n_steps, 1)
-    mean = float(gain.sum() - 1.0) / n
-    error = float(gain.std() * np.sqrt(len(gain))) / n
     return Confirmed(gain_nats_per_step=mean, gain_se=error, holds=mean > _SURE * error)
 
 

@@ -25,6 +25,7 @@ from zfcal.diagnose.findings import (
 )
 from zfcal.diagnose.heldout import own_speeds
 from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
+from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.null import (
     Chain,
     Measurement,
@@ -168,7 +169,10 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 
 
 def _is_suspicious(question: Question, omnibus: Omnibus) -> bool:
-    """Tell whether model and data disagree at all; noise does, for the theory alone."""
+    """Tell whether model and data disagree at all; noise does, for the theory alone.
+
+    A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
+    """
     sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
     return (not question.quick or sharp) and omnibus.p < _UNEXPLAINED
 
@@ -307,7 +311,10 @@ def _diagnosis(
     at_large: tuple[tuple[Located, ...], Omnibus],
 ) -> Diagnosis:
     (steps, confirmed), (where, omnibus) = kept, at_large
-    effects = tuple(_effect(step, held) for step, held in zip(steps, confirmed, strict=False))
+    effects = tuple(
+        _effect(step, held, ties_of(step.choice, [each.choice for each in steps[number:]]))
+        for number, (step, held) in enumerate(zip(steps, confirmed, strict=False), start=1)
+    )
     # What is there at times is something, though nothing that is listed.
     wavers = any(told.holds and not told.steady for told in confirmed)
     final = steps[-1].choice.best.screen if steps else case.screen
@@ -327,7 +334,7 @@ def _diagnosis(
     )
 
 
-def _effect(step: Step, held: Confirmed) -> EffectFound:
+def _effect(step: Step, held: Confirmed, ties: tuple[str, ...]) -> EffectFound:
     best = step.choice.best
     return EffectFound(
         name=best.name,
@@ -337,7 +344,7 @@ def _effect(step: Step, held: Confirmed) -> EffectFound:
         gain_nats_per_step=held.gain_nats_per_step,
         gain_se=held.gain_se,
         p=step.best.p,
-        ties=tuple(tie.name for tie in step.choice.ties),
+        ties=ties,
         trace=trace(step.best.score, step.before, best),
     )
 

@@ -32,6 +32,9 @@ _SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _SURE = 2.0
 """Standard errors by which one suspect must beat another."""
 
+_OWN_SHARE = 0.5
+"""Of what a suspect gains alone, it gains so much beside another if both are there."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Refit:
@@ -235,3 +238,22 @@ def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]
             continue
         ties.append(other)
     return Choice(best=best, ties=tuple(ties), considered=tuple(order))
+
+
+def ties_of(choice: Choice, later: Sequence[Choice]) -> tuple[str, ...]:
+    """Return the names of those that cannot be told from a chosen suspect.
+
+    One that was chosen later, with the first one in the model, and still gains what it is worth
+    is no other name for it: both are there.
+
+    Parameters
+    ----------
+    choice
+        What was chosen.
+    later
+        What was chosen after it.
+    """
+    beside = {each.best.name: each.best.nats for each in later}
+    return tuple(
+        tie.name for tie in choice.ties if beside.get(tie.name, 0.0) < _OWN_SHARE * tie.nats
+    )

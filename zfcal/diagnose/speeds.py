@@ -2,11 +2,13 @@
 
 Speeds are measured, not modelled: each zone has its own law. An effect multiplies the
 draw by a factor, so the likelihood is that of the draws with the factor divided out,
+as far as it differs between draws,
 
     log f(v | c) = log f0(v / factor) - log factor
 
 where f0 is a histogram of the zone with the weight of a few draws spread over its bins,
-taken from those very draws. Freezing is a chain of two states instead.
+taken from those very draws. Freezing is a chain of two states instead: see
+`zfcal.diagnose.rests`.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.rests import ChainFit, Runs, fit_chain, runs_of
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import bounds_of, without_effects
 from zfcal.model.packing import pack
@@ -27,9 +30,13 @@ from zfcal.parameters import Parameters
 Floats = NDArray[np.float64]
 
 _BINS = 20
+_SPARE, _MOST_BINS = 2, 200
+"""Bins beyond the fastest speed: draws without a factor may be faster than any speed."""
+
 _SMOOTH = 0.5
 _DIFFERENCE = 1e-3
-_STEPS = 2
+_RAREST = 1e-6
+"""Chance per step below which fish never stop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,7 +58,12 @@ class SpeedFit:
     gain: Floats
 
 
-def log_density(speed: Floats, factor: Floats, zone: NDArray[np.int64]) -> Floats:
+def log_density(
+    speed: Floats,
+    factor: Floats,
+    zone: NDArray[np.int64],
+    learnt: NDArray[np.bool_] | None = None,
+) -> Floats:
     """Return the log density of speeds, each zone's law taken from the same draws.
 
     Parameters
@@ -59,32 +71,52 @@ def log_density(speed: Floats, factor: Floats, zone: NDArray[np.int64]) -> Float
     speed, factor : ndarray, shape (step,)
         In m/s, and the effects' factor on the draw.
     zone : ndarray of int64, shape (step,)
+    learnt : ndarray of bool, shape (step,)
+        Draws that the laws are taken from; all by default.
 
     Returns
     -------
     ndarray, shape (step,)
         In nats, per m/s.
     """
-    own = speed / factor
-    log_p = np.empty_like(own)
+    known = np.ones(len(speed), dtype=bool) if learnt is None else learnt
+    log_p = np.empty_like(speed)
     for number in np.unique(zone):
         rows = zone == number
-        log_p[rows] = _smooth_log_density(own[rows])
-    return log_p - np.log(factor)
+        log_p[rows] = _in_zone(speed[rows], factor[rows], known[rows])
+    return log_p
 
 
-def _smooth_log_density(draws: Floats) -> Floats:
-    """Return the log of a frequency polygon over equal shares of the draws' range."""
-    top = float(np.quantile(draws, 0.999)) * 1.02 + 1e-9
-    place = np.minimum(draws / top, 1.0 - 1e-12) * _BINS - 0.5
+def _in_zone(speed: Floats, factor: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Return the log density of one zone's speeds, its law that of the known draws.
+
+    A factor on all of them alike says nothing. The bins are those of the speeds, whatever
+    the factors: bins that move along fit steps of the law better or worse, and that
+    would pose as an effect.
+    """
+    if not known.any():
+        known = np.ones_like(known)
+    relative = factor / np.exp(np.log(factor[known]).mean())
+    own = speed / relative
+    width = _end(speed[known]) / _BINS
+    n_bins = int(np.clip(np.ceil(_end(own[known]) / width), _BINS + _SPARE, _MOST_BINS))
+    return _polygon(own / width, known, n_bins) - np.log(width * relative)
+
+
+def _end(draws: Floats) -> float:
+    return max(float(np.quantile(draws, 0.999)) * 1.02, 1e-9)
+
+
+def _polygon(place: Floats, known: NDArray[np.bool_], n_bins: int) -> Floats:
+    """Return the log of a frequency polygon over bins of width one."""
+    place = np.minimum(place, n_bins * (1.0 - 1e-12)) - 0.5
     low = np.floor(place).astype(np.int64)
     share = place - low
-    counts = np.zeros(_BINS)
-    np.add.at(counts, np.clip(low, 0, _BINS - 1), 1 - share)
-    np.add.at(counts, np.clip(low + 1, 0, _BINS - 1), share)
-    density = (counts + _SMOOTH) / (len(draws) + _BINS * _SMOOTH) * _BINS / top
-    at = (1 - share) * density[np.clip(low, 0, _BINS - 1)]
-    return np.asarray(np.log(at + share * density[np.clip(low + 1, 0, _BINS - 1)]))
+    below, above = np.clip(low, 0, n_bins - 1), np.clip(low + 1, 0, n_bins - 1)
+    counts = np.bincount(below[known], weights=1 - share[known], minlength=n_bins)
+    counts += np.bincount(above[known], weights=share[known], minlength=n_bins)
+    density = (counts + _SMOOTH) / (known.sum() + n_bins * _SMOOTH)
+    return np.asarray(np.log((1 - share) * density[below] + share * density[above]))
 
 
 def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
@@ -101,34 +133,75 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     """
     if candidate.effect.stops:
         return _fit_stops(screen, candidate)
-    moves = screen.scene.moves
-    before = screen.model_factor
-    without = log_density(moves.speed_m_s, before, moves.zone)
+    all_ = np.ones(len(screen.scene.moves), dtype=bool)
+    likelihood = _Likelihood(screen=screen, candidate=candidate, learnt=all_)
     low, high = bounds_of(candidate.name, candidate.effect.strength)
-
-    def log_p(strength: float) -> Floats:
-        model = _alone(screen, candidate.values(strength))
-        factor = screen.speed_factor(pack([model(candidate.name)], screen.scene.arena))
-        return log_density(moves.speed_m_s, before * factor, moves.zone)
-
-    reach = max(3 * abs(start), 0.02 * (high - low))
-    found = optimize.minimize_scalar(
-        lambda strength: -float(log_p(strength).sum()),
-        bounds=(max(low, -reach), min(high, reach)),
-        method="bounded",
-        options={"xatol": 1e-3 * reach, "maxiter": 25},
-    )
-    best = float(found.x)
+    best = likelihood.maximum(start)
     by = max(0.05 * abs(best), 1e-3 * (high - low))
     middle = float(np.clip(best, low + by, high - by))
-    here, up, down = (float(log_p(middle + d * by).sum()) for d in (0, 1, -1))
+    here, up, down = (float(likelihood.log_p(middle + d * by).sum()) for d in (0, 1, -1))
     curvature = (2 * here - up - down) / by**2
     half = 1.96 / math.sqrt(curvature) if curvature > 0 else math.inf
     return SpeedFit(
         values=candidate.values(best),
         interval=(max(low, best - half), min(high, best + half)),
-        gain=log_p(best) - without,
+        gain=likelihood.log_p(best) - likelihood.without(),
     )
+
+
+def held_out_gain(
+    screen: Screen, candidate: Candidate, start: float, learnt: NDArray[np.bool_]
+) -> Floats:
+    """Return what an effect on speed adds to each step when it is fitted to some of them.
+
+    Parameters
+    ----------
+    screen
+        The model that it is added to.
+    candidate
+        The effect, at a shape.
+    start
+        A strength to start from.
+    learnt : ndarray of bool, shape (move,)
+        Steps that the strength and the laws of the zones are taken from.
+    """
+    if candidate.effect.stops:
+        runs = runs_of(screen)
+        found = _chain_of(runs, learnt, candidate, screen.scene.dt_s)
+        return runs.log_chance(found.chain) - runs.log_chance(found.alike)
+    likelihood = _Likelihood(screen=screen, candidate=candidate, learnt=learnt)
+    return likelihood.log_p(likelihood.maximum(start)) - likelihood.without()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Likelihood:
+    """Log densities of a recording's speeds by the strength of an effect."""
+
+    screen: Screen
+    candidate: Candidate
+    learnt: NDArray[np.bool_]
+
+    def without(self) -> Floats:
+        moves = self.screen.scene.moves
+        return log_density(moves.speed_m_s, self.screen.model_factor, moves.zone, self.learnt)
+
+    def log_p(self, strength: float) -> Floats:
+        screen, moves = self.screen, self.screen.scene.moves
+        model = _alone(screen, self.candidate.values(strength))
+        factor = screen.speed_factor(pack([model(self.candidate.name)], screen.scene.arena))
+        return log_density(moves.speed_m_s, screen.model_factor * factor, moves.zone, self.learnt)
+
+    def maximum(self, start: float) -> float:
+        """Return the strength that is most likely on the steps that are learnt from."""
+        low, high = bounds_of(self.candidate.name, self.candidate.effect.strength)
+        reach = max(3 * abs(start), 0.02 * (high - low))
+        found = optimize.minimize_scalar(
+            lambda strength: -float(self.log_p(strength)[self.learnt].sum()),
+            bounds=(max(low, -reach), min(high, reach)),
+            method="bounded",
+            options={"xatol": 1e-3 * reach, "maxiter": 25},
+        )
+        return float(found.x)
 
 
 class _alone:  # noqa: N801 - a function of two steps
@@ -143,51 +216,27 @@ class _alone:  # noqa: N801 - a function of two steps
 
 
 def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
-    """Return the chain of moving and staying that fits best; beside it draws by zone alone.
-
-    Its chance of staying differs after one step at rest, which may be a short draw, and after
-    two, which hardly are.
-    """
-    now, before = screen.still
-    zone, dt_s = screen.scene.moves.zone, screen.scene.dt_s
-    gain = np.zeros(len(now))
-    stays = float(now[before].mean()) if before.any() else 0.0
-    twice = screen.still_for(2)
-    again = float(now[twice].mean()) if twice.any() else stays
-    once = before & ~twice
-    once_more = float(now[once].mean()) if once.any() else stays
-    for number in np.unique(zone):
-        rows = zone == number
-        alike = np.clip(now[rows].mean(), 1e-6, 1 - 1e-6)
-        moving = rows & ~before
-        stopping = np.clip(now[moving].mean() if moving.any() else alike, 1e-6, 1 - 1e-6)
-        chance = np.where(before[rows], np.where(twice[rows], again, once_more), stopping)
-        chance = np.clip(chance, 1e-6, 1 - 1e-6)
-        gain[rows] = np.where(now[rows], np.log(chance / alike), np.log((1 - chance) / (1 - alike)))
-    # What stays without the effect: the share of draws too short to be told from none.
-    short = float(now[~before].mean()) if (~before).any() else 0.0
-    # One draw that is short is no rest: how long rests last shows in those of two steps.
-    held = float(np.clip((again - short) / max(1 - short, 1e-9), 1e-6, 0.999))
-    duration_s = -dt_s / math.log(held)
-    entries = _entries(now, before, screen)
-    rate = entries / max(float((~before).sum()) * dt_s, 1e-9)
-    (_, longest) = bounds_of(candidate.name, "duration_s")
-    half = 1.96 * rate / math.sqrt(max(entries, 1.0))
+    """Return the chain of swimming and resting that fits best; beside it draws by zone alone."""
+    runs, dt_s = runs_of(screen), screen.scene.dt_s
+    found = _chain_of(runs, np.ones(len(runs.now), dtype=bool), candidate, dt_s)
+    chain, (error, _) = found.chain, found.errors
+    rate = -math.log1p(-chain.begins) / dt_s
+    # The error of a logit is that of a log, but for what is left of the chance.
+    times = math.exp(min(1.96 * error * (1 - chain.begins), 700.0))
+    low, high = bounds_of(candidate.name, candidate.effect.strength)
     return SpeedFit(
-        values=candidate.values(rate) | {"duration_s": float(np.clip(duration_s, 0.1, longest))},
-        interval=(max(0.0, rate - half), rate + half),
-        gain=gain,
+        values=candidate.values(rate) | {"duration_s": -dt_s / math.log(chain.stays)},
+        interval=(max(low, rate / times), min(high, rate * times)),
+        gain=runs.log_chance(chain) - runs.log_chance(found.alike),
     )
 
 
-def _entries(now: NDArray[np.bool_], before: NDArray[np.bool_], screen: Screen) -> float:
-    """Return how many rests of two steps or more began, beyond those by short draws alone."""
-    moves = screen.scene.moves
-    order = np.lexsort((moves.at, moves.who))
-    starts = now[order] & ~before[order]
-    goes_on = np.zeros(len(order), dtype=bool)
-    next_one = (np.diff(moves.at[order]) == 1) & (np.diff(moves.who[order]) == 0)
-    goes_on[:-1] = next_one & now[order][1:]
-    long = float((starts & goes_on).sum())
-    short = float(now[~before].mean()) if (~before).any() else 0.0
-    return max(0.0, long - short * float(starts.sum()))
+def _chain_of(runs: Runs, rows: NDArray[np.bool_], candidate: Candidate, dt_s: float) -> ChainFit:
+    """Return the chain that fits some of a recording's moves, within the effect's bounds."""
+    (_, most), (least_s, most_s) = (
+        bounds_of(candidate.name, key) for key in (candidate.effect.strength, "duration_s")
+    )
+    begins = (_RAREST, 1 - math.exp(-most * dt_s))
+    return fit_chain(
+        runs.counts(rows), (begins, (math.exp(-dt_s / least_s), math.exp(-dt_s / most_s)))
+    )
