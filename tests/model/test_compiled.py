@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from zfcal.model import compiled
@@ -18,6 +19,16 @@ from zfcal.model import compiled
 from zfcal.model.kernels.random import seeded
 print(compiled.KEPT, compiled.is_warm(), int(seeded(np.uint64(1))[0]), compiled.is_warm())
 """
+
+
+@compiled.kernel
+def _times(number, twice):
+    return 2 * number if twice else number
+
+
+@compiled.kernel
+def _with_constants():
+    return _times(3, True) + _times(4, False) + _times(5, True)
 
 
 def report(tmp_path, **environment):
@@ -123,3 +134,12 @@ def test_where_nothing_can_be_written_kernels_run_all_the_same(tmp_path):
 
     assert (kept, before, after) == ("False", "False", "False")
     assert int(word) == 0x910A2DEC89025CC1  # SplitMix64 of seed 1
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="there are no versions without the compiler")
+def test_a_constant_argument_is_no_version_of_its_own():
+    """Three calls with constants of the same types: one version, for numbers of that type."""
+    _with_constants.recompile()
+
+    assert _with_constants() == 20
+    assert _times.signatures == [(numba.int64, numba.boolean)]

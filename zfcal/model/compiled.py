@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, TypeVar, final
 
 import numba
-from numba import cfunc, njit
+from numba import cfunc, njit, types
 from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -30,6 +30,7 @@ LOGGER = logging.getLogger(__name__)
 
 _config: Any = numba.config
 _Listener: Any = event.Listener
+_type_of: Any = types.unliteral
 
 
 def cache_folder() -> Path | None:
@@ -102,7 +103,7 @@ _register("numba:compile", _announcer)
 def kernel(function: F) -> F:
     """Compile a function by itself."""
     compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy")(function)
-    return compiled
+    return _for_all_values(compiled)
 
 
 def lean(function: F) -> F:
@@ -113,6 +114,24 @@ def lean(function: F) -> F:
     """
     options: dict[str, Any] = {"fastmath": {"contract"}, "_nrt": False}
     compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy", **options)(function)
+    return _for_all_values(compiled)
+
+
+def _for_all_values(compiled: Any) -> Any:
+    """Let kernels that pass a constant take the version for all values of its type.
+
+    Numba compiles a function once more for each constant that another one passes to it,
+    and the step of all agents takes longer to compile than all else.
+    """
+    if _config.DISABLE_JIT:
+        return compiled
+    find = compiled.get_call_template
+
+    def find_for_types(args: Any, named: Any) -> Any:
+        plain = {name: _type_of(arg) for name, arg in named.items()}
+        return find([_type_of(arg) for arg in args], plain)
+
+    compiled.get_call_template = find_for_types
     return compiled
 
 
