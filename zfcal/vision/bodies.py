@@ -53,6 +53,8 @@ class Bodies:
         Amplitude of the tail's direction in the stroke of swimming.
     phase_rad : ndarray, shape (body,)
         Phase of that stroke.
+    contrast : ndarray, shape (body,), optional
+        How much darker than the floor each is, as a share of what a body usually is.
     """
 
     xy_m: Floats
@@ -61,6 +63,7 @@ class Bodies:
     bend_rad: Floats
     wave_rad: Floats
     phase_rad: Floats
+    contrast: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.heading_rad)

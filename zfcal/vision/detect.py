@@ -34,7 +34,7 @@ _SKEW = 0.5
 _CORNER = 0.4
 """What the strongest corner, at the very end, is worth beside it."""
 
-_FULL = 1.15
+FULL = 1.15
 """A pixel that is so much darker than a body in the mean is all body."""
 
 
@@ -64,6 +64,8 @@ class Blob:
         Its pixels, x and y.
     weights : ndarray, shape (pixel,)
         How much of each pixel is body, in (0, 1]: less along the edge.
+    shares : ndarray, shape (pixel,)
+        By how much each pixel is darker than the empty tank, as a share of that.
     darkness
         How much darker than the empty tank its body is, as a share of the tank's grey.
     contour : ndarray of int32, shape (point, 2)
@@ -75,6 +77,7 @@ class Blob:
 
     pixels: Floats
     weights: Floats
+    shares: Floats
     darkness: float
     contour: NDArray[np.int32]
     corners: Floats
@@ -215,7 +218,8 @@ def _blob(view: Contrast, contour: NDArray[np.int32]) -> Blob | None:
     darkness = float(share @ share / share.sum())
     return Blob(
         pixels=np.column_stack([columns[kept] + left, rows[kept] + top]).astype(np.float64),
-        weights=np.minimum(share / (_FULL * darkness), 1.0),
+        weights=np.minimum(share / (FULL * darkness), 1.0),
+        shares=share,
         darkness=darkness,
         contour=contour.reshape(-1, 2),
         corners=np.empty((0, 2)),

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zfcal.vision.detect import Blob, shape_of
-from zfcal.vision.splitting import Pose, by_clusters, by_darkness, fit_bodies
+from zfcal.vision.detect import Blob, Shape, shape_of
+from zfcal.vision.fitting import fit
+from zfcal.vision.splitting import by_clusters, by_darkness
 from zfcal.vision.trail import Detection, Trail
 from zfcal.vision.usual import Body
 
@@ -25,6 +28,9 @@ _DOUBTED = 0.75
 """Share of their areas below which not all animals may be where they are thought to be."""
 
 _MOST = 8
+
+_NEAR_PX = 3
+"""So far around a blob bodies would show, if they were there."""
 
 
 def divide(
@@ -104,33 +110,55 @@ def _parts(
             return
     for part in parts:
         shape = shape_of(blob.pixels[part], blob.weights[part])
-        yield Detection(shape=shape, blob=blob, shared=n)
+        share = blob.shares[part]
+        yield Detection(
+            shape=shape, blob=blob, shared=n, own_darkness=float(share @ share / share.sum())
+        )
 
 
 def _fitted(
     blob: Blob, parts: list[NDArray[np.bool_]], trails: list[Trail], usual: Body, time_s: float
 ) -> Iterator[Detection]:
-    """Yield the bodies of tracks that lie across each other, moved until they cover the blob.
+    """Yield the bodies of tracks that lie across each other, moved until they explain the blob.
 
-    They start from the parts, each turned to the side that its track headed to: a fish may
-    turn by a right angle from one frame to the next.
+    They start from where they are due, and again from the parts, each turned to the side that its
+    track headed to: a fish may turn by a right angle from one frame to the next.
     """
     shapes = [shape_of(blob.pixels[part], blob.weights[part]) for part in parts]
     at = np.array([(shape.x_px, shape.y_px) for shape in shapes])
-    due = np.array([trail.predicted(time_s) for trail in trails])
-    order, own = linear_sum_assignment(((due[:, None] - at[None]) ** 2).sum(axis=2))
-    start = [
-        Pose(
-            x_px=shapes[k].x_px,
-            y_px=shapes[k].y_px,
-            axis_rad=_aligned(shapes[k].axis_rad, trails[t].heading_rad),
+    due = np.array([[*trail.predicted(time_s), trail.heading_rad] for trail in trails])
+    order, own = linear_sum_assignment(((due[:, None, :2] - at[None]) ** 2).sum(axis=2))
+    apart = due.copy()
+    for t, k in zip(order, own, strict=True):
+        apart[t] = *at[k], _aligned(shapes[k].axis_rad, due[t, 2])
+    pixels, shares = _around(blob)
+    builds = [trail.build(usual) for trail in trails]
+    best = min(
+        (fit(pixels, shares, builds, due, start) for start in (due, apart)),
+        key=lambda found: found.cost,
+    )
+    for (x, y, angle, _), trail, build in zip(best.poses, trails, builds, strict=True):
+        shape = Shape(
+            x_px=float(x),
+            y_px=float(y),
+            axis_rad=math.remainder(float(angle), math.tau),
+            head=0.0,
+            length_px=build.length_px,
+            width_px=build.width_px,
+            area_px=trail.own_area_px(usual.area_px),
         )
-        for t, k in zip(order, own, strict=True)
-    ]
-    for _, shape in zip(
-        trails, fit_bodies(blob, [trail.body(usual) for trail in trails], start), strict=True
-    ):
         yield Detection(shape=shape, blob=blob, shared=len(parts))
+
+
+def _around(blob: Blob) -> tuple[Floats, Floats]:
+    """Return the pixels of a blob and those near it, which are as bright as the tank."""
+    left, top = blob.pixels.min(axis=0).astype(int) - _NEAR_PX
+    columns, rows = (blob.pixels - (left, top)).astype(int).T
+    share = np.zeros((rows.max() + 1 + _NEAR_PX, columns.max() + 1 + _NEAR_PX))
+    share[rows, columns] = blob.shares
+    near = cv2.dilate((share > 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8))
+    y, x = np.nonzero(near)
+    return np.column_stack([x + left, y + top]).astype(np.float64), share[y, x]
 
 
 def _aligned(axis_rad: float, heading_rad: float) -> float:

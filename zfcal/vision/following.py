@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from zfcal.vision.assign import Match, assign
 from zfcal.vision.detect import Blob
+from zfcal.vision.identity import Identities
 from zfcal.vision.trail import Detection, Trail
 from zfcal.vision.usual import Bodies
 
@@ -44,6 +46,13 @@ squared, is worth so many squared body lengths."""
 
 _STAY = 0.3
 
+_NEVER, _DOUBT = 1.0, 0.2
+"""Squared body lengths by which an exchange is dearer: from which on there is none, and which
+makes it less likely by e."""
+
+_UNSEEN = 0.05
+"""Chance that two in one blob change places from one frame to the next."""
+
 _SMALL, _FAINT = 0.35, 0.6
 """Shares of the usual area and darkness below which a blob begins no track."""
 
@@ -59,8 +68,11 @@ class Trails:
         How long a track that is not seen keeps its id, in seconds.
     """
 
-    def __init__(self, bodies: Bodies, *, coast_s: float) -> None:
+    def __init__(self, bodies: Bodies, *, coast_s: float, n_agents: int | None = None) -> None:
         self._bodies = bodies
+        self._n_agents = n_agents
+        self._identities = None if n_agents is None else Identities(n_agents)
+        self._mixed: dict[tuple[int, int], float] = {}
         self._coast_s = coast_s
         self._trails: list[Trail] = []
         self._next_id = 0
@@ -95,8 +107,29 @@ class Trails:
                 replace(m, track=int(rows[m.track]), detection=int(columns[m.detection]))
                 for m in assign(cost[np.ix_(rows, columns)], gate[rows] ** 2)
             ]
+        self._mixed = self._crossings(matches, detections, cost)
         self._take(matches, detections, time_s)
         self.forget(time_s)
+
+    def _crossings(
+        self, matches: list[Match], detections: list[Detection], cost: Floats
+    ) -> dict[tuple[int, int], float]:
+        """Return the chances that tracks, by their keys, have just changed places."""
+        mixed = {}
+        for one, other in itertools.combinations(matches, 2):
+            a, b = detections[one.detection], detections[other.detection]
+            dearer = (
+                cost[one.track, other.detection]
+                + cost[other.track, one.detection]
+                - one.cost
+                - other.cost
+            )
+            if dearer < _NEVER:
+                chance = 1 / (1 + math.exp(dearer / _DOUBT))
+                within = _UNSEEN if a.blob is b.blob else 0.0
+                keys = self._trails[one.track].key, self._trails[other.track].key
+                mixed[keys] = min(chance + within, 0.5)
+        return mixed
 
     def _costs(self, detections: list[Detection], time_s: float) -> Floats:
         """Return how far each detection is from where each track should be, and how unlike it.
@@ -112,12 +145,10 @@ class Trails:
         )
         shapes = [d.shape for d in detections]
         to = np.array([[s.x_px, s.y_px, s.axis_rad] for s in shapes])
-        alone = np.array([d.shared == 1 for d in detections])
         away = _apart(at, to) / self._bodies.length_px**2
-        odd = np.maximum(
-            np.abs(np.log(at[:, 3:] / np.array([d.mass for d in detections]))) - _ALIKE, 0.0
-        )
-        away += np.where(alone, _SIZE * odd**2, 0.0)
+        odd = np.abs(np.log(at[:, 3:] / np.array([d.mass for d in detections]))) - _ALIKE
+        # Of those that were not told apart nobody knows how dark each is.
+        away += _SIZE * np.nan_to_num(np.maximum(odd, 0.0)) ** 2
         turn = at[:, None, 2] - to[None, :, 2]
         head = np.array([s.head for s in shapes])
         away += _HEADING * (1 - head * np.cos(turn) - (1 - head) * np.abs(np.cos(turn)))
@@ -139,7 +170,7 @@ class Trails:
     def _extend(self, match: Match, detection: Detection, time_s: float) -> None:
         trail = self._trails[match.track]
         unsure = match.margin < _CERTAIN and (trail.missed > 0 or trail.shared > 1)
-        if unsure and detection.shared == 1:
+        if unsure and detection.shared == 1 and self._identities is None:
             # Who comes out of a crowd is not known: a new id says so.
             trail.agent = self._new_id()
         trail.update(detection, time_s, unsure=unsure)
@@ -172,11 +203,12 @@ class Trails:
             and not (trail.missed and trail.hits < _PROVEN)
         ]
 
-    def told(self, n_agents: int | None) -> list[Trail]:
+    def told(self, time_s: float) -> list[Trail]:
         """Return the tracks seen just now, ascending by id; the likeliest if they are too many.
 
         A new track counts after three frames, or at once in the first frame of all.
         """
+        n_agents = self._n_agents
         seen = [t for t in self._trails if not t.missed and (t.hits >= _PROVEN or t.opening)]
         if n_agents is not None and len(seen) > n_agents:
             # Those told a frame ago stay, unless others are clearly likelier.
@@ -184,6 +216,14 @@ class Trails:
             seen = seen[:n_agents]
         for trail in self._trails:
             trail.is_told = trail in seen
+        if self._identities is not None:
+            names = self._identities.step(seen, self._mixed, time_s)
+            self._mixed = {}
+            for trail in seen:
+                trail.agent = names[trail.key]
+                look = self._identities.look(trail.agent)
+                if look is not None:
+                    trail.wear(look)
         return sorted(seen, key=lambda trail: trail.agent)
 
 

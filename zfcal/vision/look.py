@@ -32,6 +32,8 @@ class Look:
         From snout to tip of the tail fin: mean and spread from fish to fish.
     fish_grey, tail_grey
         The back at the head, and at the root of the tail fin.
+    fish_contrast_sd
+        Spread from fish to fish of how much darker than the floor they are, as a share.
     fin_opacity
         Of the tail fin, which is no part of the silhouette.
     stripe_grey
@@ -80,6 +82,7 @@ class Look:
     fish_length_sd_m: float = 0.0015
     fish_grey: float = 52.0
     tail_grey: float = 92.0
+    fish_contrast_sd: float = 0.055
     fin_opacity: float = 0.25
     stripe_grey: float = 14.0
     lure_length_m: float = 0.045

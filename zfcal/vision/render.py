@@ -52,6 +52,7 @@ class _Seen:
     moved_px: Floats
     shadow_px: Floats
     is_robot: bool
+    contrast: float
 
 
 @final
@@ -142,6 +143,9 @@ class OverheadPainter:
         ]
         # One call for all: it costs more than the points.
         pixels = self._camera.to_pixels(np.concatenate(parts, axis=1))
+        contrasts = moment.bodies.contrast
+        if contrasts is None:
+            contrasts = np.ones(len(moment.bodies))
         edges = np.cumsum([part.shape[1] for part in parts])[:-1]
         return [
             _Seen(
@@ -151,9 +155,10 @@ class OverheadPainter:
                 moved_px=rest[1] - rest[0],
                 shadow_px=rest[3] - rest[2],
                 is_robot=bool(is_robot),
+                contrast=float(contrast),
             )
-            for is_robot, *(left, right, fin, rest) in zip(
-                moment.is_robot, *np.split(pixels, edges, axis=1), strict=True
+            for is_robot, contrast, *(left, right, fin, rest) in zip(
+                moment.is_robot, contrasts, *np.split(pixels, edges, axis=1), strict=True
             )
             if np.isfinite(left).all() and np.isfinite(right).all() and np.isfinite(fin).all()
         ]
@@ -213,12 +218,16 @@ def _fills(body: _Seen, look: Look) -> list[Fill]:
     ring = np.concatenate([left, right[::-1]])
     if body.is_robot:
         return [Fill(corners_px=ring, grey=look.lure_grey)]
-    shades = np.linspace(look.fish_grey, look.tail_grey, len(_SECTIONS))
-    flank = (look.fish_grey + look.tail_grey) / 2 + look.stripe_grey
+    head, tail = (
+        min(max(look.floor_grey - body.contrast * (look.floor_grey - grey), 0.0), 255.0)
+        for grey in (look.fish_grey, look.tail_grey)
+    )
+    shades = np.linspace(head, tail, len(_SECTIONS))
+    flank = (head + tail) / 2 + look.stripe_grey
     middle = (left + right) / 2
     fills = []
     if look.fin_opacity > 0:
-        fills.append(Fill(corners_px=body.fin_px, grey=look.tail_grey, opacity=look.fin_opacity))
+        fills.append(Fill(corners_px=body.fin_px, grey=tail, opacity=look.fin_opacity))
     fills.append(Fill(corners_px=ring, grey=min(flank, 255.0)))
     sides = (middle + _BACK_SHARE * (left - middle), middle + _BACK_SHARE * (right - middle))
     for (start, end), shade in zip(_SECTIONS, shades, strict=True):

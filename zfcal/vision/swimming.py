@@ -67,7 +67,7 @@ class Swimming:
     frame : ndarray of int64, shape (frame,)
     time_s : ndarray, shape (frame,)
     is_robot : ndarray of bool, shape (agent,)
-    length_m : ndarray, shape (agent,)
+    length_m, contrast : ndarray, shape (agent,)
     xy_m, velocity_m_s : ndarray, shape (frame, agent, 2)
     heading_rad, bend_rad, wave_rad, phase_rad : ndarray, shape (frame, agent)
     """
@@ -76,6 +76,7 @@ class Swimming:
     time_s: Floats
     is_robot: NDArray[np.bool_]
     length_m: Floats
+    contrast: Floats
     xy_m: Floats
     velocity_m_s: Floats
     heading_rad: Floats
@@ -96,6 +97,7 @@ class Swimming:
             bend_rad=self.bend_rad[row, here],
             wave_rad=self.wave_rad[row, here],
             phase_rad=self.phase_rad[row, here],
+            contrast=self.contrast[here],
         )
         return Moment(
             number=int(self.frame[row]),
@@ -118,7 +120,7 @@ def swimming(tracks: Tracks, look: Look, *, fps: float, seed: int) -> Swimming:
     fps
         Frame rate of the tracks, in hertz.
     seed
-        Of the fish's lengths and the phases of their tails.
+        Of the fish's lengths and shades, and of the phases of their tails.
 
     Returns
     -------
@@ -142,11 +144,14 @@ def swimming(tracks: Tracks, look: Look, *, fps: float, seed: int) -> Swimming:
     lengths = look.fish_length_m + look.fish_length_sd_m * rng.standard_normal(len(agent))
     lengths = np.clip(lengths, 0.5 * look.fish_length_m, 1.5 * look.fish_length_m)
     bend, wave, phase = _strokes(heading, velocity, frame, fps, rng)
+    shades = np.random.default_rng([seed, _SHADES]).standard_normal(len(agent))
+    contrast = np.clip(1.0 + look.fish_contrast_sd * shades, 0.5, 1.5)
     return Swimming(
         frame=frame,
         time_s=time_s,
         is_robot=is_robot,
         length_m=np.where(is_robot, look.lure_length_m, lengths),
+        contrast=np.where(is_robot, 1.0, contrast),
         xy_m=xy_m,
         velocity_m_s=velocity,
         heading_rad=heading,
@@ -157,8 +162,8 @@ def swimming(tracks: Tracks, look: Look, *, fps: float, seed: int) -> Swimming:
     )
 
 
-_LENGTHS = 1
-"""Tells the random numbers of bodies from those of images."""
+_LENGTHS, _SHADES = 1, 2
+"""Tell the random numbers of bodies from those of images."""
 
 
 def _rate(values: Floats, frame: NDArray[np.int64], fps: float) -> Floats:

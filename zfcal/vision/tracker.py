@@ -26,6 +26,7 @@ from zfcal.vision.dividing import divide
 from zfcal.vision.finding import Finder, soften
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
+from zfcal.vision.plane import Plane
 from zfcal.vision.seen import BadFrame, Reason, Seen, TrackerOptions
 from zfcal.vision.trail import Detection
 from zfcal.vision.usual import Bodies
@@ -66,12 +67,12 @@ class FishTracker:
         region: NDArray[np.bool_] | None = None,
     ) -> None:
         self.options = options
-        self._projection = projection
+        self._plane = Plane(projection, projection.size_px)
         self._region = region
         self._learner = BackgroundLearner(options.learn_frames, options.learn_rate)
         self._finder: Finder | None = None
         self._bodies = Bodies()
-        self._trails = Trails(self._bodies, coast_s=options.coast_s)
+        self._trails = Trails(self._bodies, coast_s=options.coast_s, n_agents=options.n_agents)
         self._bad: list[BadFrame] = []
         if background is not None:
             self._take(background)
@@ -143,7 +144,7 @@ class FishTracker:
             time_s=frame.time_s,
         )
         self._trails.match(detections, frame.time_s)
-        seen = self._told()
+        seen = self._told(frame.time_s)
         self._judge(frame, detections, seen)
         return seen
 
@@ -172,14 +173,13 @@ class FishTracker:
             grey = np.asarray(cv2.convertScaleAbs(grey, alpha=1 / gain), np.uint8)
         return soften(grey, self.options.method)
 
-    def _told(self) -> list[Seen]:
-        seen = self._trails.told(self.options.n_agents)
+    def _told(self, time_s: float) -> list[Seen]:
+        seen = self._trails.told(time_s)
         if not seen:
             return []
         xy_px = np.array([trail.xy for trail in seen])
         ahead_px = xy_px + [(math.cos(t.heading_rad), math.sin(t.heading_rad)) for t in seen]
-        # In one call: undoing a lens costs much the same for ten points as for five.
-        xy_m, ahead_m = np.split(self._projection.to_metres(np.vstack([xy_px, ahead_px])), 2)
+        xy_m, ahead_m = np.split(self._plane.to_metres(np.vstack([xy_px, ahead_px])), 2)
         ahead_m = ahead_m - xy_m
         return [
             Seen(

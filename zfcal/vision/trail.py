@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.vision.detect import Blob, Shape
+from zfcal.vision.detect import FULL, Blob, Shape
+from zfcal.vision.fitting import Build
 from zfcal.vision.splitting import Pose, Template, ellipse, template_of
-from zfcal.vision.usual import Body
+from zfcal.vision.usual import Body as Look
 
 Floats = NDArray[np.float64]
 
@@ -51,16 +52,24 @@ class Detection:
         The foreground that it is part of.
     shared
         How many animals are in that.
+    own_darkness
+        Of its part of a blob that others share; NaN where it was not told apart.
     """
 
     shape: Shape
     blob: Blob
     shared: int = 1
+    own_darkness: float = math.nan
+
+    @property
+    def darkness(self) -> float:
+        """How dark it is; NaN where that cannot be told."""
+        return self.blob.darkness if self.shared == 1 else self.own_darkness
 
     @property
     def mass(self) -> float:
         """Area times darkness: what tells a lure from a fish, and a large fish from a small one."""
-        return self.shape.area_px * self.blob.darkness
+        return self.shape.area_px * self.darkness
 
 
 class Trail:
@@ -86,10 +95,14 @@ class Trail:
         "agent",
         "area_px",
         "blob",
+        "darkness",
         "doubt",
         "heading_rad",
         "hits",
+        "is_clear",
         "is_told",
+        "key",
+        "length_px",
         "likeness",
         "mass",
         "missed",
@@ -105,16 +118,19 @@ class Trail:
         self, agent: int, detection: Detection, time_s: float, *, opening: bool = False
     ) -> None:
         shape = detection.shape
-        self.agent = agent
+        self.agent = self.key = agent
         self.xy: Floats = np.array([shape.x_px, shape.y_px])
         self.velocity: Floats = np.zeros(2)
         self.time_s = time_s
         self.shape = shape
         self.blob: Blob = detection.blob
         self.area_px = shape.area_px
-        self.mass = detection.mass
+        self.length_px = shape.length_px
+        self.mass = shape.area_px * detection.blob.darkness
         self.heading_rad = shape.axis_rad
         self.hits = 1
+        self.is_clear = False
+        self.darkness = detection.darkness
         self.likeness = 0.0
         self.is_told = False
         self.missed = 0
@@ -135,7 +151,7 @@ class Trail:
         x, y = self.predicted(time_s)
         return Pose(x_px=float(x), y_px=float(y), axis_rad=self.heading_rad)
 
-    def body(self, usual: Body) -> Template:
+    def body(self, usual: Look) -> Template:
         """Return the body as last seen alone, or else the usual one."""
         if self._body is None and self.shared == 1:
             self._body = template_of(self.blob.pixels, self.blob.weights, self.heading_rad)
@@ -143,6 +159,20 @@ class Trail:
             length = usual.length_px
             self._body = ellipse(length, 4 / math.pi * usual.area_px / length)
         return self._body
+
+    def build(self, usual: Look) -> Build:
+        """Return the body as it was when it was alone; the usual where it hardly was."""
+        if self._alone < _KNOWN:
+            length, area, darkness = usual.length_px, usual.area_px, usual.darkness
+        else:
+            length, area, darkness = self.length_px, self.area_px, self.mass / self.area_px
+        return Build.of(sd_length_px=length, area_px=area, darkness=FULL * darkness)
+
+    def wear(self, look: Look) -> None:
+        """Take the look of the animal that the track is believed to be."""
+        self._alone = max(self._alone, _KNOWN)
+        self.area_px, self.length_px = look.area_px, look.length_px
+        self.mass = look.area_px * look.darkness
 
     def own_area_px(self, usual_px: float) -> float:
         """Return what this animal covers; the usual where it was hardly seen alone."""
@@ -165,19 +195,21 @@ class Trail:
         trust = _TRUST if detection.shared == 1 else _TRUST / 2
         self.velocity = step if self.hits == 1 else trust * step + (1 - trust) * self.velocity
         self._turn(shape, to - self.xy, shared=detection.shared)
+        self.is_clear = detection.shared == 1 and self.shared == 1
         if detection.shared == 1:
             self._body = None
         self.xy, self.time_s, self.shape, self.blob = to, time_s, shape, detection.blob
-        self.shared = detection.shared
+        self.shared, self.darkness = detection.shared, detection.darkness
         self.hits += 1
         self.doubt = max(_FADING * self.doubt, 0.5 if unsure else 0.0)
         if detection.shared == 1:
             self._alone += 1
             weight = max(0.1, 1 / self._alone)
             self.area_px += weight * (shape.area_px - self.area_px)
+            self.length_px += weight * (shape.length_px - self.length_px)
             self.mass += weight * (detection.mass - self.mass)
 
-    def confidence(self, usual: Body) -> float:
+    def confidence(self, usual: Look) -> float:
         """Return how sure the last sighting is, in [0, 1]; below 0.5 it is a guess.
 
         Whole for an animal alone in its blob; less for one cut out of a crowd, for one of odd

@@ -1,0 +1,147 @@
+"""Ids are kept where the number of animals is known: lost, crossed, and told by looks."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.vision.detect import Blob, Shape
+from zfcal.vision.identity import Identities
+from zfcal.vision.trail import Detection, Trail
+
+FPS = 15.0
+LARGE, SMALL = (44.0, 0.35), (36.0, 0.30)
+
+
+def sighting(look, at=(50.0, 50.0), *, shared=1):
+    """Return an animal of an area and darkness somewhere."""
+    area, darkness = look
+    blob = Blob(
+        pixels=np.array([at]),
+        weights=np.ones(1),
+        shares=np.full(1, darkness),
+        darkness=darkness,
+        contour=np.zeros((4, 2), np.int32),
+        corners=np.empty((0, 2)),
+        box=(int(at[0]), int(at[1]), 1, 1),
+    )
+    shape = Shape(
+        x_px=at[0], y_px=at[1], axis_rad=0.0, head=1.0, length_px=16.0, width_px=3.0, area_px=area
+    )
+    return Detection(shape=shape, blob=blob, shared=shared)
+
+
+class Film:
+    """Two tracks whose looks are told frame by frame."""
+
+    def __init__(self, n=2):
+        self.rng = np.random.default_rng(1)
+        self.names = Identities(n)
+        self.frame = 0
+        self.trails = {}
+
+    def show(self, looks, frames, *, mixed=None, spread=(0.04, 0.03)):
+        """Show tracks, by key, for some frames; return their last ids by key."""
+        for _ in range(frames):
+            self.frame += 1
+            time_s = self.frame / FPS
+            for key, (area, darkness) in looks.items():
+                wide = np.exp(np.array(spread) * self.rng.standard_normal(2))
+                seen = sighting((area * wide[0], darkness * wide[1]), at=(50.0 + 30 * key, 50.0))
+                if key not in self.trails:
+                    self.trails[key] = Trail(key, seen, time_s)
+                else:
+                    self.trails[key].update(seen, time_s)
+            told = [self.trails[key] for key in looks]
+            ids = self.names.step(told, mixed or {}, time_s)
+        return ids
+
+
+def test_ids_are_those_of_the_opening_and_stay():
+    """As many as there are animals, from nought."""
+    assert Film().show({7: LARGE, 9: SMALL}, 60) == {7: 0, 9: 1}
+
+
+def test_a_new_track_takes_the_id_of_the_one_that_ended():
+    """Never a third id for two animals."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 30)
+
+    assert film.show({0: LARGE, 5: SMALL}, 30) == {0: 0, 5: 1}
+    assert film.show({6: LARGE, 5: SMALL}, 30) == {6: 0, 5: 1}
+
+
+def test_of_two_that_ended_the_nearer_is_gone_on_with():
+    """Both end, both begin: by place, since they look the same."""
+    film = Film()
+    film.show({0: LARGE, 3: LARGE}, 30)
+
+    ids = film.show({13: LARGE, 10: LARGE}, 1)
+
+    assert sorted(ids.values()) == [0, 1]
+
+
+def test_places_changed_unseen_are_mended_by_looks():
+    """After a crossing that may have been either, a second of looks settles it."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+
+    assert film.show({0: SMALL, 1: LARGE}, 30) == {0: 1, 1: 0}
+
+
+def test_a_crossing_that_changed_nothing_changes_no_id():
+    """The same doubt, and the looks of before."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+
+    assert film.show({0: LARGE, 1: SMALL}, 120) == {0: 0, 1: 1}
+
+
+def test_animals_that_look_the_same_keep_their_ids():
+    """Where looks tell nothing ids do not flicker, whatever is doubted."""
+    film = Film()
+    film.show({0: LARGE, 1: LARGE}, 60)
+    changes = 0
+    for _ in range(20):
+        film.show({0: LARGE, 1: LARGE}, 1, mixed={(0, 1): 0.5})
+        changes += film.show({0: LARGE, 1: LARGE}, 15) != {0: 0, 1: 1}
+
+    assert changes <= 10
+
+
+def test_chances_sum_to_one_over_tracks_and_over_ids():
+    """Whatever was seen and mixed, each track is somebody and each id is somewhere."""
+    film = Film(3)
+    looks = {0: LARGE, 1: SMALL, 2: (60.0, 0.5)}
+    film.show(looks, 40)
+    film.show(looks, 20, mixed={(0, 1): 0.3, (1, 2): 0.2})
+
+    chance = film.names._chance
+    assert chance.sum(axis=0) == pytest.approx(np.ones(3), abs=0.02)
+    assert chance.sum(axis=1) == pytest.approx(np.ones(3), abs=0.02)
+
+
+def test_a_look_is_learnt_from_one_that_is_alone():
+    """Its area, length and darkness to two hundredths, after four seconds."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+
+    look = film.names.look(1)
+
+    assert look.area_px == pytest.approx(SMALL[0], rel=0.02)
+    assert look.darkness == pytest.approx(SMALL[1], rel=0.02)
+    assert look.length_px == pytest.approx(16.0)
+
+
+def test_a_crowd_teaches_nothing():
+    """One that shares its blob from the start has no look of its own."""
+    names = Identities(2)
+    trail = Trail(0, sighting(LARGE, shared=2), 0.0)
+    for k in range(1, 40):
+        trail.update(sighting(LARGE, shared=2), k / FPS)
+        names.step([trail], {}, k / FPS)
+
+    assert names.look(0) is None
+    assert math.isnan(trail.darkness)

@@ -1,0 +1,203 @@
+"""Who is who where the number of animals is known: what was believed, after each crossing.
+
+A track is followed from frame to frame; who it is is a belief. It is a matrix of chances,
+track by identity, whose rows and columns each sum to one. A crossing mixes the rows of those
+who may have changed places; what a track looks like, for as long as it is alone in its blob,
+speaks for identities that look the same (identity mass flow: Shin, Guibas & Zhao 2003). So
+ids are kept: a track that begins takes the identity of one that ended. It is causal: a change
+of places that looks tell of later is mended from then on, not in what was told before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from zfcal.vision.trail import Trail
+from zfcal.vision.usual import Body
+
+Floats = NDArray[np.float64]
+
+WITHIN = (0.06, 0.035)
+"""Spread of one fish's log area and log darkness over time, at first; learnt with the film."""
+
+BETWEEN = (0.085, 0.055)
+"""Spread from fish to fish of one age and tank, on the published film of eight zebrafish."""
+
+_WIDE = (0.5, 0.5)
+"""What is believed of one that was not seen yet: it may be a lure."""
+
+_ALIKE_S = 0.4
+"""For so long one look at an animal tells nothing new: it bends, it crosses a reflection."""
+
+_FAITH = 200
+"""Sightings that the spread at first is worth."""
+
+_OUTLIER = 4.0
+"""Log odds that one look tells at most: two fish in a blob taken for one are no large fish."""
+
+_KNOWN = 15
+"""Sightings from which a look is an animal's own."""
+
+_MEMORY = 3000.0
+"""Sightings that are remembered."""
+
+_SURE = 0.85
+"""Chance from which a sighting is learnt from."""
+
+_MEND = 3.0
+"""Log odds from which ids are exchanged."""
+
+_LEAST = 1e-6
+_ROUNDS = 4
+
+_REACH_PX_PER_S = 150.0
+"""How soon a lost animal may be anywhere else, in the choice among several."""
+
+
+@final
+class Identities:
+    """Names the tracks of one camera, as many as there are animals.
+
+    Parameters
+    ----------
+    n_agents
+        How many.
+    """
+
+    def __init__(self, n_agents: int) -> None:
+        self._keys: list[int | None] = [None] * n_agents
+        self._chance: Floats = np.eye(n_agents)
+        self._name = np.arange(n_agents)
+        self._last: list[tuple[Floats, float] | None] = [None] * n_agents
+        self._n = np.zeros(n_agents)
+        self._mean = np.zeros((n_agents, 2))
+        self._length = np.zeros(n_agents)
+        self._within = np.array(WITHIN) ** 2 * _FAITH
+        self._looks = float(_FAITH)
+        self._time_s = -math.inf
+
+    def step(
+        self, trails: Sequence[Trail], mixed: dict[tuple[int, int], float], time_s: float
+    ) -> dict[int, int]:
+        """Return the id of each track.
+
+        Parameters
+        ----------
+        trails
+            Those that are told, as many as there are animals at most.
+        mixed
+            For pairs of tracks, by their keys, the chance that they have just changed places.
+        time_s
+            Of the frame.
+        """
+        rows = self._rows(trails, time_s)
+        for (one, other), chance in mixed.items():
+            if one in rows and other in rows:
+                self._mix(rows[one], rows[other], chance)
+        dt_s = min(max(time_s - self._time_s, 0.0), _ALIKE_S)
+        self._time_s = time_s
+        seen = [(rows[t.key], t) for t in trails if t.is_clear]
+        if seen:
+            self._look(np.array([row for row, _ in seen]), [t for _, t in seen], dt_s / _ALIKE_S)
+        self._rename()
+        return {trail.key: int(self._name[rows[trail.key]]) for trail in trails}
+
+    def _rows(self, trails: Sequence[Trail], time_s: float) -> dict[int, int]:
+        """Return the row of each track; new ones take those of tracks that are not told."""
+        held = {key: row for row, key in enumerate(self._keys) if key is not None}
+        rows = {trail.key: held[trail.key] for trail in trails if trail.key in held}
+        new = [trail for trail in trails if trail.key not in held]
+        free = [row for row in range(len(self._keys)) if row not in set(rows.values())]
+        if new:
+            cost = np.array([[self._far(row, trail, time_s) for row in free] for trail in new])
+            for k, column in zip(*linear_sum_assignment(cost), strict=True):
+                row = free[column]
+                # Others might have been taken as well.
+                for other, far in zip(free, cost[k], strict=True):
+                    if other != row and self._last[row] and self._last[other]:
+                        self._mix(row, other, 1 / (1 + math.exp(min(far - cost[k, column], 50.0))))
+                self._keys[row] = new[k].key
+                rows[new[k].key] = row
+        for trail in trails:
+            self._last[rows[trail.key]] = (trail.xy.copy(), time_s)
+        return rows
+
+    def _far(self, row: int, trail: Trail, time_s: float) -> float:
+        """Return how unlikely it is that a new track goes on a lost one, as minus log odds."""
+        last = self._last[row]
+        if last is None:
+            return 20.0 + 1e-3 * row
+        xy, at_s = last
+        reach = 10.0 + _REACH_PX_PER_S * (time_s - at_s)
+        return float(np.hypot(*(trail.xy - xy))) / reach
+
+    def _mix(self, one: int, other: int, chance: float) -> None:
+        a, b = self._chance[one].copy(), self._chance[other].copy()
+        self._chance[one] = (1 - chance) * a + chance * b
+        self._chance[other] = (1 - chance) * b + chance * a
+
+    def _look(self, rows: NDArray[np.intp], trails: list[Trail], weight: float) -> None:
+        """Let what tracks look like speak, and learn what they look like."""
+        seen = np.log(np.array([(t.shape.area_px, t.blob.darkness) for t in trails]))
+        within = self._within / self._looks
+        n = self._n[:, None] * weight
+        known = self._n > 0
+        middle = self._mean[known].mean(axis=0) if known.any() else seen.mean(axis=0)
+        # Nobody knows beforehand whether one is a lure.
+        between = np.array(BETWEEN if known.all() else _WIDE) ** 2
+        sure = 1 / between + n / within
+        mean = (middle / between + n * self._mean / within) / sure
+        spread = within + 1 / sure
+        odd = (seen[:, None] - mean) ** 2 / spread + np.log(spread)
+        tells = -0.5 * odd.sum(axis=2)
+        tells = np.maximum(tells - tells.max(axis=1, keepdims=True), -_OUTLIER)
+        self._chance[rows] *= np.exp(weight * tells)
+        self._balance()
+        self._learn(rows, seen, np.log([t.shape.length_px for t in trails]))
+
+    def _balance(self) -> None:
+        """Make rows and columns sum to one again (Sinkhorn)."""
+        chance = np.maximum(self._chance, _LEAST)
+        for _ in range(_ROUNDS):
+            chance /= chance.sum(axis=1, keepdims=True)
+            chance /= chance.sum(axis=0)
+        self._chance = chance
+
+    def _learn(self, rows: NDArray[np.intp], seen: Floats, lengths: Floats) -> None:
+        for row, each, length in zip(rows, seen, lengths, strict=True):
+            who = int(self._chance[row].argmax())
+            if self._chance[row, who] < _SURE:
+                continue
+            self._n[who] += 1
+            away = each - self._mean[who]
+            if self._n[who] > _FAITH:
+                self._within += np.minimum(away**2, 9 * self._within / self._looks)
+                self._looks += 1
+            weight = 1 / min(self._n[who], _MEMORY)
+            self._mean[who] += weight * away
+            self._length[who] += weight * (length - self._length[who])
+
+    def look(self, agent: int) -> Body | None:
+        """Return what an animal looks like; None where it was hardly seen alone."""
+        if self._n[agent] < _KNOWN:
+            return None
+        area, darkness = np.exp(self._mean[agent])
+        return Body(
+            area_px=float(area),
+            length_px=math.exp(self._length[agent]),
+            darkness=float(darkness),
+        )
+
+    def _rename(self) -> None:
+        """Exchange ids where others are clearly likelier."""
+        likely = np.log(np.maximum(self._chance, _LEAST))
+        rows, names = linear_sum_assignment(-likely)
+        gain = likely[rows, names].sum() - likely[rows, self._name].sum()
+        if gain > _MEND:
+            self._name = names
