@@ -8,13 +8,16 @@ squares (Levenberg 1944, Marquardt 1963), compiled. Who they are is the business
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+F = TypeVar("F", bound=Callable[..., Any])
 
 _PROFILE = np.array([0.12, 0.22, 0.36, 0.56, 0.76, 0.93, 1.0, 0.9, 0.55])
 """Width along the body, from tail to snout, as a share of the greatest."""
@@ -41,6 +44,15 @@ _STEPS = 12
 _BEND_MOST = 1.6
 _PIXELS = 400.0
 """Pixels that count: more make it no more exact."""
+
+
+def _kernel(function: F) -> F:
+    """Compile a function, and keep it for the next start where there is a place to."""
+    try:
+        compiled: Any = njit(cache=True, nogil=True)(function)
+    except RuntimeError:
+        compiled = njit(nogil=True)(function)
+    return compiled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +105,12 @@ class Fit:
     cost: float
 
 
+def prepare() -> None:
+    """Compile, so that the first crossing does not have to wait for it."""
+    some, body = np.zeros((1, 3)), Build(length_px=9.0, width_px=3.0, darkness=0.5)
+    fit(np.zeros((1, 2)), np.zeros(1), [body], some, some)
+
+
 def fit(pixels: Floats, shares: Floats, builds: list[Build], due: Floats, start: Floats) -> Fit:
     """Return the poses of bodies that best explain the shades of a blob, near where they are due.
 
@@ -119,7 +137,7 @@ def fit(pixels: Floats, shares: Floats, builds: list[Build], due: Floats, start:
     return Fit(poses=poses, cost=cost)
 
 
-@njit(cache=True, nogil=True)
+@_kernel
 def _cover(  # noqa: PLR0913, PLR0917 - a kernel
     pixels: Floats,
     length: float,
@@ -170,7 +188,7 @@ def _cover(  # noqa: PLR0913, PLR0917 - a kernel
         out[p] = darkness * min(max(0.5 + best / ramp, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True)
+@_kernel
 def _misfit(  # noqa: PLR0913, PLR0917 - a kernel
     shares: Floats, covers: Floats, body: Floats, due: Floats, poses: Floats, noise: float
 ) -> float:
@@ -190,7 +208,7 @@ def _misfit(  # noqa: PLR0913, PLR0917 - a kernel
     return 0.5 * total
 
 
-@njit(cache=True, nogil=True)
+@_kernel
 def _fit(  # noqa: PLR0912, PLR0913, PLR0917 - one kernel
     pixels: Floats,
     shares: Floats,

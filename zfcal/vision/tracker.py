@@ -24,6 +24,7 @@ from zfcal.vision.background import (
 from zfcal.vision.camera import Projection
 from zfcal.vision.dividing import divide
 from zfcal.vision.finding import Finder, soften
+from zfcal.vision.fitting import prepare
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
 from zfcal.vision.plane import Plane
@@ -74,6 +75,7 @@ class FishTracker:
         self._bodies = Bodies()
         self._trails = Trails(self._bodies, coast_s=options.coast_s, n_agents=options.n_agents)
         self._bad: list[BadFrame] = []
+        prepare()
         if background is not None:
             self._take(background)
 
