@@ -1,8 +1,10 @@
-"""What all tests share: where the real recordings lie, and how hypothesis runs."""
+"""What all tests share: real recordings, how hypothesis runs, and what is compiled before."""
 
 import importlib.util
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,26 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 settings.register_profile("zfcal", deadline=None)
 settings.register_profile("zfcal-ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("zfcal-ci" if os.environ.get("CI") else "zfcal")
+
+
+def pytest_configure(config):
+    """Compile the kernels before there are workers, when the whole suite was asked for.
+
+    With an empty cache each worker would otherwise compile the same ones at the same time.
+    What fails here fails once more in a test, which says what it is about.
+    """
+    option = config.option
+    is_part = option.keyword or option.markexpr or option.collectonly
+    is_whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not is_part
+    if not is_whole or not config.getoption("numprocesses", None):
+        return
+    script = Path(__file__).with_name("warming.py")
+    started = [
+        subprocess.Popen([sys.executable, script, part], cwd=REPOSITORY)
+        for part in ("simulator", "observer")
+    ]
+    for process in started:
+        process.wait()
 
 
 def pytest_collection_modifyitems(items):
