@@ -12,7 +12,7 @@ from zfcal.artifacts.lock import lock
 from zfcal.artifacts.models import read_model, read_result
 from zfcal.artifacts.tables import read_extra, read_table
 from zfcal.behaviour.rows import scores_from_rows
-from zfcal.errors import InputError, LockedError
+from zfcal.errors import InputError, LockedError, StorageError
 from zfcal.online.analyse import AnalyseOptions, analyse
 from zfcal.online.calibrate import CalibrateOptions, calibrate
 from zfcal.online.events import (
@@ -371,3 +371,21 @@ def test_places_by_hand(tmp_path):
     ]
     assert places.checkpoint.name == ".000120.checkpoint"
     assert np.isfinite(places.end_s)
+
+
+@pytest.mark.parametrize("moment", ["search", "end"])
+def test_a_trial_that_is_moved_away_does_not_come_back(trial, quick, moment):
+    """Just before a write, in the search or at the round's end: an error, and no folder of its."""
+    away = trial.with_name("away")
+
+    def move(event):
+        is_it = isinstance(event, Progress if moment == "search" else Made)
+        if is_it and not away.exists():
+            trial.rename(away)
+
+    with pytest.raises(StorageError, match="cannot be written"):
+        calibrate(trial, quick, move)
+    assert not trial.exists()
+    away.rename(trial)
+    calibrate(trial, quick, say_nothing)
+    assert (trial / "models" / "000240.toml").exists()

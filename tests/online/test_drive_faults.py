@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from zfcal.artifacts.drive_files import drive_files, read_drive
@@ -18,6 +19,7 @@ from zfcal.errors import LockedError
 from zfcal.online.drive_replay import replay
 from zfcal.online.events import say_nothing
 from zfcal.robot.virtual_process import VirtualProcess
+from zfcal_cli.main import run as zfcal
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
 driven = importlib.util.module_from_spec(_spec)
@@ -138,25 +140,99 @@ def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     assert replay(rig.root, say_nothing).is_same
 
 
-def test_a_driver_that_was_killed_has_its_last_word_and_goes_on(rig):
-    """By SIGKILL: the robot stops; a new driver adds to the same log, which loses nothing."""
-    driver = rig.start()
-    rig.until(lambda: rig.moves() > 15)
-    driver.kill()
-    rig.until(lambda: rig.heard()[-1][1] == STOP and rig.wheels() == 0.0, 5.0)
-    before = rig.items("command")
-    assert len(before) >= 10
-    second = rig.start()
+def test_a_driver_that_is_killed_has_its_last_word_and_goes_on(rig):
+    """By SIGKILL at random instants, from its start on: the robot stops each time.
+
+    A new driver adds to the same log, which loses nothing but what passed meanwhile.
+    """
+    rng = np.random.default_rng(7)
+    kept = []
+    for number in range(5):
+        driver, moves = rig.start(), rig.moves()
+        if number % 2 == 0:
+            rig.until(lambda moves=moves: rig.moves() > moves + 5)
+        time.sleep(rng.uniform(0.0, 0.8))
+        driver.kill()
+        driver.wait()
+        rig.until(lambda: rig.wheels() == 0.0, 5.0)
+        assert not rig.moves() or rig.heard()[-1][1] == STOP
+        found = rig.items("command")
+        assert found[: len(kept)] == kept
+        kept = found
+    assert len(kept) >= 15
+    rig.start()
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 10)
-    second.send_signal(signal.SIGTERM)
-    assert second.wait(10) == 143
+    rig.end()
     after = rig.items("command")
-    assert after[: len(before)] == before
-    assert len(after) > len(before) + 8
-    assert len([m for m in rig.items("model") if m["begins"]]) == 2
+    assert after[: len(kept)] == kept
+    assert len(after) > len(kept) + 8
+    assert len([m for m in rig.items("model") if m["begins"]]) >= 4
     assert all(overview(path).whole for path in drive_files(rig.root).values())
     assert replay(rig.root, say_nothing).is_same
+
+
+@pytest.fixture
+def small_disk(rig):
+    """Return the drive's folder, on a file system of 2 MB of its own."""
+    place = rig.root / "drive"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "zfcal-test", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("a file system of 2 MB cannot be mounted here (needs root)")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
+    """It is said; the robot is driven on; with room again the log lacks not a tick."""
+    driver = rig.start()
+    rig.until(lambda: rig.moves() > 5)
+    filler = small_disk / "filler"
+    with filler.open("wb", buffering=0) as file, contextlib.suppress(OSError):
+        while True:
+            file.write(bytes(4096))
+    moves = rig.moves()
+    rig.until(lambda: rig.moves() > moves + 25)
+    filler.unlink()
+    rig.until(lambda: [f["ended"] for f in rig.items("fault") if f["fault"] == "log"])
+    rig.end()
+    assert [f["ended"] for f in rig.items("fault") if f["fault"] == "log"] == [False, True]
+    said = driver.stderr.read()
+    assert "No space left on device" in said
+    assert "the robot is driven on" in said
+    times = [c["time_s"] for c in rig.items("command")]
+    assert np.diff(times).max() < 0.35
+    assert all(overview(path).whole for path in drive_files(rig.root).values())
+    assert replay(rig.root, say_nothing).is_same
+
+
+FAKETIME = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
+
+
+@pytest.mark.apt
+def test_a_clock_that_is_set_by_an_hour_changes_nothing(rig, tmp_path, monkeypatch):
+    """Forwards and back while it drives: no STOP, no tick left out, no latency of an hour."""
+    if not FAKETIME.exists():
+        pytest.skip("needs the Debian package faketime")
+    step = tmp_path / "step"
+    step.write_text("+0")
+    monkeypatch.setenv("LD_PRELOAD", str(FAKETIME))
+    monkeypatch.setenv("FAKETIME_TIMESTAMP_FILE", str(step))
+    monkeypatch.setenv("FAKETIME_NO_CACHE", "1")
+    monkeypatch.setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1")
+    driver = rig.start()
+    for offset in ("+3600", "-3600"):
+        moves = rig.moves()
+        rig.until(lambda moves=moves: rig.moves() > moves + 12)
+        step.write_text(offset)
+    moves = rig.moves()
+    rig.until(lambda: rig.moves() > moves + 12)
+    # The library that sets the clock breaks the wait for a process that ends.
+    driver.kill()
+    assert "stopped" not in driver.stderr.read()
+    assert rig.items("fault") == []
+    assert np.diff([c["time_s"] for c in rig.items("command")]).max() < 0.35
 
 
 def test_unplugged_and_back(rig):
@@ -176,19 +252,46 @@ def test_unplugged_and_back(rig):
     assert replay(rig.root, say_nothing).is_same
 
 
-def test_new_parameters_drive_within_a_step(rig):
-    """Written whole by another process; a broken one is told and ignored."""
+ROUND = ("--generations", "1", "--population", "4", "--steps", "20", "--no-seed-likelihood", "-q")
+NEW = "models/000120.toml"
+
+
+@pytest.fixture
+def analysed(template, tmp_path):
+    """Return a trial with the statistics of a window; all that a round needs is compiled."""
+    root = Path(shutil.copytree(template[0], tmp_path / "analysed"))
+    model = str(root / "models" / "000000.toml")
+    for name, *words in (
+        ("simulate", "--model", model, "--duration", "120", "-q"),
+        ("analyse", "-q"),
+        ("calibrate", *ROUND),
+    ):
+        assert zfcal([name, str(root), *words]) == 0
+    return root
+
+
+def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
+    """By `zfcal calibrate` beside it, in real time; a broken model is told and ignored."""
+    for folder in ("tracks", "stats"):
+        shutil.copytree(analysed / folder, rig.root / folder)
     driver = rig.start()
     rig.until(lambda: rig.moves() > 5)
-    driven.add_model(rig.root, 120)
-    written_s = rig.items("command")[-1]["time_s"]
-    rig.until(lambda: len(rig.items("model")) == 2)
-    assert rig.items("model")[-1]["time_s"] - written_s < 0.45
+    words = [sys.executable, "-m", "zfcal_cli.main", "calibrate", str(rig.root), *ROUND]
+    calibrating = subprocess.Popen(words)
+    made = rig.root / "models" / "000120.toml"
+    rig.until(made.exists, 60)
+    made_s = rig.robot.control.ask("pose")["time_s"]
+    target = rig.until(lambda: [t for t in rig.items("target") if t["model"] == NEW], 5)[0]
+    command = rig.until(lambda: [c for c in rig.items("command") if c["step"] >= target["step"]])[0]
+    # When the robot heard that command, by its own clock.
+    own = [t for t, frame in rig.heard() if frame == STOP or frame.startswith("040000000b")]
+    assert own[command["n_sent"] - 1] - made_s < 1.0
+    assert calibrating.wait(60) == 0
     (rig.root / "models" / "000180.toml").write_text("half of it = ")
     rig.until(lambda: any(f["fault"] == "model" for f in rig.items("fault")))
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 5)
-    assert rig.items("target")[-1]["model"] == "models/000120.toml"
+    assert rig.items("target")[-1]["model"] == NEW
     driver.send_signal(signal.SIGTERM)
     assert driver.wait(10) == 143
     said = driver.stderr.read()

@@ -38,7 +38,7 @@ _HINTS = {
 _NO_FLUSH = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path, write: Callable[[Path], None], *, parents: bool = True) -> None:
     """Make a file that at every instant is absent, the old one, or the new one whole.
 
     Parameters
@@ -48,6 +48,9 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     write
         Writes the content to the path that it is given: a dot-file in the same
         folder, whose ending says nothing about the format.
+    parents
+        Whether all that its folder lies in is made as well. Not so in a trial: one that
+        was moved away just now must not come into being again where it was.
 
     Raises
     ------
@@ -58,7 +61,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     part = _part_of(path)
     _IN_USE.add(part.name)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=parents, exist_ok=True)
         _remove_orphans(path)
         write(part)
         _flush(part)
@@ -73,18 +76,18 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         _IN_USE.discard(part.name)
 
 
-def write_text_whole(path: Path, text: str) -> None:
+def write_text_whole(path: Path, text: str, *, parents: bool = True) -> None:
     """Make a UTF-8 text file with `write_whole`, its line ends as they stand in ``text``."""
-    write_bytes_whole(path, text.encode())
+    write_bytes_whole(path, text.encode(), parents=parents)
 
 
-def write_bytes_whole(path: Path, data: bytes) -> None:
+def write_bytes_whole(path: Path, data: bytes, *, parents: bool = True) -> None:
     """Make a file of these bytes with `write_whole`."""
 
     def write(part: Path) -> None:
         part.write_bytes(data)
 
-    write_whole(path, write)
+    write_whole(path, write, parents=parents)
 
 
 def append_bytes(path: Path, data: bytes) -> None:

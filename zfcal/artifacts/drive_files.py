@@ -7,6 +7,7 @@ together lie in one chunk, which is flushed at once.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -70,7 +71,8 @@ class DriveWriter:
         earlier = _earlier(path)
         part = path.with_name(f".{path.name}.taken-up") if earlier else path
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            # Not the trial itself: one that was moved away must not come into being again.
+            path.parent.mkdir(exist_ok=True)
             self._file = part.open("wb")
             self._writer = Writer(self._file, chunk_size=2**22)
             self._writer.start(profile="", library=LIBRARY)
@@ -78,9 +80,12 @@ class DriveWriter:
             self._channels = _register(self._writer)
             for topic, time_ns, data in earlier:
                 self._put(topic, time_ns, data)
-            self.flush()
+            self._writer.flush()  # type: ignore[no-untyped-call]
             part.replace(path)
         except OSError as error:
+            self.abandon()
+            if earlier:
+                part.unlink(missing_ok=True)
             raise storage_error(path, error) from error
 
     def add(self, item: Item) -> None:
@@ -104,6 +109,11 @@ class DriveWriter:
             self._writer.flush()  # type: ignore[no-untyped-call]
         except OSError as error:
             raise storage_error(self.path, error) from error
+
+    def abandon(self) -> None:
+        """Leave the file as it is, after an error: what was flushed before can be read."""
+        with contextlib.suppress(OSError, AttributeError):
+            self._file.close()
 
     def close(self, measured: Mapping[str, str] | None = None) -> None:
         """Write the footer and close the file.

@@ -94,6 +94,8 @@ def write_model(
     parameters: Parameters,
     lineage: Lineage,
     result: Mapping[str, JSON] | None = None,
+    *,
+    parents: bool = True,
 ) -> None:
     """Write a model file whole, or not at all.
 
@@ -108,6 +110,8 @@ def write_model(
     result
         How the calibration went, for the table ``[result]``; values that are
         None are left out, since TOML has no word for them.
+    parents
+        See `zfcal.artifacts.atomic.write_whole`.
 
     Raises
     ------
@@ -126,7 +130,7 @@ def write_model(
     # The file's own schema stands at its head, once.
     del origin["schema"]
     document.add("lineage", _table(origin))
-    write_text_whole(path, tomlkit.dumps(document))
+    write_text_whole(path, tomlkit.dumps(document), parents=parents)
 
 
 def read_result(path: Path) -> dict[str, Any]:

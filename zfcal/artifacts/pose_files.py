@@ -73,7 +73,8 @@ class PoseWriter:
         self.path = path
         self._arena = arena
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            # Not the trial itself: one that was moved away must not come into being again.
+            path.parent.mkdir(exist_ok=True)
             self._file = path.open("wb")
             self._writer = Writer(self._file, chunk_size=2**22)
             self._writer.start(profile="", library=LIBRARY)

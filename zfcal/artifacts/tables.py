@@ -70,7 +70,7 @@ def write_table(
     if extra:
         metadata[_EXTRA_KEY] = to_json(extra).encode()
     whole = table.select(form.names).combine_chunks().replace_schema_metadata(metadata)
-    write_whole(path, lambda part: _write_parquet(part, whole))
+    write_whole(path, lambda part: _write_parquet(part, whole), parents=False)
 
 
 def _write_parquet(part: Path, table: pa.Table) -> None:

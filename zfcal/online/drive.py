@@ -7,6 +7,7 @@ import dataclasses
 import gc
 import json
 import os
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -140,7 +141,7 @@ def _drive(
     is_live = options.clock == "wall"
     robot, virtual = _robot(opened, options, stack)
     clock: DriveClock = WallClock() if is_live else PoseClock(opened.trial.fps)
-    log = DriveLog(opened.trial, lineage_of(opened, options), tell)
+    log = DriveLog(opened.trial, lineage_of(opened, options), tell, is_patient=is_live)
     watchdog = Watchdog(robot) if is_live else None
     crew = Crew(
         robot=robot,
@@ -237,6 +238,8 @@ class _Loop:
         self._opened, self._options = opened, options
         self._driver, self._crew = driver, crew
         self._follower, self._virtual = follower, virtual
+        # A wait by the monotonic clock, as all that is timed here.
+        self._nothing = threading.Event()
         self._size = (-1, -1)
         self._searched_s = 0.0
         self._first_s: float | None = None
@@ -269,7 +272,7 @@ class _Loop:
                 return
             yield frames
             if not frames:
-                time.sleep(min(_LOOK_S, self._crew.clock.rest_s()))
+                self._nothing.wait(min(_LOOK_S, self._crew.clock.rest_s()))
 
     def _poll(self) -> list[Any]:
         """Read on where the file has grown; the folder is searched now and then."""

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import time
+from itertools import takewhile
 from typing import Any, final
 
 import numpy as np
 
 from zfcal.artifacts.drive_files import DriveWriter
 from zfcal.artifacts.lineage import Lineage
-from zfcal.online.events import Made, Tell
+from zfcal.errors import StorageError
+from zfcal.online.events import Made, Note, Tell
 from zfcal.trial import Trial
 from zfcal.units import SEGMENT_S
 
 TICK_TO_BYTE, POSE_TO_STATE = "tick_to_byte_s", "pose_to_state_s"
+
+_RETRY_S = 1.0
+_MOST_KEPT = 60_000
+"""Messages that wait for the disk: half an hour at 15 Hz, some 50 MB."""
 
 
 @final
@@ -27,32 +34,91 @@ class DriveLog:
         Where it comes from.
     tell
         Hears of every file, when it is closed.
+    is_patient
+        Whether a disk that cannot be written is waited for: messages are kept meanwhile,
+        and written when it can. Who drives a robot does not let go of it for a full disk.
     """
 
-    def __init__(self, trial: Trial, lineage: Lineage, tell: Tell) -> None:
+    def __init__(
+        self, trial: Trial, lineage: Lineage, tell: Tell, *, is_patient: bool = False
+    ) -> None:
         self._trial = trial
         self._lineage = lineage
         self._tell = tell
+        self._is_patient = is_patient
+        self._kept: list[dict[str, Any]] = []
+        self._failed = False
+        self._retry_s = 0.0
         self._writer: DriveWriter | None = None
         self._start_s = -1
+        self._is_open = False
         self._taken: dict[str, list[float]] = {TICK_TO_BYTE: [], POSE_TO_STATE: []}
         self.n_ticks_skipped = 0
         self.n_steps_missed = 0
 
     def add(self, item: dict[str, Any]) -> None:
-        """Take a message, into the file of its minute."""
-        start_s = int((item["time_s"] + 1e-6) // SEGMENT_S * SEGMENT_S)
-        # A pose may be a little older than the tick before it: files do not go back.
-        if self._writer is None or start_s > self._start_s:
-            self._close_file()
-            path = self._trial.path("drive", start_s, ".mcap")
-            self._writer, self._start_s = DriveWriter(path, self._lineage), start_s
-        self._writer.add(item)
+        """Take a message, for the file of its minute; the next `flush` writes it."""
+        self._kept.append(item)
 
     def flush(self) -> None:
-        """Hand over what was added."""
+        """Hand over what was added.
+
+        Raises
+        ------
+        StorageError
+            The place cannot be written, and it is not waited for, or not any longer.
+        """
+        if self._failed and time.monotonic() < self._retry_s:
+            return
+        try:
+            self._write()
+        except StorageError as error:
+            self._fail(error)
+        else:
+            self._recover()
+
+    def _write(self) -> None:
+        while self._kept:
+            minute = _minute_of(self._kept[0])
+            # A pose may be a little older than the tick before it: files do not go back.
+            if not self._is_open or minute > self._start_s:
+                self._close_file()
+                self._start_s, self._is_open = max(minute, self._start_s), True
+            writer = self._taken_up()
+            own = list(takewhile(lambda item: _minute_of(item) <= self._start_s, self._kept))
+            for item in own:
+                writer.add(item)
+            writer.flush()
+            del self._kept[: len(own)]
+
+    def _taken_up(self) -> DriveWriter:
+        """Return the writer of the file that is open; after a failure it goes on in it."""
+        if self._writer is None:
+            path = self._trial.path("drive", self._start_s, ".mcap")
+            self._writer = DriveWriter(path, self._lineage)
+        return self._writer
+
+    def _fail(self, error: StorageError) -> None:
         if self._writer is not None:
-            self._writer.flush()
+            self._writer.abandon()
+            self._writer = None
+        if not self._is_patient or len(self._kept) > _MOST_KEPT:
+            raise error
+        self._retry_s = time.monotonic() + _RETRY_S
+        if not self._failed:
+            self._failed = True
+            self._fault(f"{error} It is kept until it can be; the robot is driven on.")
+
+    def _recover(self) -> None:
+        if self._failed:
+            self._failed = False
+            self._fault("The log can be written again, and lacks nothing.", ended=True)
+
+    def _fault(self, says: str, *, ended: bool = False) -> None:
+        time_s = self._kept[-1]["time_s"] if self._kept else float(self._start_s)
+        item = {"what": "fault", "time_s": time_s, "fault": "log", "says": says, "ended": ended}
+        self._kept.append(item)
+        self._tell(Note(text=says, warning=not ended))
 
     def measure(self, what: str, seconds: float) -> None:
         """Note a latency."""
@@ -76,18 +142,31 @@ class DriveLog:
         return found
 
     def close(self) -> None:
-        """Close the last file; it says how quick the driver was so far."""
+        """Write what is left and close the last file; it says how quick the driver was so far.
+
+        Raises
+        ------
+        StorageError
+            The place cannot be written; there is nothing more to wait for.
+        """
+        self._is_patient, self._retry_s = False, 0.0
+        self.flush()
         self._close_file()
 
     def _close_file(self) -> None:
-        if self._writer is None:
+        if not self._is_open:
             return
+        writer = self._taken_up()
         flat: dict[str, str] = {}
         for name, value in self.latencies().items():
             if isinstance(value, dict):
                 flat |= {f"{name}.{key}": str(number) for key, number in value.items()}
             else:
                 flat[name] = str(value)
-        self._writer.close(flat)
-        self._tell(Made(path=self._writer.path, reason="driven"))
-        self._writer = None
+        writer.close(flat)
+        self._tell(Made(path=writer.path, reason="driven"))
+        self._writer, self._is_open = None, False
+
+
+def _minute_of(item: dict[str, Any]) -> int:
+    return int((item["time_s"] + 1e-6) // SEGMENT_S * SEGMENT_S)

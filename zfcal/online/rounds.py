@@ -156,7 +156,7 @@ def write_round(
         ceiling=result.ceiling,
     )
     write_table(places.scores, make_table(SCORES, rows), lineages[SCORES])
-    write_model(places.model, result.champion, lineages[MODEL], table)
+    write_model(places.model, result.champion, lineages[MODEL], table, parents=False)
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
@@ -271,7 +271,7 @@ class Checkpoint:
         """
         data = to_bytes(progress, key=self._key, since=self._kept)
         if self._kept is None:
-            write_bytes_whole(self._path, data)
+            write_bytes_whole(self._path, data, parents=False)
         else:
             append_bytes(self._path, data)
         self._kept = progress

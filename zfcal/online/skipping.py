@@ -84,5 +84,6 @@ def write_skipped(root: Path, end_s: int, *, went_on_with_s: int, because: str) 
         "lineage": origin,
     }
     path = skipped_path(root, end_s)
-    write_text_whole(path, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+    write_text_whole(path, text, parents=False)
     return path

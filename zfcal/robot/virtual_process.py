@@ -15,7 +15,7 @@ from typing import Any, Self, final
 from zfcal.errors import InputError
 
 _PATIENCE_S = 300.0
-"""One that has ended is noticed at once; one that is merely slow, on a busy computer, is waited for."""
+"""One that has ended is noticed at once; on a busy computer a slow one is waited for."""
 
 
 @final
