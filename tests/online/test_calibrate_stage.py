@@ -9,8 +9,8 @@ import pytest
 
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.lock import lock
-from zfcal.artifacts.models import read_model, read_result
-from zfcal.artifacts.tables import read_extra, read_table
+from zfcal.artifacts.models import read_model, read_result, write_model
+from zfcal.artifacts.tables import read_extra, read_table, write_table
 from zfcal.behaviour.rows import scores_from_rows
 from zfcal.errors import InputError, LockedError, StorageError
 from zfcal.online.analyse import AnalyseOptions, analyse
@@ -373,19 +373,17 @@ def test_places_by_hand(tmp_path):
     assert np.isfinite(places.end_s)
 
 
-@pytest.mark.parametrize("moment", ["search", "end"])
-def test_a_trial_that_is_moved_away_does_not_come_back(trial, quick, moment):
-    """Just before a write, in the search or at the round's end: an error, and no folder of its."""
-    away = trial.with_name("away")
-
-    def move(event):
-        is_it = isinstance(event, Progress if moment == "search" else Made)
-        if is_it and not away.exists():
-            trial.rename(away)
-
-    with pytest.raises(StorageError, match="cannot be written"):
-        calibrate(trial, quick, move)
-    assert not trial.exists()
-    away.rename(trial)
+def test_what_a_round_writes_makes_no_trial_that_was_moved_away(trial, quick):
+    """Its population and its model: an error, and no folder where it was."""
     calibrate(trial, quick, say_nothing)
-    assert (trial / "models" / "000240.toml").exists()
+    population, model = (trial / "models" / f"000120{ending}" for ending in (".parquet", ".toml"))
+    table, lineage = read_table(population, "zfcal.population/1"), read_lineage(population)
+    parameters, origin = read_model(model), read_lineage(model)
+    trial.rename(trial.with_name("away"))
+    for write in (
+        lambda: write_table(population, table, lineage),
+        lambda: write_model(model, parameters, origin, parents=False),
+    ):
+        with pytest.raises(StorageError, match="cannot be written"):
+            write()
+    assert not trial.exists()

@@ -250,8 +250,13 @@ class Watch:
         ends = segment_ends(tracks)
         if name == ANALYSE:
             return Turn(seen_s=ends)
-        # A round's minute begins when its tracks were there, if they are here at all.
-        seen_s = {end: ends.get(end, here_s) for end, here_s in stats.items()}
+        # A round's minute begins when its tracks were there; where statistics come from
+        # another computer, when they did: a cut link is no overrun.
+        is_fetched = ANALYSE not in self._options.stages
+        seen_s = {
+            end: max(here_s, ends.get(end, here_s)) if is_fetched else ends.get(end, here_s)
+            for end, here_s in stats.items()
+        }
         hurry = not (self._options.once or self._ended)
         return Turn(seen_s=seen_s, due_after_s=SEGMENT_S if hurry else None)
 
