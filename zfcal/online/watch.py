@@ -252,7 +252,7 @@ class Watch:
             return Turn(seen_s=ends)
         # A round's minute begins when its tracks were there; where statistics come from
         # another computer, when they did: a cut link is no overrun.
-        is_fetched = ANALYSE not in self._options.stages
+        is_fetched = ANALYSE not in self._stages
         seen_s = {
             end: max(here_s, ends.get(end, here_s)) if is_fetched else ends.get(end, here_s)
             for end, here_s in stats.items()
