@@ -106,8 +106,7 @@ def measure_all(options: argparse.Namespace) -> dict[str, Any]:
 
 def _against(trial: dict[str, Any], feature: str = "S") -> float:
     """Return how near the robot's score comes to that of a fish in its place."""
-    share = trial["robot_vs_fish"].get(feature, {}).get("against_ceiling")
-    return float("nan") if share is None else float(share)
+    return _mark(trial, feature, "value") / _mark(trial, feature, "ceiling")
 
 
 def interval(values: list[float]) -> tuple[float, float, float]:
@@ -131,21 +130,31 @@ def markdown(found: dict[str, Any]) -> str:
         of {minutes} min for each robot ({how}), four fish whose parameters differ from trial
         to trial and drift ([closed-loop.md](closed-loop.md)); seeds on which nothing
         was tuned; 30 generations a round."""
+    text = [textwrap.fill(" ".join(said.split()), 120)]
+    text.append(_robot_table(trials, kinds))
+    if len(kinds) > 1:
+        text.append(_difference_table(trials, kinds))
+    text.append(_model_table(trials))
+    return "# The published experiment, virtually\n\n" + "\n\n".join(text)
+
+
+def _robot_table(trials: list[dict[str, Any]], kinds: list[str]) -> str:
+    """Return how the robot scores, and over what a fish in its place gets."""
     rows = []
     for kind in kinds:
         own = [t for t in trials if t["kind"] == kind]
-        mean, low, high = interval([_against(t) for t in own])
-        parts = [
-            interval(
-                [t["robot_vs_fish"].get(f, {}).get("against_ceiling") or float("nan") for t in own]
-            )[0]
-            for f in "DWOT"
-        ]
+        mean, low, high = interval([_mark(t, "S", "value") for t in own])
+        shares = []
+        for feature in "SDWOT":
+            value = np.nanmean([_mark(t, feature, "value") for t in own])
+            shares.append(value / _ceiling(trials, feature))
         speed = float(np.median([t["times_real_time"] for t in own]))
-        rows.append([kind, mean, f"{low:.3f} to {high:.3f}", *parts, speed])
+        span = f"{low / _ceiling(trials, 'S'):.3f} to {high / _ceiling(trials, 'S'):.3f}"
+        rows.append([kind, mean, *shares[:1], span, *shares[1:], speed])
     head = (
         "robot",
-        "S against its ceiling",
+        "S",
+        "S over the ceiling",
         "95 % interval",
         "D",
         "W",
@@ -153,13 +162,42 @@ def markdown(found: dict[str, Any]) -> str:
         "T",
         "times real time",
     )
-    text = [textwrap.fill(" ".join(said.split()), 120)]
-    text.append(
-        "## The robot among the fish\n\n`robot-vs-fish`, pooled from 300 s to the end, over "
-        "what a fish in its place gets.\n\n" + table(head, rows)
+    return (
+        "## The robot among the fish\n\n`robot-vs-fish`, pooled from 300 s to the end, and over "
+        f"what a fish in its place gets: S {_ceiling(trials, 'S'):.3f}, the mean over all trials of the "
+        "table, since that of one trial comes from four fish and varies.\n\n" + table(head, rows)
     )
-    text.append(_model_table(trials))
-    return "# The published experiment, virtually\n\n" + "\n\n".join(text)
+
+
+def _difference_table(trials: list[dict[str, Any]], kinds: list[str]) -> str:
+    """Return how much better the calibrated robot is among the very same fish."""
+    rows = []
+    first = {t["seed"]: t for t in trials if t["kind"] == kinds[0]}
+    for kind in kinds[1:]:
+        own = [t for t in trials if t["kind"] == kind and t["seed"] in first]
+        parts = []
+        for feature in "SDWOT":
+            apart = [
+                _mark(first[t["seed"]], feature, "value") - _mark(t, feature, "value") for t in own
+            ]
+            mean, low, high = interval(apart)
+            parts.append(f"{mean:+.3f} ({low:+.3f} to {high:+.3f})")
+        rows.append([f"{kinds[0]} less {kind}", *parts])
+    return (
+        "Robot by robot among the same fish (same seed, same true parameters), with 95 % "
+        "intervals:\n\n" + table(("robots", "S", "D", "W", "O", "T"), rows)
+    )
+
+
+def _mark(trial: dict[str, Any], feature: str, what: str) -> float:
+    """Return a score of the robot, or its ceiling; NaN where there is none."""
+    found = trial["robot_vs_fish"].get(feature, {}).get(what)
+    return float("nan") if found is None else float(found)
+
+
+def _ceiling(trials: list[dict[str, Any]], feature: str) -> float:
+    """Return the mean ceiling over trials."""
+    return float(np.nanmean([_mark(t, feature, "ceiling") for t in trials]))
 
 
 def _model_table(trials: list[dict[str, Any]]) -> str:
@@ -193,7 +231,8 @@ def _model_table(trials: list[dict[str, Any]]) -> str:
 def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
     """Return what is compared with the committed results."""
     means = {
-        kind: interval([_against(t) for t in found["trials"] if t["kind"] == kind])[0]
+        kind: interval([_mark(t, "S", "value") for t in found["trials"] if t["kind"] == kind])[0]
+        / _ceiling(found["trials"], "S")
         for kind in KINDS
     }
     return {
