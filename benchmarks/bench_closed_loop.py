@@ -164,8 +164,9 @@ def _robot_table(trials: list[dict[str, Any]], kinds: list[str]) -> str:
     )
     return (
         "## The robot among the fish\n\n`robot-vs-fish`, pooled from 300 s to the end, and over "
-        f"what a fish in its place gets: S {_ceiling(trials, 'S'):.3f}, the mean over all trials of the "
-        "table, since that of one trial comes from four fish and varies.\n\n" + table(head, rows)
+        f"what a fish in its place gets: S {_ceiling(trials, 'S'):.3f}, the mean over all trials "
+        "of the table, since that of one trial comes from four fish and varies.\n\n"
+        + table(head, rows)
     )
 
 
