@@ -72,6 +72,18 @@ def test_a_track_that_was_the_robot_s_gets_a_new_name_as_a_fish():
     assert after[0.1] != before[0.1]
 
 
+def test_a_fish_that_crosses_over_the_robot_keeps_its_name():
+    """A little nearer to the LEDs for a moment it is still the fish, and the robot the robot."""
+    fuser = Fuser()
+    fuser.step([Blob(1, 0.50, 0.5), Blob(2, 0.60, 0.5)], robot(0.5, 0.5), 0.0)
+    before = kinds(fuser.step([Blob(1, 0.50, 0.5), Blob(2, 0.53, 0.5)], robot(0.5, 0.5), 0.0))
+
+    crossing = fuser.step([Blob(1, 0.507, 0.5), Blob(2, 0.502, 0.5)], robot(0.5, 0.5), 0.0)
+
+    assert kinds(crossing) == before
+    assert {a.x_m for a in crossing if a.kind == ROBOT} == {0.507}
+
+
 def test_a_fish_that_is_not_seen_for_a_while_keeps_its_name():
     """As long as the tracker keeps it."""
     fuser = Fuser()

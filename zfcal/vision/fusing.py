@@ -21,6 +21,9 @@ ALONE = 0.6
 GUESSED = 0.4
 """Confidence of a robot without LEDs, known by having been the robot before."""
 
+_STAYS_M = 0.01
+"""How much nearer to the LEDs than the robot's track another must be, to be the robot."""
+
 _FORGET_S = 60.0
 """Far longer than any tracker keeps the id of an animal that it does not see."""
 
@@ -104,10 +107,15 @@ class Fuser:
     def _which(self, blobs: Sequence[Blob], robot: RobotSeen, time_s: float) -> int | None:
         xy_m = np.array([(blob.x_m, blob.y_m) for blob in blobs], np.float64).reshape(-1, 2)
         which = nearest_blob(robot, xy_m, time_s)
-        if which is not None or not robot.is_lost:
-            return which
-        before = [k for k, blob in enumerate(blobs) if blob.agent == self._robot_blob]
-        return before[0] if before else None
+        before = next((k for k, blob in enumerate(blobs) if blob.agent == self._robot_blob), None)
+        if which is None:
+            return before if robot.is_lost else None
+        if before is not None:
+            # A fish that crosses over the robot may be a little nearer to its LEDs.
+            away_m = np.hypot(*(xy_m - (robot.x_m, robot.y_m)).T)
+            if away_m[before] <= away_m[which] + _STAYS_M:
+                return before
+        return which
 
     def _new(self) -> int:
         self.next_agent += 1

@@ -76,7 +76,7 @@ class Seen:
     Parameters
     ----------
     agent
-        Track id: the same for as long as it is certain, a new one after that.
+        The animal's id where their number is known; else the track's, a new one when in doubt.
     x_m, y_m
         Centroid of the silhouette, in metres.
     heading_rad
