@@ -8,19 +8,14 @@ import pytest
 
 from zfcal.model.effects import all_effects
 from zfcal.model.effects.generic import generic_effects
-from zfcal.model.extended import (
-    factors_of,
-    harmonics_of,
-    smooth_factors_of,
-    view_of,
-    with_effect,
-)
+from zfcal.model.extended import with_effect
 from zfcal.model.geometry import zone_of
-from zfcal.model.kernels.extended import factor_score, mixture_score
+from zfcal.model.kernels.scores import factor_score, mixture_score
 from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
 from zfcal.model.simulate import tank_of
+from zfcal.model.views import factors_of, harmonics_of, smooth_factors_of, view_of
 
 SMOOTH = [e for e in (*all_effects(), *generic_effects()) if e.harmonics is not None]
 

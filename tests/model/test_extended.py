@@ -7,33 +7,16 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from zfcal.model.extended import (
-    MIN_STEPS,
-    SCALES,
-    bounds_of,
-    constants,
-    maximise,
-    start_of,
-    view_of,
-    with_effect,
-    without_effects,
-    zone_scores,
-    zone_turns,
-)
-from zfcal.model.kernels.extended import (
-    BASE,
-    COLUMNS,
-    EXTRA,
-    densities,
-    extended_sums,
-    make_cells,
-)
+from zfcal.model.extended import bounds_of, maximise, start_of, with_effect, without_effects
+from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_scores, zone_turns
+from zfcal.model.kernels.extended import BASE, COLUMNS, EXTRA, densities, extended_sums, make_cells
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.likelihood import fit
 from zfcal.model.onestep import heading_density
 from zfcal.model.scene import make_scene
 from zfcal.model.simulate import simulate_tracks
 from zfcal.model.steps import ANGLES, steps_of
+from zfcal.model.views import view_of
 from zfcal.tracks import Samples
 
 DT_S = 0.2

@@ -34,10 +34,11 @@ from zfcal.diagnose.kernels import (
     heading_moments,
 )
 from zfcal.diagnose.surroundings import Surroundings, probabilities, signed_angle, surroundings
-from zfcal.model.extended import Fitted, sees_late
+from zfcal.model.fitted import Fitted
 from zfcal.model.kernels.scene import ask_speeds, perceive
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
+from zfcal.model.views import sees_late
 from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]

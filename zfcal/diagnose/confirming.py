@@ -18,7 +18,8 @@ from zfcal.diagnose.screening import Score, Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
 from zfcal.model.effects.generic import PREFIX
-from zfcal.model.extended import MIN_STEPS, Fitted, maximise
+from zfcal.model.extended import maximise
+from zfcal.model.fitted import MIN_STEPS, Fitted
 from zfcal.model.scene import Moves, Scene, thin
 
 Floats = NDArray[np.float64]

@@ -54,7 +54,8 @@ from zfcal.diagnose.telling import says
 from zfcal.diagnose.tracing import trace
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.effects.generic import generic_effects
-from zfcal.model.extended import Free, maximise
+from zfcal.model.extended import maximise
+from zfcal.model.fitted import Free
 from zfcal.model.scene import Scene, make_scene
 from zfcal.parameters import Parameters
 

@@ -21,7 +21,8 @@ from zfcal.diagnose.naming import refit
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import log_density
 from zfcal.model.effects import find_effect
-from zfcal.model.extended import Fitted, maximise
+from zfcal.model.extended import maximise
+from zfcal.model.fitted import Fitted
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, thin
 from zfcal.model.steps import ANGLES

@@ -20,7 +20,7 @@ from scipy.stats import false_discovery_control
 
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
-from zfcal.model.extended import Fitted
+from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Moves, Scene
 
 Floats = NDArray[np.float64]

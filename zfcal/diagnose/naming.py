@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.screening import Score, Screen
 from zfcal.diagnose.speeds import fit_speed
-from zfcal.model.extended import Fitted, Free, bounds_of, maximise, nats_at, with_effect
+from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
+from zfcal.model.fitted import Fitted, Free
 from zfcal.model.kernels.world import TRAIT
 from zfcal.model.scene import Scene
 

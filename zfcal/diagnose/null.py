@@ -20,7 +20,8 @@ from scipy import stats
 from zfcal.arena import Arena
 from zfcal.diagnose.screening import Screen
 from zfcal.errors import InputError
-from zfcal.model.extended import Fitted, maximise
+from zfcal.model.extended import maximise
+from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene, make_scene
 from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import Parameters

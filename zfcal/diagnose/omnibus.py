@@ -35,7 +35,7 @@ from zfcal.diagnose.null import UNLIKE
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
 from zfcal.diagnose.surroundings import probabilities, surroundings
-from zfcal.model.extended import Fitted
+from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Moves, Scene
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from zfcal.diagnose.contexts import contexts
 from zfcal.diagnose.kernels import rare_headings
 from zfcal.diagnose.ranks import speed_ranks
 from zfcal.diagnose.surroundings import surroundings
-from zfcal.model.extended import Fitted
+from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -26,20 +26,10 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.model.extended import (
-    SCALES,
-    Fitted,
-    attended,
-    components_of,
-    constants,
-    factors_of,
-    harmonics,
-    late_sight,
-    spin_of,
-    with_effect,
-    without_effects,
-)
-from zfcal.model.kernels.extended import (
+from zfcal.model.extended import with_effect, without_effects
+from zfcal.model.fitted import SCALES, Fitted, constants
+from zfcal.model.kernels.scene import ask_speeds, perceive
+from zfcal.model.kernels.scores import (
     component_score,
     factor_score,
     late_score,
@@ -47,10 +37,10 @@ from zfcal.model.kernels.extended import (
     mixture_score,
     social_score,
 )
-from zfcal.model.kernels.scene import ask_speeds, perceive
 from zfcal.model.kernels.world import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
+from zfcal.model.views import attended, components_of, factors_of, harmonics, late_sight, spin_of
 from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]

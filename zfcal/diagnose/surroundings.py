@@ -26,7 +26,7 @@ from zfcal.diagnose.kernels import (
     SUM_HY,
     surroundings_of,
 )
-from zfcal.model.extended import Fitted
+from zfcal.model.fitted import Fitted
 from zfcal.model.kernels.world import (
     FOLLOWS,
     HX,

@@ -1,0 +1,232 @@
+"""What the agents of a scene saw, and what a model's effects make of it, turn by turn.
+
+It comes from the very functions that a simulation calls; the base's parameters have no part.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.model.effects import find_effect
+from zfcal.model.kernels.extended import harmonic_tilt
+from zfcal.model.kernels.perception import REPULSION_M
+from zfcal.model.kernels.scene import (
+    PART,
+    ask_components,
+    ask_factors,
+    ask_harmonics,
+    ask_rotations,
+    attend,
+    head_late,
+    perceive,
+)
+from zfcal.model.kernels.world import Packed
+from zfcal.model.packing import pack
+from zfcal.model.scene import Scene
+from zfcal.model.steps import ANGLES
+from zfcal.parameters import Parameters
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """What the steps' agents saw, and what the effects ask, as the kernels want it.
+
+    Parameters
+    ----------
+    toward, angle_sr : ndarray, shape (step, column, 2) and (step, column)
+        Unit vectors to neighbours and solid angles, with the effects on sight. Where a
+        share of them is late, a second set of columns holds that share.
+    spin : ndarray, shape (step, 2)
+        Cosine and sine of the angle by which base directions are turned; empty where no
+        effect turns them.
+    seen_sr : ndarray, shape (step, agent)
+        Solid angles as effects are given them.
+    parts : ndarray, shape (step, component, 4)
+        Components of effects: weight, unit vector, kappa.
+    tilt, tilt_taken : ndarray, shape (step, cell) and (step,)
+        Product of factors; empty where the model has none.
+    """
+
+    toward: Floats
+    angle_sr: Floats
+    parts: Floats
+    tilt: Floats
+    tilt_taken: Floats
+    seen_sr: Floats
+    spin: Floats
+    late: dict[int, tuple[Floats, Floats]] = dataclasses.field(default_factory=dict)
+    """What was perceived so many steps late, so that a fit looks but once."""
+
+
+def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> View:
+    """Return what a model says of a scene's turns, but for the base's parameters.
+
+    Parameters
+    ----------
+    parameters
+        Its field of view and its effects count.
+    seen
+        A view of the model without effects, if there is one: sight is taken from it.
+    """
+    packed = pack([parameters], scene.arena)
+    share, all_late = packed.lates[0, 0], sees_late(packed)
+    known = {} if seen is None else seen.late
+    toward, angle = _perceived(scene, packed, known, all_late)
+    own = angle
+    if packed.lags[0] > 0 and share > 0.0 and not all_late:
+        late_toward, late_angle = late_sight(scene, packed, known)
+        toward = np.concatenate([toward, late_toward], axis=1)
+        angle = np.concatenate([(1 - share) * angle, share * late_angle], axis=1)
+    parts = components_of(scene, packed, own)
+    degree = harmonics_of(parameters)
+    if degree is None:
+        tilt, tilt_taken = factors_of(scene, packed, own)
+    else:
+        tilt, tilt_taken = smooth_factors_of(scene, packed, own, degree)
+    return View(
+        toward=toward,
+        angle_sr=angle,
+        parts=parts,
+        tilt=tilt,
+        tilt_taken=tilt_taken,
+        seen_sr=own,
+        spin=spin_of(scene, packed, own),
+        late=known,
+    )
+
+
+def spin_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
+    """Return cosine and sine of the angle that effects turn base directions by; or nothing."""
+    turns = scene.turns
+    spin = np.zeros((len(turns) if len(packed.rotations) else 0, 2))
+    if len(packed.rotations):
+        ask_rotations(scene.states, turns.at, turns.who, packed, angle_sr, spin)
+    return spin
+
+
+def sees_late(packed: Packed) -> int:
+    """Return by how many steps all that agents of a model see is late."""
+    share, _, whole = packed.lates[0]
+    return int(packed.lags[0]) if share >= 1.0 and whole > 0.0 else 0
+
+
+def late_sight(
+    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]]
+) -> tuple[Floats, Floats]:
+    """Return unit vectors and solid angles of neighbours as a model sees them that is late."""
+    lag, (_, felt_m, whole) = int(packed.lags[0]), packed.lates[0]
+    if whole > 0.0:
+        return _perceived(scene, packed, known, lag)
+    toward, angle = _perceived(scene, packed, known, 0)
+    turns, made = scene.turns, np.empty_like(toward)
+    near_m = max(float(felt_m), REPULSION_M)
+    head_late(scene.states, turns.at, turns.who, lag, near_m, toward, made)
+    return made, angle
+
+
+def _perceived(
+    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]], late: int
+) -> tuple[Floats, Floats]:
+    """Return what is seen so many steps late, with a model's effects on sight."""
+    if late not in known:
+        turns = scene.turns
+        cos_fov = float(packed.cos_fov[0])
+        known[late] = perceive(scene.states, turns.at, turns.who, late, cos_fov)
+    toward, angle = known[late]
+    return toward, attended(scene, packed, angle)
+
+
+def attended(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
+    """Return solid angles as a model's effects on sight change them.
+
+    Parameters
+    ----------
+    angle_sr : ndarray, shape (step, column)
+        One set of columns of the scene, or several side by side.
+    """
+    if not len(packed.sights):
+        return angle_sr
+    turns, n = scene.turns, scene.states.shape[2]
+    sets = []
+    for first in range(0, angle_sr.shape[1], n):
+        own = np.ascontiguousarray(angle_sr[:, first : first + n])
+        sets.append(np.empty_like(own))
+        attend(scene.states, turns.at, turns.who, packed, own, sets[-1])
+    return np.concatenate(sets, axis=1)
+
+
+def components_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
+    """Return the effects' components for each turn, shape (step, component, 4)."""
+    turns = scene.turns
+    parts = np.zeros((len(turns), len(packed.components), PART))
+    if len(packed.components):
+        ask_components(scene.states, turns.at, turns.who, packed, angle_sr, parts)
+    return parts
+
+
+def factors_of(
+    scene: Scene, packed: Packed, angle_sr: Floats, probability: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Return the effects' factors on each cell and at the heading taken; empty without.
+
+    Parameters
+    ----------
+    probability : ndarray, shape (turn, cell)
+        Where it is given, cells that hardly any heading takes have a factor of one.
+    """
+    turns = scene.turns
+    if not len(packed.factors):
+        return np.zeros((0, ANGLES)), np.zeros(0)
+    tilt, taken = np.empty((len(turns), ANGLES)), np.empty(len(turns))
+    ask_factors(
+        scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
+        turns.landing, turns.share, np.zeros((0, ANGLES)) if probability is None else probability,
+        tilt, taken,
+    )  # fmt: skip
+    return tilt, taken
+
+
+def harmonics_of(parameters: Parameters) -> int | None:
+    """Return the degree of the polynomial that a model's factors are; None where one is none."""
+    effects = [find_effect(name) for name in parameters.effects]
+    degrees = [effect.harmonics for effect in effects if effect.factor is not None]
+    known = [degree for degree in degrees if degree is not None]
+    return max(known, default=0) if len(known) == len(degrees) else None
+
+
+def harmonics(
+    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return the log of the effects' factors as a polynomial, and at the heading taken.
+
+    Returns
+    -------
+    waves, zones, log_taken
+        As `zfcal.model.kernels.scene.ask_harmonics` has them.
+    """
+    turns, n = scene.turns, len(scene.turns)
+    waves, log_taken = np.empty((n, 1 + 2 * degree)), np.empty(n)
+    zones = np.empty((n, turns.share.shape[2]))
+    ask_harmonics(
+        scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
+        turns.landing, waves, zones, log_taken,
+    )  # fmt: skip
+    return waves, zones, log_taken
+
+
+def smooth_factors_of(
+    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+) -> tuple[Floats, Floats]:
+    """Return what `factors_of` does, of factors that are polynomials in their log."""
+    if not len(packed.factors):
+        return np.zeros((0, ANGLES)), np.zeros(0)
+    waves, zones, log_taken = harmonics(scene, packed, angle_sr, degree)
+    tilt = np.empty((len(scene.turns), ANGLES))
+    harmonic_tilt(waves, zones, scene.turns.share, tilt)
+    return tilt, np.exp(log_taken)
