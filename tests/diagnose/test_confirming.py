@@ -7,7 +7,8 @@ import pytest
 
 from zfcal.diagnose.confirming import confirm, half_of, halves, halves_note, is_steady
 from zfcal.diagnose.naming import choose, refit
-from zfcal.diagnose.screening import Screen, summed
+from zfcal.diagnose.scores import summed
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene

@@ -7,16 +7,8 @@ import pytest
 from scipy import stats
 
 from zfcal.diagnose.candidates import askable, candidates_of
-from zfcal.diagnose.screening import (
-    Screen,
-    ask_all,
-    by_track,
-    centred,
-    excess_deviate,
-    normal_deviate,
-    summed,
-    tame,
-)
+from zfcal.diagnose.scores import by_track, centred, excess_deviate, normal_deviate, summed, tame
+from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
 

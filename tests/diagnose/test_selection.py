@@ -5,7 +5,7 @@ import pytest
 
 from zfcal.diagnose.candidates import candidates_of
 from zfcal.diagnose.null import from_replicates, theory
-from zfcal.diagnose.screening import Score
+from zfcal.diagnose.scores import Score
 from zfcal.diagnose.selection import Asked, best_of
 from zfcal.model.effects import find_effect
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.screening import Score, Screen
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
 from zfcal.model.effects.generic import PREFIX

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.diagnose.screening import Screen, summed
+from zfcal.diagnose.scores import summed
+from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
 from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
 from zfcal.model.scene import Scene

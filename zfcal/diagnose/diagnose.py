@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from zfcal.diagnose.candidates import Candidate, askable, candidates_of, company_of
+from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, is_suspicious, open_case
 from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
 from zfcal.diagnose.controls import NAMES, ask_controls
 from zfcal.diagnose.findings import (
@@ -23,21 +22,18 @@ from zfcal.diagnose.findings import (
     Screened,
     Verdict,
 )
-from zfcal.diagnose.heldout import own_speeds
-from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
+from zfcal.diagnose.located import Residuals, centre_and_spread, located
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.null import (
-    Chain,
-    Measurement,
     Null,
-    check_length,
     from_replicates,
     run_null,
     theory,
 )
-from zfcal.diagnose.omnibus import Omnibus, judge, statistics
+from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
-from zfcal.diagnose.screening import Score, Screen, ask_all
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVAL_Z,
@@ -49,26 +45,16 @@ from zfcal.diagnose.selection import (
     Step,
     best_of,
 )
-from zfcal.diagnose.sharpening import sharpened
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.tracing import trace
-from zfcal.model.effects import Effect, find_effect
-from zfcal.model.effects.generic import generic_effects
-from zfcal.model.extended import maximise
-from zfcal.model.fitted import Free
-from zfcal.model.scene import Scene, make_scene
-from zfcal.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
-LEAST_STEPS = 200
-"""Fewer steps with a heading tell nothing of twenty-one parameters."""
 
 _GENERIC_REPLICATES = 8
 _AT_LARGE_REPLICATES = 20
 """Replicates that are asked in general as well: where, and whether at all."""
 
-_QUICK_REPLICATES = 6
 _QUICK_Z = 2.5
 """Where positions are not sharp, a quick answer holds what is larger than that against a few
 replicates."""
@@ -76,11 +62,7 @@ replicates."""
 _NOTICED = 5.0
 """Standard errors at which an effect of notable strength must stand to be testable."""
 
-_UNEXPLAINED = 1e-3
 _CONTROL = 4.5
-_ASSUMED_NOISE_M = 0.0
-_SHARP_M = 1e-4
-"""Positions so sharp are those of the theory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,39 +72,6 @@ class _Row:
     listed: Floats
     controls: Floats | None
     at_large: tuple[Residuals, dict[str, float]] | None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Case:
-    """A question, its scene, the fitted model, and the families that are asked for."""
-
-    question: Question
-    scene: Scene
-    screen: Screen
-    listed: tuple[Candidate, ...]
-    generic: tuple[Candidate, ...]
-    lacks: dict[str, str]
-
-    def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
-        """Return the located residuals and the omnibus statistics of a screen."""
-        rng = np.random.default_rng([self.question.seed, 5, number])
-        scene, fitted, table = screen.scene, screen.fitted, screen.probability
-        return residuals(scene, fitted, table=table), statistics(scene, fitted, rng, table=table)
-
-    @cached_property
-    def chain(self) -> Chain:
-        """What makes replicates of the fitted model."""
-        question, fitted = self.question, self.screen.fitted
-        chain = Chain(
-            samples=question.samples,
-            arena=question.arena,
-            fitted=fitted,
-            maker=own_speeds(self.screen, fitted.parameters, question.arena.bins.speed_m_s),
-            measurement=Measurement(noise_m=_noise(question), grain_m=question.grain_m),
-            seed=question.seed,
-            keeps=_QUICK_REPLICATES if question.quick else 0,
-        )
-        return sharpened(chain) if _has_noise(question) else chain
 
 
 def diagnose(question: Question, tell: Tell) -> Diagnosis:
@@ -141,7 +90,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         There are no fish, or too few of their steps have a heading.
     """
     tell("fitting", 0, 1)
-    case = _open(question)
+    case = open_case(question)
     tell("fitting", 1, 1)
     scores = ask_all(case.screen, case.listed, question.n_workers)
     asked = _asked(question, scores)
@@ -155,7 +104,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
             null=_null([row.listed for row in rows], len(asked)),
         ),
         rivals=lambda screen: _rivals(case, screen),
-        suspicious=_is_suspicious(question, omnibus),
+        suspicious=is_suspicious(question, omnibus),
         n_workers=question.n_workers,
         told=tell,
     )
@@ -169,20 +118,6 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     return _diagnosis(case, rows, selection, (kept, confirmed), (where, omnibus))
 
 
-def _is_suspicious(question: Question, omnibus: Omnibus) -> bool:
-    """Tell whether model and data disagree at all; noise does, for the theory alone.
-
-    A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
-    """
-    sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
-    return (not question.quick or sharp) and omnibus.p < _UNEXPLAINED
-
-
-def _has_noise(question: Question) -> bool:
-    """Tell whether positions are known to err by so much that the theory alone is no null."""
-    return question.noise_m is not None and question.noise_m > _SHARP_M
-
-
 def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]:
     """Return which effects are held against replicates, each at its best shape.
 
@@ -192,7 +127,7 @@ def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]
     if not question.quick:
         return tuple(candidate for _, candidate in best)
     clear = -stats.norm.ppf(LEVEL / 2 / max(len(scores), 1))
-    if not _has_noise(question) or not any(z > clear for z, _ in best):
+    if not has_noise(question) or not any(z > clear for z, _ in best):
         return ()
     return tuple(candidate for z, candidate in best if z > _QUICK_Z)
 
@@ -207,7 +142,7 @@ def _best_shapes(scores: Sequence[Score]) -> list[tuple[float, Candidate]]:
     return list(best.values())
 
 
-def _null_rows(case: _Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row]:
+def _null_rows(case: Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row]:
     question = case.question
     if not asked:
         return []
@@ -220,7 +155,7 @@ def _null_rows(case: _Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row
             at_large=case.at_large(number + 1, screen) if number < n_at_large else None,
         )
 
-    n = _QUICK_REPLICATES if question.quick else question.n_null
+    n = QUICK_REPLICATES if question.quick else question.n_null
     return run_null(
         case.chain,
         ask,
@@ -230,68 +165,27 @@ def _null_rows(case: _Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row
     )
 
 
-def _noise(question: Question) -> float:
-    return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
-
-
 def _null(rows: Sequence[Floats], n_statistics: int) -> Null:
     return from_replicates(np.array(rows)) if len(rows) > 2 else theory(n_statistics)
 
 
-def _rivals(case: _Case, screen: Screen) -> list[Best]:
+def _rivals(case: Case, screen: Screen) -> list[Best]:
     """Return what beyond the list a model is asked for, held against a few replicates."""
     question = case.question
     alone = Asked(candidates=case.generic, held=(), null=theory(0))
     found = best_of(alone, ask_all(screen, case.generic, question.n_workers))
     found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
-    if not found or (question.quick and not _has_noise(question)):
+    if not found or (question.quick and not has_noise(question)):
         return found
     asked = tuple(best.score.candidate for best in found)
 
     def ask(_number: int, other: Screen) -> Floats:
         return np.array([other.ask(each).z for each in asked])
 
-    n = _QUICK_REPLICATES if question.quick else _GENERIC_REPLICATES
+    n = QUICK_REPLICATES if question.quick else _GENERIC_REPLICATES
     rows = run_null(case.chain, ask, n, n_workers=question.n_workers)
     family = Asked(candidates=case.generic, held=asked, null=_null(rows, len(asked)))
     return best_of(family, [best.score for best in found])
-
-
-def _open(question: Question) -> _Case:
-    model = dataclasses.replace(
-        question.model,
-        zones=tuple(dataclasses.replace(zone, kappa_w=None) for zone in question.model.zones),
-    )
-    scene = make_scene(question.samples, question.arena)
-    check_length(question.samples, scene, LEAST_STEPS)
-    fitted = maximise(scene, model, free=free_of_model(model))
-    effects, lacks = askable(scene, model)
-    own = tuple(model.effects)
-    return _Case(
-        question=question,
-        scene=scene,
-        screen=Screen(scene=scene, fitted=fitted),
-        listed=candidates_of(effects, question.arena, without=own),
-        generic=candidates_of(_generic(scene), question.arena, without=own),
-        lacks=lacks,
-    )
-
-
-def free_of_model(model: Parameters) -> Free:
-    """Return the parameters of a model's effects on heading that a fit moves."""
-    return tuple(
-        (name, key)
-        for name in model.effects
-        for effect in (find_effect(name),)
-        if not effect.on_speed
-        for key in effect.names
-        if key not in effect.fixed and key in model.effects[name]
-    )
-
-
-def _generic(scene: Scene) -> tuple[Effect, ...]:
-    company = company_of(scene)
-    return tuple(effect for effect in generic_effects() if effect.lacks(company) is None)
 
 
 def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, ...]:
@@ -305,7 +199,7 @@ def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, 
 
 
 def _diagnosis(
-    case: _Case,
+    case: Case,
     rows: Sequence[_Row],
     selection: Selection,
     kept: tuple[tuple[Step, ...], Sequence[Confirmed]],
@@ -322,7 +216,7 @@ def _diagnosis(
     screened = _screened(case, selection.screened)
     return Diagnosis(
         verdict=_verdict(
-            effects, screened, suspicious=wavers or _is_suspicious(case.question, omnibus)
+            effects, screened, suspicious=wavers or is_suspicious(case.question, omnibus)
         ),
         where=where,
         effects=effects,
@@ -362,7 +256,7 @@ def _verdict(
     return Verdict.UNTESTABLE if 2 * len(blind) > len(asked) else Verdict.NO_EFFECT
 
 
-def _screened(case: _Case, ranked: Sequence[Best]) -> tuple[Screened, ...]:
+def _screened(case: Case, ranked: Sequence[Best]) -> tuple[Screened, ...]:
     minutes = case.scene.duration_s / 60
     made = [_as_screened(best, minutes) for best in ranked]
     made += [
@@ -391,7 +285,7 @@ def _where(own: Residuals, rows: Sequence[_Row]) -> tuple[Located, ...]:
     return located(own, *centre_and_spread(own, nulls)) if nulls else located(own)
 
 
-def _notes(case: _Case, rows: Sequence[_Row], final: Screen, omnibus: Omnibus) -> tuple[Note, ...]:
+def _notes(case: Case, rows: Sequence[_Row], final: Screen, omnibus: Omnibus) -> tuple[Note, ...]:
     return (
         _noise_note(case.question),
         halves_note(case.screen),
@@ -420,7 +314,7 @@ def _noise_note(question: Question) -> Note:
     return Note(name="noise", says=f"{text} ({source}).", values={"noise_m": question.noise_m})
 
 
-def _controls_note(case: _Case, rows: Sequence[_Row], final: Screen) -> Note:
+def _controls_note(case: Case, rows: Sequence[_Row], final: Screen) -> Note:
     z = ask_controls(final, case.question.seed)
     drawn = [row.controls for row in rows if row.controls is not None]
     null = from_replicates(np.array(drawn)) if drawn else theory(len(z))

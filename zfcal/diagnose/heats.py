@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from zfcal.diagnose.heldout import evaluate
 from zfcal.diagnose.naming import Refit, refit
-from zfcal.diagnose.screening import Score, Screen
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen
 from zfcal.model.scene import Moves, Scene, thin
 
 HEAT_TURNS = 8000

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.diagnose.screening import Score, Screen
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed
 from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free

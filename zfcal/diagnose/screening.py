@@ -15,7 +15,6 @@ effect responds to, within each zone.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -23,9 +22,20 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.scores import (
+    Score,
+    Tables,
+    basis_of,
+    by_track,
+    centred,
+    excess_deviate,
+    normal_deviate,
+    summed,
+    tables_of,
+    tame,
+)
 from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
 from zfcal.model.kernels.scene import ask_speeds, perceive
@@ -45,8 +55,6 @@ from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]
 
-_FLOOR = 0.01
-"""Share of a uniform law in a heading's density, beside the lapse that was fitted."""
 
 _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""
@@ -57,69 +65,9 @@ _LATE_SHARE = 0.3
 """Share of a late response that is asked for: all fish that respond late are seldom seen."""
 
 _FAST_QUANTILE = 0.995
-_SEVERAL = 60.0
-"""Steps of one size that a score must be made of, to be as good as normal."""
 
 _LONG_RESTS_S = (1.0, 2.0)
 """Rests that last longer are asked for after one step at rest more."""
-
-_STEEPEST = 8.0
-"""What a speed responds to counts for no more than so many standard deviations: one
-swapped identity must not look like an effect."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Score:
-    """How strongly a recording asks for an effect at one shape.
-
-    Parameters
-    ----------
-    candidate
-        What was asked for.
-    z
-        Standard normal, analytically, when the model is right.
-    strength
-        One step of Newton from the null.
-    information
-        Of the strength: one over the square of its standard error.
-    steps : ndarray, shape (step,)
-        Efficient scores of the scene's turns, or of its moves for an effect on speed.
-    """
-
-    candidate: Candidate
-    z: float
-    strength: float
-    information: float
-    steps: Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Tables:
-    """The fitted density of each cell of headings.
-
-    Parameters
-    ----------
-    mixture : ndarray, shape (turn, cell)
-        Before attraction and tilts, not scaled.
-    probability, with_lapse : ndarray, shape (turn, cell)
-        Of each cell, without and with the lapse.
-    taken : ndarray, shape (turn,)
-        The mixture at the heading taken.
-    floor : ndarray, shape (turn,)
-        What is added to it, so that no heading counts for too much.
-    """
-
-    mixture: Floats
-    probability: Floats
-    with_lapse: Floats
-    taken: Floats
-    floor: Floats
-
-    def mixtures(
-        self, rows: NDArray[np.intp] | slice = slice(None)
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return what the scores of mixtures need of some turns."""
-        return self.mixture[rows], self.with_lapse[rows], self.taken[rows], self.floor[rows]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,21 +86,8 @@ class Screen:
     fitted: Fitted
 
     @cached_property
-    def _tables(self) -> _Tables:
-        mixture, probability, taken = self.fitted.tables()
-        lapse = np.zeros(len(taken))
-        for x, turns in zip(self.fitted.x, self.fitted.turns, strict=True):
-            lapse[turns.rows] = x[-1]
-        inside = probability > 0
-        evenly = inside / np.maximum(inside.sum(axis=1), 1)[:, None]
-        with_lapse = (1 - lapse)[:, None] * probability + lapse[:, None] * evenly
-        return _Tables(
-            mixture=mixture,
-            probability=probability,
-            with_lapse=with_lapse,
-            taken=taken,
-            floor=(lapse / (1 - lapse) + _FLOOR) * mixture.mean(axis=1),
-        )
+    def _tables(self) -> Tables:
+        return tables_of(self.fitted)
 
     @cached_property
     def _bases(self) -> tuple[list[Floats], Floats]:
@@ -162,11 +97,11 @@ class Screen:
             # A parameter at its bound explains nothing on the other side.
             open_ = np.ones(scores.shape[1], dtype=bool)
             open_[-1] = x[-1] > 2e-6
-            zones.append(_basis(scores[:, open_]))
+            zones.append(basis_of(scores[:, open_]))
         psi = self.fitted.effect_scores.copy()
         for basis, turns in zip(zones, self.fitted.turns, strict=True):
             psi[turns.rows] -= basis @ (basis.T @ psi[turns.rows])
-        return zones, _basis(psi)
+        return zones, basis_of(psi)
 
     @property
     def probability(self) -> Floats:
@@ -427,79 +362,6 @@ def _rested_steps(candidate: Candidate) -> int:
     """Return after how many steps at rest it is asked whether one more follows."""
     duration_s = candidate.shape.get("duration_s", 0.0)
     return 1 + sum(duration_s > limit_s for limit_s in _LONG_RESTS_S)
-
-
-def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
-    """Return the sums of scores and of their squares for each track, in ascending order."""
-    _, place = np.unique(track, return_inverse=True)
-    sums = np.bincount(place, weights=steps).astype(np.float64)
-    squares = np.bincount(place, weights=steps**2).astype(np.float64)
-    return sums, squares
-
-
-def normal_deviate(chi2: float, df: int) -> float:
-    """Return the normal deviate of the same upper tail as a chi-square."""
-    tail = float(stats.chi2.logsf(chi2, df))
-    if math.isinf(tail):  # beyond what a double holds: the first term of its expansion
-        half = chi2 / 2
-        tail = (df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)
-    return float(stats.norm.isf(np.exp(tail))) if tail > -600 else float(np.sqrt(-2 * tail))
-
-
-def excess_deviate(count: float, expected: float) -> float:
-    r"""Return a count as a normal deviate, where it was to be so large; however small both are.
-
-    By the inequality of Freedman (1975, Annals of Probability 3: 100-118) no such count has a
-    tail above :math:`\exp(-n \log(n / m) + n - m)`, whatever the dependence along the way.
-    """
-    if not expected > 0.0:
-        return 0.0
-    away = expected - count + (count * math.log(count / expected) if count > 0.0 else 0.0)
-    if count <= expected:
-        return -math.sqrt(2 * max(away, 0.0))
-    return max(0.0, float(stats.norm.isf(math.exp(-away)))) if away < 700 else math.sqrt(2 * away)
-
-
-def summed(candidate: Candidate, steps: Floats) -> Score:
-    """Return the score of a candidate from its efficient scores."""
-    total, information = float(steps.sum()), float((steps**2).sum())
-    if not information > 0:
-        return Score(candidate=candidate, z=0.0, strength=0.0, information=0.0, steps=steps)
-    # Where a few steps make up all of the sum it is not normal: they count for less.
-    several = information**2 / float((steps**4).sum())
-    return Score(
-        candidate=candidate,
-        z=total / np.sqrt(information) * min(1.0, np.sqrt(several / _SEVERAL)),
-        strength=total / information,
-        information=information,
-        steps=steps,
-    )
-
-
-def tame(scores: Floats) -> Floats:
-    """Return values with what lies beyond eight standard deviations set there."""
-    limit = _STEEPEST * float(scores.std()) if scores.size else 0.0
-    return np.clip(scores, -limit, limit)
-
-
-def centred(values: Floats, zone: NDArray[np.int64], kept: NDArray[np.bool_]) -> Floats:
-    """Return values less their mean in each zone; zero for what is not kept."""
-    rest = np.zeros_like(values)
-    for number in np.unique(zone):
-        rows = (zone == number) & kept
-        if rows.any():
-            rest[rows] = values[rows] - values[rows].mean()
-    return rest
-
-
-def _basis(columns: Floats) -> Floats:
-    """Return an orthonormal basis of columns; those that say nothing are left out."""
-    size = np.sqrt((columns**2).sum(axis=0))
-    columns = columns[:, size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)]
-    if not columns.size:
-        return np.zeros((len(columns), 0))
-    left, values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.ascontiguousarray(left[:, values > 1e-6])
 
 
 def ask_all(screen: Screen, candidates: Sequence[Candidate], n_workers: int) -> list[Score]:

@@ -21,7 +21,8 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.heats import unbeaten
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
-from zfcal.diagnose.screening import Score, Screen, ask_all
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen, ask_all
 
 Floats = NDArray[np.float64]
 Told = Callable[[str, int, int], None]

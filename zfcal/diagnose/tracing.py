@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.findings import Trace
 from zfcal.diagnose.naming import Refit
-from zfcal.diagnose.screening import Score, Screen
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen
 from zfcal.model.kernels.world import SPEED, WALL, ZONE, X, Y
 from zfcal.model.scene import Moves, Scene
 

@@ -1,0 +1,132 @@
+"""A question with its scene, the fitted model, and the families that are asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from zfcal.diagnose.candidates import Candidate, askable, candidates_of, company_of
+from zfcal.diagnose.heldout import own_speeds
+from zfcal.diagnose.located import Residuals, residuals
+from zfcal.diagnose.null import Chain, Measurement, check_length
+from zfcal.diagnose.omnibus import Omnibus, statistics
+from zfcal.diagnose.question import Question
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.sharpening import sharpened
+from zfcal.model.effects import Effect, find_effect
+from zfcal.model.effects.generic import generic_effects
+from zfcal.model.extended import maximise
+from zfcal.model.fitted import Free
+from zfcal.model.scene import Scene, make_scene
+from zfcal.parameters import Parameters
+
+LEAST_STEPS = 200
+"""Fewer steps with a heading tell nothing of twenty-one parameters."""
+
+QUICK_REPLICATES = 6
+
+_UNEXPLAINED = 1e-3
+
+_ASSUMED_NOISE_M = 0.0
+
+_SHARP_M = 1e-4
+"""Positions so sharp are those of the theory."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A question, its scene, the fitted model, and the families that are asked for."""
+
+    question: Question
+    scene: Scene
+    screen: Screen
+    listed: tuple[Candidate, ...]
+    generic: tuple[Candidate, ...]
+    lacks: dict[str, str]
+
+    def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
+        """Return the located residuals and the omnibus statistics of a screen."""
+        rng = np.random.default_rng([self.question.seed, 5, number])
+        scene, fitted, table = screen.scene, screen.fitted, screen.probability
+        return residuals(scene, fitted, table=table), statistics(scene, fitted, rng, table=table)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """What makes replicates of the fitted model."""
+        question, fitted = self.question, self.screen.fitted
+        chain = Chain(
+            samples=question.samples,
+            arena=question.arena,
+            fitted=fitted,
+            maker=own_speeds(self.screen, fitted.parameters, question.arena.bins.speed_m_s),
+            measurement=Measurement(noise_m=noise_of(question), grain_m=question.grain_m),
+            seed=question.seed,
+            keeps=QUICK_REPLICATES if question.quick else 0,
+        )
+        return sharpened(chain) if has_noise(question) else chain
+
+
+def is_suspicious(question: Question, omnibus: Omnibus) -> bool:
+    """Tell whether model and data disagree at all; noise does, for the theory alone.
+
+    A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
+    """
+    sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
+    return (not question.quick or sharp) and omnibus.p < _UNEXPLAINED
+
+
+def has_noise(question: Question) -> bool:
+    """Tell whether positions are known to err by so much that the theory alone is no null."""
+    return question.noise_m is not None and question.noise_m > _SHARP_M
+
+
+def noise_of(question: Question) -> float:
+    """Return the noise of positions per coordinate, in metres; none where it is not known."""
+    return _ASSUMED_NOISE_M if question.noise_m is None else question.noise_m
+
+
+def open_case(question: Question) -> Case:
+    """Return a question with the model fitted to its tracks, and what can be asked of them.
+
+    Raises
+    ------
+    InputError
+        There are no fish, or too few of their steps have a heading.
+    """
+    model = dataclasses.replace(
+        question.model,
+        zones=tuple(dataclasses.replace(zone, kappa_w=None) for zone in question.model.zones),
+    )
+    scene = make_scene(question.samples, question.arena)
+    check_length(question.samples, scene, LEAST_STEPS)
+    fitted = maximise(scene, model, free=free_of_model(model))
+    effects, lacks = askable(scene, model)
+    own = tuple(model.effects)
+    return Case(
+        question=question,
+        scene=scene,
+        screen=Screen(scene=scene, fitted=fitted),
+        listed=candidates_of(effects, question.arena, without=own),
+        generic=candidates_of(_generic(scene), question.arena, without=own),
+        lacks=lacks,
+    )
+
+
+def free_of_model(model: Parameters) -> Free:
+    """Return the parameters of a model's effects on heading that a fit moves."""
+    return tuple(
+        (name, key)
+        for name in model.effects
+        for effect in (find_effect(name),)
+        if not effect.on_speed
+        for key in effect.names
+        if key not in effect.fixed and key in model.effects[name]
+    )
+
+
+def _generic(scene: Scene) -> tuple[Effect, ...]:
+    company = company_of(scene)
+    return tuple(effect for effect in generic_effects() if effect.lacks(company) is None)
