@@ -50,8 +50,8 @@ _NEVER, _DOUBT = 1.0, 0.2
 """Squared body lengths by which an exchange is dearer: from which on there is none, and which
 makes it less likely by e."""
 
-_UNSEEN = 0.05
-"""Chance that two in one blob change places from one frame to the next."""
+_UNSEEN_PER_S = 0.75
+"""Chance in a second that two in one blob change places, though nothing else speaks for it."""
 
 _SMALL, _FAINT = 0.35, 0.6
 """Shares of the usual area and darkness below which a blob begins no track."""
@@ -107,12 +107,12 @@ class Trails:
                 replace(m, track=int(rows[m.track]), detection=int(columns[m.detection]))
                 for m in assign(cost[np.ix_(rows, columns)], gate[rows] ** 2)
             ]
-        self._mixed = self._crossings(matches, detections, cost)
+        self._mixed = self._crossings(matches, detections, cost, ages_s)
         self._take(matches, detections, time_s)
         self.forget(time_s)
 
     def _crossings(
-        self, matches: list[Match], detections: list[Detection], cost: Floats
+        self, matches: list[Match], detections: list[Detection], cost: Floats, ages_s: Floats
     ) -> dict[tuple[int, int], float]:
         """Return the chances that tracks, by their keys, have just changed places."""
         mixed = {}
@@ -126,7 +126,7 @@ class Trails:
             )
             if dearer < _NEVER:
                 chance = 1 / (1 + math.exp(dearer / _DOUBT))
-                within = _UNSEEN if a.blob is b.blob else 0.0
+                within = _UNSEEN_PER_S * ages_s[one.track] if a.blob is b.blob else 0.0
                 keys = self._trails[one.track].key, self._trails[other.track].key
                 mixed[keys] = min(chance + within, 0.5)
         return mixed
