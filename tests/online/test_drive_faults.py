@@ -16,8 +16,12 @@ import pytest
 from zfcal.artifacts.drive_files import drive_files, read_drive
 from zfcal.artifacts.mcap_files import overview
 from zfcal.errors import LockedError
+from zfcal.online.drive_models import DriveModels
 from zfcal.online.drive_replay import replay
 from zfcal.online.events import say_nothing
+from zfcal.online.opening import open_trial
+from zfcal.online.pilot import Manner, Pilot
+from zfcal.robot.fishbot import FishBot
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal_cli.main import run as zfcal
 
@@ -33,6 +37,9 @@ SECONDS = 40
 def template(tmp_path_factory):
     """Return a trial and frames for it."""
     root = driven.make_trial(tmp_path_factory.mktemp("live") / "trial")
+    opened = open_trial(root)
+    # Compiled here once, not by each driver while its robot waits.
+    Pilot(opened, Manner(), FishBot("F", None)).warm_up(DriveModels(opened).first())
     return root, driven.frames_of(root, SECONDS)
 
 

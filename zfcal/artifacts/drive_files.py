@@ -69,7 +69,8 @@ class DriveWriter:
         self.path = path
         self._last_ns = 0
         earlier = _earlier(path)
-        part = path.with_name(f".{path.name}.taken-up") if earlier else path
+        # Whoever looks finds a file with a head, and with all that it held before.
+        part = path.with_name(f".{path.name}.taken-up")
         try:
             # Not the trial itself: one that was moved away must not come into being again.
             path.parent.mkdir(exist_ok=True)
@@ -84,8 +85,7 @@ class DriveWriter:
             part.replace(path)
         except OSError as error:
             self.abandon()
-            if earlier:
-                part.unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
             raise storage_error(path, error) from error
 
     def add(self, item: Item) -> None:
