@@ -7,15 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import i0e
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
-from zfcal.model.kernels.staircase import COLUMNS, ROWS, build
+from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
 from zfcal.model.kernels.world import (
     KAPPA_BASE,
     KAPPA_F,
     LAG_MAX,
+    LAW_BASE,
+    LAW_F,
     LAWS,
     ZONE_COLUMNS,
     Packed,
@@ -105,6 +108,9 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
     zones[:, 1:] = np.stack([kappa_base, own[:, :, 1], own[:, :, 2]], axis=-1)
     turns = np.zeros((*zones.shape[:2], LAWS, ROWS, COLUMNS))
     build(zones[:, :, [KAPPA_BASE, KAPPA_F]].ravel(), turns.reshape(-1, ROWS, COLUMNS))
+    turns[:, :, [LAW_BASE, LAW_F], TAKE, SCALE_AT] = 1.0 / (
+        2.0 * math.pi * i0e(zones[:, :, [KAPPA_BASE, KAPPA_F]])
+    )
     attraction = np.zeros((n_models, n_zones + 1, n_zones + 1))
     top = gamma.max(axis=2, keepdims=True)
     # A row of zeros asks for nothing: without a preference all zones are alike.

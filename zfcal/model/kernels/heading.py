@@ -7,11 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
+from zfcal.model.compiled import inlined, kernel, lean
 from zfcal.model.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation, call_speed
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
+from zfcal.model.kernels.sectors import draw_in_sectors, open_sectors
 from zfcal.model.kernels.staircase import staircase_turn
 from zfcal.model.kernels.world import (
     ALPHA,
@@ -26,6 +27,7 @@ from zfcal.model.kernels.world import (
     PAST_HX,
     PAST_HY,
     SPEED,
+    TABLE,
     TAU_X,
     TAU_Y,
     ZONE,
@@ -38,10 +40,9 @@ from zfcal.model.kernels.world import (
 )
 
 REJECTIONS = 200
+PATIENCE = 12
+"""Draws from the mixture before its law is bounded in sectors, which costs as much as twenty."""
 REDRAWS = 50
-
-_TABLE = 0.0
-"""In place of a sampler's constant: the zone's own table serves."""
 
 Floats = NDArray[np.float64]
 Random = NDArray[np.uint64]
@@ -100,13 +101,13 @@ def gather(
             parts[count, 1] = sight.dx_m[k] * sight.toward_per_m[k]
             parts[count, 2] = sight.dy_m[k] * sight.toward_per_m[k]
             parts[count, 3] = kappa
-            parts[count, 4] = _TABLE
+            parts[count, 4] = TABLE
             total += weight
             count += 1
     for k in range(i * n, (i + 1) * n if late else i * n):
         weight = alpha * work.late[k, 0]
         if weight > 0.0:
-            parts[count, 0], parts[count, 3], parts[count, 4] = weight, kappa, _TABLE
+            parts[count, 0], parts[count, 3], parts[count, 4] = weight, kappa, TABLE
             parts[count, 1], parts[count, 2] = work.late[k, 1], work.late[k, 2]
             total += weight
             count += 1
@@ -269,7 +270,7 @@ def _draw_mixture(
     zone = int(state[ZONE, i])
     level = uniform(random) * total
     if level < 1.0:
-        law, r, kappa = LAW_BASE, _TABLE, packed.zones[model, zone, KAPPA_BASE]
+        law, r, kappa = LAW_BASE, TABLE, packed.zones[model, zone, KAPPA_BASE]
         if tank.follows[zone]:
             cx, cy = state[TAU_X, i], state[TAU_Y, i]
             if next_word(random) >> np.uint64(63):
@@ -286,7 +287,7 @@ def _draw_mixture(
             k += 1
         law, cx, cy = LAW_F, work.parts[k, 1], work.parts[k, 2]
         kappa, r = work.parts[k, 3], work.parts[k, 4]
-    if r == _TABLE:
+    if r == TABLE:
         cosine, sine = staircase_turn(kappa, packed.turns, (model, zone, law), random)
     else:
         cosine, sine = vonmises_turn(kappa, r, random)
@@ -315,7 +316,7 @@ def draw_exact(
         best = best_within(x, y, reach, packed.gamma[model, zone], tank)
     if best == 0.0:
         return False
-    for _ in range(REJECTIONS):
+    for _ in range(PATIENCE):
         ux, uy = _draw_mixture(i, state, model, packed, tank, random, work, count, total)
         landing, accept = zone, best
         if not sure:
@@ -326,6 +327,24 @@ def draw_exact(
         if accept >= best or uniform(random) * best < accept:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
+    return _draw_rare(i, speed, best, state, model, packed, tank, sight, random, work, count)
+
+
+@lean
+def _draw_rare(
+    i: int, speed: float, best: float, state: Floats, model: int, packed: Packed, tank: Tank,
+    sight: Sight, random: Random, work: Work, count: int,
+) -> bool:  # fmt: skip
+    """Go on where draws from the mixture were rejected: in sectors, and at last on the grid."""
+    reach = speed * packed.dt_s
+    opened = open_sectors(i, reach, best, state, model, packed, tank, work, count)
+    for _ in range(REJECTIONS - PATIENCE if opened[1] > 0.0 else 0):
+        if draw_in_sectors(i, reach, opened, state, model, packed, tank, random, work):
+            if packed.factors.shape[0] == 0:
+                return True
+            move = (work.moves[i, 0], work.moves[i, 1], speed, int(work.moves[i, 2]))
+            if uniform(random) < _tilt(i, move, state, model, packed, sight):
+                return True
     return draw_from_grid(i, speed, state, model, packed, tank, sight, random, work)
 
 

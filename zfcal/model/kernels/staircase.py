@@ -23,6 +23,8 @@ _REACH = 4.0
 
 HEIGHT, TAKE, OTHER, ROWS = range(4)
 COLUMNS = STEPS + 2
+SCALE_AT = STEPS + 1
+"""Behind TAKE: one over the integral of ``exp(kappa (cos t - 1))`` over the circle."""
 
 _TO_UNIT = 1.0 / (1 << 53)
 

@@ -51,8 +51,16 @@ LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_COLUMNS = range(4)
 LAW_BASE, LAW_F, LAWS = range(3)
 
 
+TABLE = 0.0
+"""In place of a sampler's constant: the zone's own table serves."""
+
 GRID = 360
 """Angles of the numeric density, -pi to pi, unless asked otherwise."""
+
+
+SECTORS = 32
+"""Of the circle, for headings that draws from the mixture hardly ever hit."""
+SECTOR_ROWS = 3
 
 
 class Packed(NamedTuple):
@@ -129,6 +137,10 @@ class Work(NamedTuple):
         Cosine and sine of the angle by which effects turn an agent's base directions.
     late : ndarray, shape (agent * agent, 3)
         Of what is late: its share of the solid angle, and the unit vector.
+    sectors : ndarray, shape (3, SECTORS)
+        Unit vector x and y of the middle of each, and a bound of the heading law.
+    laws : ndarray, shape (2 agents + components + 2, 4)
+        Unit vector x and y, kappa, and weight over integral, of each law of a mixture.
     """
 
     moves: Floats
@@ -142,17 +154,23 @@ class Work(NamedTuple):
     steps: Floats
     spin: Floats
     late: Floats
+    sectors: Floats
+    laws: Floats
 
 
 @kernel
 def make_work(n: int, n_components: int, grid: int) -> Work:
     """Return room for n agents, so many components of effects, and a grid of angles."""
     angles = np.linspace(-math.pi, math.pi, grid + 1)
+    sectors = np.zeros((SECTOR_ROWS, SECTORS))
+    for s in range(SECTORS):
+        middle = (2 * s + 1) * math.pi / SECTORS
+        sectors[0, s], sectors[1, s] = math.cos(middle), math.sin(middle)
     return Work(
         np.zeros((n, 4)), np.zeros((2 * n + n_components, 5)), np.zeros(n),
         np.cos(angles), np.sin(angles), np.zeros(grid + 1), np.zeros(grid + 1),
         np.zeros((LAG_MAX + 1, 4, n)), np.zeros(1), np.array([1.0, 0.0]),
-        np.zeros((n * n, 3)),
+        np.zeros((n * n, 3)), sectors, np.zeros((2 * n + n_components + 2, 4)),
     )  # fmt: skip
 
 
