@@ -35,6 +35,7 @@ from zfcal.model.kernels.world import (
     Work,
     X,
     Y,
+    has_effects,
     sight_row,
     splits,
 )
@@ -63,6 +64,41 @@ def draw_speed(
 
 
 @inlined
+def _own_row(i: int, n: int, packed: Packed, sight: Sight) -> tuple[int, int]:
+    """Return where the pairs of an agent start in `Sight`, and how many they are."""
+    row = sight_row(n, packed)
+    # Sight of all by all, or of this agent alone.
+    if sight.angle_sr.size < n * row:
+        return 0, n
+    return i * row, row
+
+
+@inlined
+def weigh(i: int, state: Floats, model: int, packed: Packed, sight: Sight) -> float:
+    """Return the sum of all weights of an agent's mixture, as `gather` does, without effects."""
+    first, row = _own_row(i, state.shape[1], packed, sight)
+    seen_sr = 0.0
+    for k in range(first, first + row):
+        seen_sr += sight.angle_sr[k]
+    return 1.0 + packed.zones[model, int(state[ZONE, i]), ALPHA] * seen_sr
+
+
+@inlined
+def _toward_one(
+    i: int, level: float, state: Floats, model: int, packed: Packed, sight: Sight
+) -> tuple[float, float]:
+    """Return the direction of the neighbour at a level of the summed weights, without effects."""
+    first, row = _own_row(i, state.shape[1], packed, sight)
+    alpha = packed.zones[model, int(state[ZONE, i]), ALPHA]
+    # No branch: which neighbour it is no processor can foresee.
+    k, below = first, 0.0
+    for other in range(first, first + row - 1):
+        below += alpha * sight.angle_sr[other]
+        k += level >= below
+    return sight.dx_m[k] * sight.toward_per_m[k], sight.dy_m[k] * sight.toward_per_m[k]
+
+
+@inlined
 def gather(
     i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work
 ) -> tuple[int, float]:
@@ -87,11 +123,7 @@ def gather(
     late = splits(model, packed)
     now = 1.0 - packed.lates[model, LATE_SHARE] if late else 1.0
     n = state.shape[1]
-    # Sight of all by all, or of this agent alone.
-    row = sight_row(n, packed)
-    first = i * row
-    if sight.angle_sr.size < n * row:
-        first, row = 0, n
+    first, row = _own_row(i, n, packed, sight)
     count, total = 0, 1.0
     for k in range(first, first + row):
         angle = sight.angle_sr[k]
@@ -263,10 +295,13 @@ def draw_on_grid(
 
 @inlined
 def _draw_mixture(
-    i: int, state: Floats, model: int, packed: Packed, tank: Tank, random: Random, work: Work,
-    count: int, total: float,
+    i: int, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight, random: Random,
+    work: Work, count: int, total: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the unit vector of a heading drawn from the mixture that `gather` wrote."""
+    """Return the unit vector of a heading drawn from the mixture.
+
+    Without effects its components are taken from sight; with them, from what `gather` wrote.
+    """
     zone = int(state[ZONE, i])
     level = uniform(random) * total
     if level < 1.0:
@@ -279,6 +314,9 @@ def _draw_mixture(
             cx, cy = state[HX, i], state[HY, i]
         if packed.rotations.shape[0] > 0:
             cx, cy = _spun(cx, cy, work)
+    elif not has_effects(packed):
+        law, r, kappa = LAW_F, TABLE, packed.zones[model, zone, KAPPA_F]
+        cx, cy = _toward_one(i, level - 1.0, state, model, packed, sight)
     else:
         level -= 1.0
         k = 0
@@ -317,7 +355,7 @@ def draw_exact(
     if best == 0.0:
         return False
     for _ in range(PATIENCE):
-        ux, uy = _draw_mixture(i, state, model, packed, tank, random, work, count, total)
+        ux, uy = _draw_mixture(i, state, model, packed, tank, sight, random, work, count, total)
         landing, accept = zone, best
         if not sure:
             landing = zone_of(x + reach * ux, y + reach * uy, tank)
@@ -327,16 +365,17 @@ def draw_exact(
         if accept >= best or uniform(random) * best < accept:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
-    return _draw_rare(i, speed, best, state, model, packed, tank, sight, random, work, count)
+    return _draw_rare(i, speed, best, state, model, packed, tank, sight, random, work)
 
 
 @lean
 def _draw_rare(
     i: int, speed: float, best: float, state: Floats, model: int, packed: Packed, tank: Tank,
-    sight: Sight, random: Random, work: Work, count: int,
+    sight: Sight, random: Random, work: Work,
 ) -> bool:  # fmt: skip
     """Go on where draws from the mixture were rejected: in sectors, and at last on the grid."""
     reach = speed * packed.dt_s
+    count, _ = gather(i, state, model, packed, sight, work)
     opened = open_sectors(i, reach, best, state, model, packed, tank, work, count)
     for _ in range(REJECTIONS - PATIENCE if opened[1] > 0.0 else 0):
         if draw_in_sectors(i, reach, opened, state, model, packed, tank, random, work):
@@ -358,7 +397,10 @@ def draw_move(
     Without an admissible direction the speed is redrawn, at most 50 times;
     then the agent stays: speed zero, the heading and zone that it has.
     """
-    count, total = gather(i, state, model, packed, sight, work)
+    if has_effects(packed):
+        count, total = gather(i, state, model, packed, sight, work)
+    else:
+        count, total = 0, weigh(i, state, model, packed, sight)
     factor = 1.0
     for k in range(packed.speeds.shape[0]):
         factor *= call_speed(
