@@ -191,9 +191,9 @@ def best_within(x: float, y: float, reach_m: float, gain: Floats, tank: Tank) ->
     """
     row, column = int((y - tank.y0_m) * tank.per_m), int((x - tank.x0_m) * tank.per_m)
     best = 0.0
+    # No branch but the loop's: which zones are near changes from step to step.
     for zone in range(1, gain.size):
-        if gain[zone] > best and tank.near_m[row, column, zone] <= reach_m:
-            best = gain[zone]
+        best = max(best, gain[zone] if tank.near_m[row, column, zone] <= reach_m else 0.0)
     return best
 
 

@@ -57,8 +57,8 @@ def draw_speed(
     zone = int(state[ZONE, i])
     place = 10.0 * uniform(random)
     column = int(place)
-    if place - column >= packed.speed_take[model, zone, column]:
-        column = packed.speed_other[model, zone, column]
+    other = packed.speed_other[model, zone, column]
+    column = other if place - column >= packed.speed_take[model, zone, column] else column
     share = (column + uniform(random)) / 10.0
     return tank.speed_low + (tank.speed_high - tank.speed_low) * share
 

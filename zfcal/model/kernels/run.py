@@ -116,12 +116,10 @@ def _count_state(
         column = bin_of(state[WALL, i], tank.wall_low_m, tank.wall_per_m)
         counts.wall[model, run, zone - 1, column] += 1
         for j in range(i):
-            if state[ZONE, j] == state[ZONE, i]:
-                away = math.sqrt(
-                    (state[X, i] - state[X, j]) ** 2 + (state[Y, i] - state[Y, j]) ** 2
-                )
-                column = bin_of(away, tank.distance_low_m, tank.distance_per_m)
-                counts.distance[model, run, zone - 1, column] += 1
+            # Of another zone none is added: whether it is one no processor can foresee.
+            away = math.sqrt((state[X, i] - state[X, j]) ** 2 + (state[Y, i] - state[Y, j]) ** 2)
+            column = bin_of(away, tank.distance_low_m, tank.distance_per_m)
+            counts.distance[model, run, zone - 1, column] += state[ZONE, j] == state[ZONE, i]
 
 
 @inlined

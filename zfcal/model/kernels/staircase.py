@@ -102,8 +102,8 @@ def staircase_turn(
     while True:
         place = (STEPS + 1) * uniform(random)
         step = int(place)
-        if place - step >= tables[m, z, law, TAKE, step]:
-            step = int(tables[m, z, law, OTHER, step])
+        other = int(tables[m, z, law, OTHER, step])
+        step = other if place - step >= tables[m, z, law, TAKE, step] else step
         wide, below = width, tables[m, z, law, HEIGHT, step + 1]
         if step == STEPS:
             wide, below = math.pi - STEPS * width, 0.0
