@@ -75,13 +75,24 @@ def nats_of(x, turns, view):
     return zone_scores(x, turns, view)[0]
 
 
-def test_the_maximum_is_that_of_the_base_models_likelihood(walk, scene, two_rooms, model):
-    """Both climb the same hill: 0.1 nats at most lie between their tops, of some 9,000."""
+def test_the_hill_is_that_of_the_base_models_likelihood(walk, scene, two_rooms, model):
+    """The base's top is as high here, to 1e-3 nats of some 9,000, and nothing higher is missed.
+
+    Kappas and alpha may go beyond what a gene can hold, so the top here can be the higher one;
+    the climb ends where no step promises 0.02 nats in a zone.
+    """
     base = fit(steps_of(walk, two_rooms, fov_rad=model.fov_rad), two_rooms, model)
     fitted = maximise(scene, model)
 
+    view, there = view_of(scene, base.parameters), 0.0
+    for x, turns, name in zip(
+        start_of(base.parameters), zone_turns(scene), base.lapse, strict=True
+    ):
+        x[-1] = base.lapse[name]
+        there += nats_of(x, turns, view).sum()
     assert fitted.used.sum() == base.n_steps
-    assert fitted.nats == pytest.approx(base.nats_per_step * base.n_steps, abs=0.1)
+    assert there == pytest.approx(base.nats_per_step * base.n_steps, abs=1e-3)
+    assert fitted.nats > there - 0.06
     for own, other in zip(fitted.parameters.zones, base.parameters.zones, strict=True):
         assert own.kappa_0 == pytest.approx(other.kappa_0, rel=0.03)
         assert own.alpha == pytest.approx(other.alpha, rel=0.05)
