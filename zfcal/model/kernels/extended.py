@@ -8,72 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
+from zfcal.model.compiled import kernel
+from zfcal.model.kernels.bells import exponential, one_over_integral
 from zfcal.model.kernels.likelihood import PER_CELL
 
 Floats = NDArray[np.float64]
 
 # Columns of the sums at the taken heading and over the landing zones.
 BASE, BASE_SLOPE, SOCIAL, SOCIAL_SLOPE, EXTRA, COLUMNS = range(6)
-
-
-@kernel
-def scale(kappa: float) -> float:
-    """Return one over ``2 pi I0(kappa) exp(-kappa)``.
-
-    Source: Abramowitz and Stegun 1964, 9.8.1 and 9.8.2 (relative error below 2e-7).
-    """
-    if kappa < 3.75:
-        t = (kappa / 3.75) ** 2
-        i0 = 1.0 + t * (
-            3.5156229
-            + t * (3.0899424 + t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))
-        )
-        return math.exp(kappa) / (2.0 * math.pi * i0)
-    t = 3.75 / kappa
-    scaled = 0.39894228 + t * (
-        0.01328592
-        + t
-        * (
-            0.00225319
-            + t
-            * (
-                -0.00157565
-                + t
-                * (
-                    0.00916281
-                    + t * (-0.02057706 + t * (0.02635537 + t * (-0.01647633 + t * 0.00392377)))
-                )
-            )
-        )
-    )
-    return math.sqrt(kappa) / (2.0 * math.pi * scaled)
-
-
-_HALVINGS = 10
-
-
-@inlined
-def _exponential(x: float) -> float:
-    """Return ``exp(x)`` for x in [-250, 0]: a series at x / 1024, squared ten times.
-
-    Nothing but products and sums, so that the compiler makes vectors of loops of it. The
-    relative error is below 2e-6 at -120, and next to nothing near zero.
-    """
-    y = x * (1.0 / (1 << _HALVINGS))
-    value = 1.0 + y * (
-        1.0 + y * (1 / 2 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720)))))
-    )
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    value *= value
-    return value * value
 
 
 class Cells(NamedTuple):
@@ -113,7 +55,7 @@ def bell(
     for g in range(gx.size):
         cosine[g] = gx[g] * x + gy[g] * y
     for g in range(gx.size):
-        value[g] = weight * _exponential(kappa * (cosine[g] - 1.0))
+        value[g] = weight * exponential(kappa * (cosine[g] - 1.0))
     for g in range(gx.size):
         total[g] += value[g]
 
@@ -171,7 +113,7 @@ def _own_parts(parts: Floats, own: Floats) -> None:
     """Write the components of one step with their constants."""
     for c in range(parts.shape[0]):
         own[c, :4] = parts[c]
-        own[c, 4] = scale(parts[c, 3]) if parts[c, 0] > 0.0 else 0.0
+        own[c, 4] = one_over_integral(parts[c, 3]) if parts[c, 0] > 0.0 else 0.0
 
 
 @kernel
@@ -307,4 +249,4 @@ def harmonic_tilt(waves: Floats, zones: Floats, share: NDArray[np.uint8], tilt: 
                         most, zone = share[s, g, z], z
                 total[g] += zones[s, zone]
         for g in range(cells):
-            tilt[s, g] = _exponential(min(total[g], 0.0))
+            tilt[s, g] = exponential(min(total[g], 0.0))

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.compiled import kernel
-from zfcal.model.kernels.extended import bell, make_cells, scale
+from zfcal.model.kernels.bells import one_over_integral
+from zfcal.model.kernels.extended import bell, make_cells
 
 Floats = NDArray[np.float64]
 
@@ -131,8 +132,9 @@ def component_score(
             if parts[s, c, 0] > 0.0:
                 there = True
                 kappa = parts[s, c, 3]
+                weight = parts[s, c, 0] * one_over_integral(kappa)
                 bell(
-                    parts[s, c, 1], parts[s, c, 2], kappa, parts[s, c, 0] * scale(kappa),
+                    parts[s, c, 1], parts[s, c, 2], kappa, weight,
                     cells.gx, cells.gy, cells.cosine, cells.value, more,
                 )  # fmt: skip
         if there:
