@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from zfcal.arena import Arena
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import Tank, zone_of
-from zfcal.model.kernels.heading import draw_move
+from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
@@ -201,4 +201,4 @@ def _draw(
         see_late(state, 0, packed, sight, work)
     else:
         look(state, 0, packed, sight)
-    draw_move(own, state, 0, packed, tank, sight, seeded(seed), work, False)
+    draw_one(own, state, packed, tank, sight, seeded(seed), work)

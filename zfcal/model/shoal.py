@@ -11,7 +11,8 @@ from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import Tank, zone_of
-from zfcal.model.kernels.heading import apply_move, draw_move
+from zfcal.model.kernels.heading import apply_move
+from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
@@ -146,7 +147,7 @@ def _step(
     else:
         look(state, 0, packed, sight)
     for i in range(n_fish):
-        draw_move(i, state, 0, packed, tank, sight, random, work, False)
+        draw_one(i, state, packed, tank, sight, random, work)
     for i in range(n_fish):
         apply_move(i, work, packed.dt_s, state)
         settle(i, state, tank)
