@@ -74,10 +74,17 @@ def record(worlds, tank, fish):
 @pytest.fixture(scope="session")
 def screen(record, tank, fish):
     """Return what fits the base model to a simulated recording, ready to be asked."""
+    kept = {}
 
     def of(seed, effects=None, **company):
-        scene = make_scene(record(seed, effects, **company), tank)
-        return Screen(scene=scene, fitted=maximise(scene, fish))
+        samples = record(seed, effects, **company)
+        if id(samples) not in kept:
+            # The last two: several tests in a row ask the same recording.
+            while len(kept) > 1:
+                del kept[next(iter(kept))]
+            scene = make_scene(samples, tank)
+            kept[id(samples)] = Screen(scene=scene, fitted=maximise(scene, fish))
+        return kept[id(samples)]
 
     return of
 
