@@ -55,13 +55,18 @@ def command(
         zfcal simulate alone --model my.toml --arena two-rooms --fish 5 --duration 600
         zfcal simulate filmed --model trial/models/000120.toml --duration 2min --video
     """
-    from zfcal.online.filming import simulate_on_film
     from zfcal.online.opening import Task
-    from zfcal.online.simulate import SimulateOptions
+    from zfcal.online.simulate import SimulateOptions, simulate
 
     def work() -> None:
         options = SimulateOptions(model=model, duration_s=duration_s, seed=seed, **new)
         task = Task(dry_run=dry_run, force=force)
+        if film is None:
+            simulate(trial, options, out.tell, task=task)
+            return
+        # What draws images takes a third of a second to import.
+        from zfcal.online.filming import simulate_on_film
+
         simulate_on_film(trial, options, film, out.tell, task=task)
 
     out.attempt(work)

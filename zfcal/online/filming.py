@@ -22,12 +22,12 @@ RIG_FPS = 15.0
 def simulate_on_film(
     root: Path,
     options: SimulateOptions,
-    filmed: FilmOptions | None,
+    filmed: FilmOptions,
     tell: Tell,
     *,
     task: Task | None = None,
 ) -> None:
-    """Simulate a trial, and draw the camera images of its tracks if they are asked for.
+    """Simulate a trial, and draw the camera images of its tracks.
 
     Parameters
     ----------
@@ -36,16 +36,13 @@ def simulate_on_film(
     options
         What to simulate.
     filmed
-        What to draw; None for tracks alone.
+        What to draw.
     tell
         Hears of every file.
     task
         How to go about it.
     """
     task = task or Task()
-    if filmed is None:
-        simulate(root, options, tell, task=task)
-        return
     new = not (root / "trial.toml").exists()
     # What cannot be drawn is said before anything is simulated.
     photograph_of(filmed)
