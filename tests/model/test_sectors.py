@@ -10,7 +10,8 @@ import pytest
 from scipy import stats
 
 from zfcal.model.compiled import kernel
-from zfcal.model.kernels.heading import PATIENCE, gather
+from zfcal.model.kernels.heading import PATIENCE
+from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.sectors import draw_in_sectors, open_sectors
 from zfcal.model.kernels.world import SECTORS, look, make_work

@@ -9,7 +9,8 @@ from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import Tank, zone_of
-from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_grid, gather
+from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_grid
+from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.world import (

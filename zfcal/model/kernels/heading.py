@@ -9,19 +9,18 @@ from numpy.typing import NDArray
 
 from zfcal.model.compiled import inlined, kernel, lean
 from zfcal.model.geometry import Tank, best_within, zone_of
-from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation, call_speed
+from zfcal.model.kernels.hooks import call_speed
+from zfcal.model.kernels.mixture import gather, spun, tilt, toward_one, weigh
 from zfcal.model.kernels.perception import Sight
-from zfcal.model.kernels.random import next_word, uniform, vonmises_r, vonmises_turn
+from zfcal.model.kernels.random import next_word, uniform, vonmises_turn
 from zfcal.model.kernels.sectors import draw_in_sectors, open_sectors
 from zfcal.model.kernels.staircase import staircase_turn
 from zfcal.model.kernels.world import (
-    ALPHA,
     CLEAR,
     HX,
     HY,
     KAPPA_BASE,
     KAPPA_F,
-    LATE_SHARE,
     LAW_BASE,
     LAW_F,
     PAST_HX,
@@ -36,8 +35,6 @@ from zfcal.model.kernels.world import (
     X,
     Y,
     has_effects,
-    sight_row,
-    splits,
 )
 
 REJECTIONS = 200
@@ -63,140 +60,6 @@ def draw_speed(
     return tank.speed_low + (tank.speed_high - tank.speed_low) * share
 
 
-@inlined
-def _own_row(i: int, n: int, packed: Packed, sight: Sight) -> tuple[int, int]:
-    """Return where the pairs of an agent start in `Sight`, and how many they are."""
-    row = sight_row(n, packed)
-    # Sight of all by all, or of this agent alone.
-    if sight.angle_sr.size < n * row:
-        return 0, n
-    return i * row, row
-
-
-@inlined
-def weigh(i: int, state: Floats, model: int, packed: Packed, sight: Sight) -> float:
-    """Return the sum of all weights of an agent's mixture, as `gather` does, without effects."""
-    first, row = _own_row(i, state.shape[1], packed, sight)
-    seen_sr = 0.0
-    for k in range(first, first + row):
-        seen_sr += sight.angle_sr[k]
-    return 1.0 + packed.zones[model, int(state[ZONE, i]), ALPHA] * seen_sr
-
-
-@inlined
-def _toward_one(
-    i: int, level: float, state: Floats, model: int, packed: Packed, sight: Sight
-) -> tuple[float, float]:
-    """Return the direction of the neighbour at a level of the summed weights, without effects."""
-    first, row = _own_row(i, state.shape[1], packed, sight)
-    alpha = packed.zones[model, int(state[ZONE, i]), ALPHA]
-    # No branch: which neighbour it is no processor can foresee.
-    k, below = first, 0.0
-    for other in range(first, first + row - 1):
-        below += alpha * sight.angle_sr[other]
-        k += level >= below
-    return sight.dx_m[k] * sight.toward_per_m[k], sight.dy_m[k] * sight.toward_per_m[k]
-
-
-@inlined
-def gather(
-    i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work
-) -> tuple[int, float]:
-    """Write the components of an agent's heading mixture beyond the base.
-
-    Parameters
-    ----------
-    work
-        Its ``parts`` receive weight, unit vector x and y, kappa of each component, and the
-        constant of its sampler, zero where the zone's table serves; the base has weight
-        one and is not among them.
-
-    Returns
-    -------
-    count : int
-    total : float
-        Sum of all weights, the base included.
-    """
-    zone = int(state[ZONE, i])
-    alpha = packed.zones[model, zone, ALPHA]
-    kappa, parts = packed.zones[model, zone, KAPPA_F], work.parts
-    late = splits(model, packed)
-    now = 1.0 - packed.lates[model, LATE_SHARE] if late else 1.0
-    n = state.shape[1]
-    first, row = _own_row(i, n, packed, sight)
-    count, total = 0, 1.0
-    for k in range(first, first + row):
-        angle = sight.angle_sr[k]
-        weight = now * alpha * angle
-        if weight > 0.0:
-            parts[count, 0] = weight
-            parts[count, 1] = sight.dx_m[k] * sight.toward_per_m[k]
-            parts[count, 2] = sight.dy_m[k] * sight.toward_per_m[k]
-            parts[count, 3] = kappa
-            parts[count, 4] = TABLE
-            total += weight
-            count += 1
-    for k in range(i * n, (i + 1) * n if late else i * n):
-        weight = alpha * work.late[k, 0]
-        if weight > 0.0:
-            parts[count, 0], parts[count, 3], parts[count, 4] = weight, kappa, TABLE
-            parts[count, 1], parts[count, 2] = work.late[k, 1], work.late[k, 2]
-            total += weight
-            count += 1
-    for k in range(packed.components.shape[0]):
-        weight = call_component(
-            packed.components[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, n, i,
-            packed.effects[model, packed.components[k, 1]].ctypes.data,
-            parts[count, 1:].ctypes.data,
-        )  # fmt: skip
-        if weight > 0.0:
-            parts[count, 0], parts[count, 4] = weight, vonmises_r(parts[count, 3])
-            total += weight
-            count += 1
-    if packed.rotations.shape[0] > 0:
-        _spin(i, state, model, packed, sight, work)
-    return count, total
-
-
-@inlined
-def _spin(i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
-    """Write the cosine and sine of the angle by which effects turn an agent's base law."""
-    angle = 0.0
-    for k in range(packed.rotations.shape[0]):
-        angle += call_rotation(
-            packed.rotations[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-            state.shape[1], i, packed.effects[model, packed.rotations[k, 1]].ctypes.data,
-        )  # fmt: skip
-    work.spin[0], work.spin[1] = math.cos(angle), math.sin(angle)
-
-
-@inlined
-def _spun(x: float, y: float, work: Work) -> tuple[float, float]:
-    """Return a base direction turned by the angle that `gather` wrote."""
-    return work.spin[0] * x - work.spin[1] * y, work.spin[1] * x + work.spin[0] * y
-
-
-@kernel
-def _tilt(
-    i: int,
-    move: tuple[float, float, float, int],
-    state: Floats,
-    model: int,
-    packed: Packed,
-    sight: Sight,
-) -> float:
-    """Return the product of the effects' factors for a heading, in [0, 1]."""
-    ux, uy, speed, landing = move
-    product = 1.0
-    for k in range(packed.factors.shape[0]):
-        product *= call_factor(
-            packed.factors[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-            state.shape[1], i, packed.effects[model, packed.factors[k, 1]].ctypes.data,
-            ux, uy, speed, landing,
-        )  # fmt: skip
-    return product
-
-
 @kernel
 def density_on_grid(
     i: int, speed: float, state: Floats, model: int, packed: Packed, tank: Tank, sight: Sight,
@@ -212,11 +75,11 @@ def density_on_grid(
     kappa = packed.zones[model, zone, KAPPA_BASE]
     work.density[:] = 0.0
     if tank.follows[zone]:
-        bx, by = _spun(state[TAU_X, i], state[TAU_Y, i], work)
+        bx, by = spun(state[TAU_X, i], state[TAU_Y, i], work)
         _add(work, 0.5, bx, by, kappa)
         _add(work, 0.5, -bx, -by, kappa)
     else:
-        bx, by = _spun(state[HX, i], state[HY, i], work)
+        bx, by = spun(state[HX, i], state[HY, i], work)
         _add(work, 1.0, bx, by, kappa)
     for k in range(count):
         _add(work, work.parts[k, 0], work.parts[k, 1], work.parts[k, 2], work.parts[k, 3])
@@ -226,7 +89,7 @@ def density_on_grid(
         landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
         work.density[k] *= packed.gamma[model, zone, landing]
         if packed.factors.shape[0] > 0 and work.density[k] > 0.0:
-            work.density[k] *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+            work.density[k] *= tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
 
 
 @kernel
@@ -286,7 +149,7 @@ def draw_on_grid(
         landing = zone_of(state[X, i] + reach * ux, state[Y, i] + reach * uy, tank)
         allowed = packed.gamma[model, zone, landing]
         if packed.factors.shape[0] > 0 and allowed > 0.0:
-            allowed *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+            allowed *= tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
         if allowed > 0.0:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
@@ -313,10 +176,10 @@ def _draw_mixture(
         else:
             cx, cy = state[HX, i], state[HY, i]
         if packed.rotations.shape[0] > 0:
-            cx, cy = _spun(cx, cy, work)
+            cx, cy = spun(cx, cy, work)
     elif not has_effects(packed):
         law, r, kappa = LAW_F, TABLE, packed.zones[model, zone, KAPPA_F]
-        cx, cy = _toward_one(i, level - 1.0, state, model, packed, sight)
+        cx, cy = toward_one(i, level - 1.0, state, model, packed, sight)
     else:
         level -= 1.0
         k = 0
@@ -361,7 +224,7 @@ def draw_exact(
             landing = zone_of(x + reach * ux, y + reach * uy, tank)
             accept = packed.gamma[model, zone, landing]
         if packed.factors.shape[0] > 0 and accept > 0.0:
-            accept *= _tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
+            accept *= tilt(i, (ux, uy, speed, landing), state, model, packed, sight)
         if accept >= best or uniform(random) * best < accept:
             work.moves[i, 0], work.moves[i, 1], work.moves[i, 2] = ux, uy, landing
             return True
@@ -382,7 +245,7 @@ def _draw_rare(
             if packed.factors.shape[0] == 0:
                 return True
             move = (work.moves[i, 0], work.moves[i, 1], speed, int(work.moves[i, 2]))
-            if uniform(random) < _tilt(i, move, state, model, packed, sight):
+            if uniform(random) < tilt(i, move, state, model, packed, sight):
                 return True
     return draw_from_grid(i, speed, state, model, packed, tank, sight, random, work)
 
