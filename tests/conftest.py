@@ -203,3 +203,21 @@ def make_diagnosis():
         return Diagnosis(**{**known, **changes})
 
     return make
+
+
+@pytest.fixture
+def set_clock(tmp_path, monkeypatch):
+    """Return a function that sets the clock of processes started from now on, such as +3600 s.
+
+    Their steady clock stays as it is, as it does where somebody sets a computer's time.
+    """
+    library = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
+    if not library.exists():
+        pytest.skip("needs the Debian package faketime")
+    step = tmp_path / "step"
+    step.write_text("+0")
+    monkeypatch.setenv("LD_PRELOAD", str(library))
+    monkeypatch.setenv("FAKETIME_TIMESTAMP_FILE", str(step))
+    monkeypatch.setenv("FAKETIME_NO_CACHE", "1")
+    monkeypatch.setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1")
+    return step.write_text

@@ -147,26 +147,15 @@ def test_segments_out_of_order_end_in_the_same_bytes(recording, undisturbed, wat
     assert watching.contents(recording) == undisturbed
 
 
-FAKETIME = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
-
-
 @pytest.mark.apt
 def test_a_clock_that_is_set_by_an_hour_changes_nothing(
-    recording, undisturbed, watching, tmp_path, monkeypatch
+    recording, undisturbed, watching, set_clock
 ):
     """Forwards and back while it works: what counts is a clock that nobody sets."""
-    if not FAKETIME.exists():
-        pytest.skip("needs the Debian package faketime")
-    step = tmp_path / "step"
-    step.write_text("+0")
-    monkeypatch.setenv("LD_PRELOAD", str(FAKETIME))
-    monkeypatch.setenv("FAKETIME_TIMESTAMP_FILE", str(step))
-    monkeypatch.setenv("FAKETIME_NO_CACHE", "1")
-    monkeypatch.setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1")
     with watching.start(recording, *ROUND, "--until-idle", "300s") as watch:
         watch.until("began")
         for offset, starts in (("+3600", (0, 60)), ("-3600", (120, 180))):
-            step.write_text(offset)
+            set_clock(offset)
             bring(recording, *starts)
             watch.until("finished", window_end_s=starts[1] + 60)
         bring(recording, 240)
