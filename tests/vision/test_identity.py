@@ -72,11 +72,11 @@ def test_a_new_track_takes_the_id_of_the_one_that_ended():
 
 
 def test_of_two_that_ended_the_nearer_is_gone_on_with():
-    """Both end, both begin: by place, since they look the same."""
+    """Both end, both begin elsewhere: by place, since they look the same."""
     film = Film()
     film.show({0: LARGE, 3: LARGE}, 30)
 
-    ids = film.show({13: LARGE, 10: LARGE}, 1)
+    ids = film.show({13: LARGE, 10: LARGE}, 6)
 
     assert sorted(ids.values()) == [0, 1]
 
@@ -145,3 +145,27 @@ def test_a_crowd_teaches_nothing():
 
     assert names.look(0) is None
     assert math.isnan(trail.darkness)
+
+
+@pytest.mark.parametrize(("apart", "silent"), [(1, 0), (4, 3)], ids=["beside", "apart"])
+def test_ids_exchanged_late_do_not_jump(apart, silent):
+    """Nobody is told for a fifth of a second where names go to another place; else at once."""
+    film = Film()
+    film.show({0: LARGE, apart: SMALL}, 150)
+    swapped = {0: SMALL, apart: LARGE}
+    told = [film.show(swapped, 1, mixed={(0, apart): 0.5})]
+    told += [film.show(swapped, 1) for _ in range(150)]
+
+    before, after = {0: 0, apart: 1}, {0: 1, apart: 0}
+    assert told.count({}) == silent
+    assert told == sorted(told, key=[before, {}, after].index)
+    assert told[0] == before
+    assert told[-1] == after
+
+
+def test_a_lost_id_that_is_found_elsewhere_at_once_is_not_told_yet():
+    """Three frames after it was last seen it may be anywhere."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 30)
+    told = [film.show({0: LARGE, 6: SMALL}, 1) for _ in range(4)]
+    assert told == [{0: 0}, {0: 0}, {0: 0, 6: 1}, {0: 0, 6: 1}]

@@ -219,6 +219,7 @@ class Trails:
         if self._identities is not None:
             names = self._identities.step(seen, self._mixed, time_s)
             self._mixed = {}
+            seen = [trail for trail in seen if trail.key in names]
             for trail in seen:
                 trail.agent = names[trail.key]
                 look = self._identities.look(trail.agent)
