@@ -14,9 +14,12 @@ from zfcal.diagnose.kernels import (
     QUANTITIES,
     TURN,
     heading_moments,
+    landing_chances,
     surroundings_of,
 )
 from zfcal.diagnose.located import Residuals, centre_and_spread, locate, located, residuals
+from zfcal.diagnose.standing import standing_of
+from zfcal.diagnose.surroundings import probabilities
 from zfcal.model.kernels.world import HX, HY, SPEED, STATES, ZONE, X, Y
 
 CELLS = 64
@@ -94,7 +97,7 @@ def test_every_statistic_of_the_base_model_is_a_standard_normal_number(base):
     """
     scene, fitted = base
 
-    table = residuals(scene, fitted)
+    table = residuals(standing_of(scene, fitted))
 
     assert np.abs(table.z).max() < 4.5
     blocks = table.block >= 0
@@ -257,8 +260,8 @@ def test_a_mirrored_tank_has_the_same_sizes_and_opposite_turns(worlds):
     one, model = worlds.fitted_scene(xy)
     # The diagonal from lower left to upper right mirrors the two rooms onto each other.
     other, mirrored = worlds.fitted_scene(np.ascontiguousarray(xy[..., ::-1]))
-    seen = {s.statistic: s for s in heading_statistics(one, model)}
-    back = {s.statistic: s for s in heading_statistics(other, mirrored)}
+    seen = {s.statistic: s for s in heading_statistics(standing_of(one, model))}
+    back = {s.statistic: s for s in heading_statistics(standing_of(other, mirrored))}
 
     for name, sign in (("turning", -1), ("turn size", 1), ("persistence", 1)):
         assert back[name].observed.sum() == pytest.approx(sign * seen[name].observed.sum())
@@ -270,8 +273,32 @@ def test_a_mirrored_tank_has_the_same_sizes_and_opposite_turns(worlds):
 def test_speeds_are_expected_as_their_zone_has_them(base):
     """The residuals of speed sum to zero in every zone, whatever the speeds."""
     scene, fitted = base
-    speed = next(s for s in speed_statistics(scene, fitted) if s.statistic == "speed")
+    speed = next(s for s in speed_statistics(standing_of(scene, fitted)) if s.statistic == "speed")
 
     left = np.bincount(scene.moves.zone, speed.observed - speed.expected)
 
     assert left == pytest.approx(np.zeros(4), abs=1e-9)
+
+
+def test_landing_chances_are_those_of_the_written_out_sum(base):
+    """Of each cell its parts by zone, weighted by preferences and made to sum to one."""
+    scene, fitted = base
+    turns, probability = scene.turns, probabilities(fitted)
+    weight = np.exp(np.random.default_rng(4).normal(size=(len(turns), turns.share.shape[2])))
+
+    found = landing_chances(probability, turns.share, weight)
+
+    parts = turns.share * weight[:, None, :]
+    parts /= np.maximum(parts.sum(axis=2, keepdims=True), 1e-300)
+    np.testing.assert_allclose(found, np.einsum("sg,sgz->sz", probability, parts), atol=1e-12)
+
+
+@pytest.mark.parametrize(("timed", "owned"), [(True, False), (False, True)])
+def test_parts_of_a_statistic_add_up_to_the_whole_recording(base, timed, owned):
+    """Over blocks of time, and over agents, where no part is too small."""
+    table = residuals(standing_of(*base))
+    whole = table.keys.index(("turning", -1, False, False))
+    rows = [key == ("turning", -1, timed, owned) for key in table.keys]
+
+    for of in (table.count, table.observed, table.expected, table.variance):
+        assert of[rows].sum() == pytest.approx(of[whole])

@@ -8,9 +8,10 @@ import pytest
 from scipy.stats import chi2, kstest, norm
 
 from zfcal.diagnose.chances import by_context, normal_of, rare_by_context
-from zfcal.diagnose.kernels import cell_ranks, rare_headings
+from zfcal.diagnose.kernels import cell_ranks, product_sums, rare_headings
 from zfcal.diagnose.omnibus import judge, omnibus, pulses, statistics
 from zfcal.diagnose.ranks import heading_ranks, scores_of, speed_ranks
+from zfcal.diagnose.standing import standing_of
 from zfcal.diagnose.surroundings import probabilities, signed_angle, surroundings
 from zfcal.model.scene import Moves
 
@@ -239,7 +240,7 @@ def test_no_statistics_no_disagreement():
 
 def test_the_same_seed_gives_the_same_statistics(base):
     """What is drawn at random is drawn from the generator that is given."""
-    one, other = (statistics(*base, np.random.default_rng(3)) for _ in range(2))
+    one, other = (statistics(standing_of(*base), np.random.default_rng(3)) for _ in range(2))
 
     assert one == other
 
@@ -258,3 +259,14 @@ def test_what_noise_explains_is_trusted_to_a_quarter():
     quiet = [{"a": rng.normal(0, 1)} for _ in range(39)]
     assert judge({"a": 13.0}, noisy).p > 0.01
     assert judge({"a": 13.0}, quiet).p < 1e-6
+
+
+def test_products_are_summed_over_steps_that_both_have_a_score():
+    """Neither over steps without another, nor where either has none."""
+    values = np.array([[1.0, 2.0], [3.0, -1.0], [np.nan, np.nan], [0.5, 4.0]])
+    sums = np.zeros(2)
+
+    n = product_sums(values, np.array([1, -1, 0, 1]), sums)
+
+    assert n == 2
+    assert sums == pytest.approx([1 * 3 + 0.5 * 3, 2 * -1 + 4 * -1])

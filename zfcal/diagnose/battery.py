@@ -32,8 +32,10 @@ from zfcal.diagnose.kernels import (
     TURN,
     TURN_SIZE,
     heading_moments,
+    landing_chances,
 )
-from zfcal.diagnose.surroundings import Surroundings, probabilities, signed_angle, surroundings
+from zfcal.diagnose.standing import Standing
+from zfcal.diagnose.surroundings import Surroundings, signed_angle
 from zfcal.model.fitted import Fitted
 from zfcal.model.kernels.scene import ask_speeds, perceive
 from zfcal.model.packing import pack
@@ -87,18 +89,10 @@ class Steps:
     variance: Floats
 
 
-def heading_statistics(
-    scene: Scene, fitted: Fitted, table: Floats | None = None
-) -> Iterator[Steps]:
-    """Yield what headings show, step by step of the scene's turns.
-
-    Parameters
-    ----------
-    table : ndarray, shape (turn, cell)
-        The second table of ``fitted.tables()``, where it is at hand.
-    """
-    turns, about = scene.turns, surroundings(scene, scene.turns)
-    probability = probabilities(fitted, table)
+def heading_statistics(standing: Standing) -> Iterator[Steps]:
+    """Yield what headings show, step by step of the scene's turns."""
+    scene, fitted, about = standing.scene, standing.fitted, standing.turns
+    turns, probability = scene.turns, standing.probability
     n = len(turns)
     waves, quantities = np.empty((n, 4)), np.empty((n, QUANTITIES, 3))
     reach_m = turns.speed_m_s * scene.dt_s
@@ -185,11 +179,10 @@ def _of_walls(waves: Floats, taken: Floats, about: Surroundings, reach_m: Floats
 def _of_landings(scene: Scene, fitted: Fitted, probability: Floats) -> Iterator[Steps]:
     """Yield, for each zone, whether a step led there, for steps that could."""
     turns = scene.turns
-    share = turns.share.astype(np.float64)
+    weight = np.ones((len(turns), turns.share.shape[2]))
     for x, own in zip(fitted.x, fitted.turns, strict=True):
-        share[own.rows] *= np.exp(x[3:-1])
-    share /= np.maximum(share.sum(axis=2, keepdims=True), 1e-300)
-    chance = np.einsum("sg,sgz->sz", probability, share)
+        weight[own.rows] = np.exp(x[3:-1])
+    chance = landing_chances(probability, turns.share, weight)
     for zone, name in enumerate(scene.arena.zone_names):
         p = np.clip(chance[:, zone], 0.0, 1.0)
         yield Steps(
@@ -201,15 +194,15 @@ def _of_landings(scene: Scene, fitted: Fitted, probability: Floats) -> Iterator[
         )
 
 
-def speed_statistics(scene: Scene, fitted: Fitted) -> Iterator[Steps]:
+def speed_statistics(standing: Standing) -> Iterator[Steps]:
     """Yield what speeds show, step by step of the scene's moves.
 
     A step's speed is drawn from what was measured in the zone where it begins, times
     what the model's effects make of it.
     """
+    scene, about = standing.scene, standing.moves
     moves = scene.moves
-    about = surroundings(scene, moves)
-    factor = speed_factor(scene, fitted)
+    factor = speed_factor(scene, standing.fitted)
     still = moves.speed_m_s < HEADING_MIN_STEP_M / scene.dt_s
     speed, v_mean, v_variance = _by_zone(moves.speed_m_s / np.maximum(factor, 1e-6), moves.zone)
     expected, variance = factor * v_mean, factor * factor * v_variance

@@ -16,6 +16,7 @@ from zfcal.diagnose.omnibus import Omnibus, statistics
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.sharpening import sharpened
+from zfcal.diagnose.standing import standing_of
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import maximise
@@ -50,8 +51,8 @@ class Case:
     def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
         """Return the located residuals and the omnibus statistics of a screen."""
         rng = np.random.default_rng([self.question.seed, 5, number])
-        scene, fitted, table = screen.scene, screen.fitted, screen.probability
-        return residuals(scene, fitted, table=table), statistics(scene, fitted, rng, table=table)
+        standing = standing_of(screen.scene, screen.fitted, screen.probability)
+        return residuals(standing), statistics(standing, rng)
 
     @cached_property
     def chain(self) -> Chain:

@@ -141,6 +141,58 @@ def heading_moments(
 
 
 @kernel
+def landing_chances(probability: Floats, share: NDArray[np.uint8], weight: Floats) -> Floats:
+    """Return the probability that a step ends in each zone, shape (step, zone).
+
+    Parameters
+    ----------
+    probability : ndarray, shape (step, cell)
+        Of each cell of headings.
+    share : ndarray of uint8, shape (step, cell, zone)
+        Parts of each cell that land in each zone.
+    weight : ndarray, shape (step, zone)
+        Preference of each zone.
+    """
+    steps, cells, zones = share.shape
+    chance = np.zeros((steps, zones))
+    for s in range(steps):
+        for g in range(cells):
+            p, whole = probability[s, g], 0.0
+            if not p > 0.0:
+                continue
+            for z in range(zones):
+                whole += share[s, g, z] * weight[s, z]
+            if whole > 0.0:
+                for z in range(zones):
+                    chance[s, z] += p * share[s, g, z] * weight[s, z] / whole
+    return chance
+
+
+@kernel
+def product_sums(values: Floats, other: Ints, sums: Floats) -> int:
+    """Add up products of scores with those of other steps; return of how many steps.
+
+    Parameters
+    ----------
+    values : ndarray, shape (step, degree)
+        NaN in all of a step's degrees where it has none.
+    other : ndarray of int64, shape (step,)
+        The other step of each, -1 for none.
+    sums : ndarray, shape (degree,)
+        Receives the sum of each degree.
+    """
+    n = 0
+    for s in range(other.size):
+        o = other[s]
+        if o < 0 or math.isnan(values[s, 0] * values[o, 0]):
+            continue
+        n += 1
+        for d in range(sums.size):
+            sums[d] += values[s, d] * values[o, d]
+    return n
+
+
+@kernel
 def _counted(angle: float, folded: bool) -> float:
     """Return an angle from -pi to 3 pi in [-pi, pi), or its size there."""
     if angle >= math.pi:

@@ -20,6 +20,7 @@ from scipy.stats import false_discovery_control
 
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
+from zfcal.diagnose.standing import Standing, standing_of
 from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Moves, Scene
 
@@ -89,25 +90,22 @@ class Residuals:
         ]
 
 
-def residuals(scene: Scene, fitted: Fitted, *, table: Floats | None = None) -> Residuals:
+def residuals(standing: Standing) -> Residuals:
     """Return the residuals of the battery, summed over the recording and its parts.
 
     Parameters
     ----------
-    scene
-        Where everybody was.
-    fitted
-        The model that is doubted, at its maximum likelihood on the scene.
-    table : ndarray, shape (turn, cell)
-        The second table of ``fitted.tables()``, where it is at hand.
+    standing
+        The scene under the model that is doubted.
     """
+    scene = standing.scene
     edges_s = _edges(scene)
     ids = np.unique(scene.moves.track)
     names: list[str] = []
     parts: list[_Sums] = []
     for steps, found in (
-        (scene.turns, heading_statistics(scene, fitted, table)),
-        (scene.moves, speed_statistics(scene, fitted)),
+        (scene.turns, heading_statistics(standing)),
+        (scene.moves, speed_statistics(standing)),
     ):
         split = _split(scene, steps, edges_s, ids)
         for each in found:
@@ -164,22 +162,22 @@ def _split(scene: Scene, steps: Moves, edges_s: Floats, ids: NDArray[np.int32]) 
 
 def _sums(steps: Steps, split: _Split, number: int) -> Iterator[_Sums]:
     rows = np.flatnonzero(steps.rows)
-    columns = (split.zone[rows], split.block[rows], split.agent[rows])
+    at = (split.zone[rows], split.block[rows], split.agent[rows])
+    cell, n = np.ravel_multi_index(at, split.sizes), math.prod(split.sizes)
+    finest = [
+        np.bincount(cell, values, n).reshape(split.sizes)
+        for values in (None, *(v[rows] for v in (steps.observed, steps.expected, steps.variance)))
+    ]
     for kept in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 0, 1)):
-        shape = tuple(size if keep else 1 for size, keep in zip(split.sizes, kept, strict=True))
-        at = [column if keep else 0 * column for column, keep in zip(columns, kept, strict=True)]
-        cell, n = np.ravel_multi_index(at, shape), int(np.prod(shape))
-        count = np.bincount(cell, minlength=n)
-        observed, expected, variance = (
-            np.bincount(cell, values[rows], n).astype(np.float64)
-            for values in (steps.observed, steps.expected, steps.variance)
-        )
-        enough = np.flatnonzero((count >= _LEAST_STEPS) & (variance > 1e-9 * count))
-        place = np.unravel_index(enough, shape)
-        where = [p if keep else np.full(len(enough), _ALL) for p, keep in zip(place, kept)]  # noqa: B905
+        over = tuple(axis for axis, keep in enumerate(kept) if not keep)
+        whole = [values.sum(axis=over, keepdims=True) for values in finest]
+        count, observed, expected, variance = whole
+        enough = np.nonzero((count >= _LEAST_STEPS) & (variance > 1e-9 * count))
+        size = len(enough[0])
+        where = [p if keep else np.full(size, _ALL) for p, keep in zip(enough, kept)]  # noqa: B905
         yield _Sums(
-            statistic=np.full(len(enough), number),
-            zone=where[0], block=where[1], agent=where[2], count=count[enough],
+            statistic=np.full(size, number),
+            zone=where[0], block=where[1], agent=where[2], count=count[enough].astype(np.int64),
             observed=observed[enough], expected=expected[enough], variance=variance[enough],
         )  # fmt: skip
 
@@ -331,4 +329,4 @@ def locate(scene: Scene, fitted: Fitted, *, most: int = MOST) -> tuple[Located, 
     most
         At most so many places.
     """
-    return located(residuals(scene, fitted), most=most)
+    return located(residuals(standing_of(scene, fitted)), most=most)

@@ -30,7 +30,7 @@ from zfcal.tracks import ROBOT, Samples
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 
-_ROUNDS = 3
+_ROUNDS = 2
 """Steps of a replicate's fit, which starts at the parameters that made it."""
 
 UNLIKE = 0.25

@@ -31,10 +31,11 @@ from scipy.stats import t as student
 from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of, normal_of_tail
 from zfcal.diagnose.contexts import contexts, speed_context
+from zfcal.diagnose.kernels import product_sums
 from zfcal.diagnose.null import UNLIKE
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
-from zfcal.diagnose.surroundings import probabilities, surroundings
+from zfcal.diagnose.standing import Standing, standing_of
 from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Moves, Scene
 
@@ -89,26 +90,20 @@ class _Scores:
         return np.asarray(np.isfinite(self.values[:, 0]))
 
 
-def statistics(
-    scene: Scene, fitted: Fitted, rng: np.random.Generator, *, table: Floats | None = None
-) -> dict[str, float]:
+def statistics(standing: Standing, rng: np.random.Generator) -> dict[str, float]:
     """Return the statistics of the omnibus test by name, each standard normal in the null.
 
     Parameters
     ----------
-    scene
-        Where everybody was.
-    fitted
-        The model that is doubted, at its maximum likelihood on the scene.
+    standing
+        The scene under the model that is doubted.
     rng
         For the ranks within a cell of headings.
-    table : ndarray, shape (turn, cell)
-        The second table of ``fitted.tables()``, where it is at hand.
     """
+    scene = standing.scene
     made: dict[str, float] = {}
     compass: list[Floats] = []
-    probability = probabilities(fitted, table)
-    for scores in _scored(scene, fitted, rng, probability):
+    for scores in _scored(standing, rng):
         if scores.known.sum() < LEAST_IN_BIN:
             continue
         if scores.steps is scene.turns:
@@ -121,22 +116,20 @@ def statistics(
             compass.append(_summed_up(scores, scene)[0])
     if compass:
         made["compass: pulses"] = pulses(np.stack(compass), scene.dt_s)
-    made |= rare_statistics(scene, fitted, probability)
-    made |= run_statistics(scene, fitted, rng)
+    made |= rare_statistics(standing)
+    made |= run_statistics(standing, rng)
     return {name: z for name, z in made.items() if math.isfinite(z)}
 
 
-def _scored(
-    scene: Scene, fitted: Fitted, rng: np.random.Generator, probability: Floats
-) -> Iterator[_Scores]:
+def _scored(standing: Standing, rng: np.random.Generator) -> Iterator[_Scores]:
+    scene, fitted, about = standing.scene, standing.fitted, standing.turns
     turns, moves = scene.turns, scene.moves
-    about = surroundings(scene, turns)
     sorted_by = contexts(scene, turns, about)
     sorted_by["own speed"] = speed_context(turns.speed_m_s)
-    for name, ranks in heading_ranks(turns, about, probability, rng).items():
+    for name, ranks in heading_ranks(turns, about, standing.probability, rng).items():
         values = scores_of(np.where(fitted.used, ranks, np.nan))
         yield _Scores(name=name, steps=turns, values=values, near=about.near, contexts=sorted_by)
-    about = surroundings(scene, moves)
+    about = standing.moves
     sorted_by = contexts(scene, moves, about)
     # Speeds are ranked within their zones: that says nothing.
     del sorted_by["zone"]
@@ -173,13 +166,9 @@ def _serial(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _products(values: Floats, other: Ints) -> float:
-    rows = other >= 0
-    product = values[rows] * values[other[rows]]
-    product = product[np.isfinite(product[:, 0])]
-    if len(product) < LEAST_IN_BIN:
-        return math.nan
-    chi2 = (product.sum(axis=0) ** 2).sum() / len(product)
-    return normal_of(float(chi2), product.shape[1])
+    sums = np.zeros(values.shape[1])
+    n = product_sums(values, other, sums)
+    return normal_of(float((sums**2).sum()) / n, sums.size) if n >= LEAST_IN_BIN else math.nan
 
 
 def _summed_up(scores: _Scores, scene: Scene, power: int = 1) -> Floats:
@@ -283,4 +272,4 @@ def omnibus(scene: Scene, fitted: Fitted, *, rng: np.random.Generator) -> Omnibu
     rng
         For the ranks within a cell of headings.
     """
-    return judge(statistics(scene, fitted, rng))
+    return judge(statistics(standing_of(scene, fitted), rng))

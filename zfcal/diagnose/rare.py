@@ -18,9 +18,7 @@ from zfcal.diagnose.chances import LEAST_IN_BIN, normal_of_tail, rare_by_context
 from zfcal.diagnose.contexts import contexts
 from zfcal.diagnose.kernels import rare_headings
 from zfcal.diagnose.ranks import speed_ranks
-from zfcal.diagnose.surroundings import surroundings
-from zfcal.model.fitted import Fitted
-from zfcal.model.scene import Scene
+from zfcal.diagnose.standing import Standing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,16 +35,9 @@ TAIL = 0.1
 """Share of the speeds of a zone that count as fast, and as slow."""
 
 
-def rare_statistics(scene: Scene, fitted: Fitted, probability: Floats) -> dict[str, float]:
-    """Return how headings that the model hardly expects lie about some directions.
-
-    Parameters
-    ----------
-    probability : ndarray, shape (turn, cell)
-        Of each cell of headings under the model.
-    """
-    turns = scene.turns
-    about = surroundings(scene, turns)
+def rare_statistics(standing: Standing) -> dict[str, float]:
+    """Return how headings that the model hardly expects lie about some directions."""
+    turns, about = standing.scene.turns, standing.turns
     east = np.broadcast_to(np.array([1.0, 0.0]), turns.taken.shape)
     ways = {
         "the nearest neighbour": about.toward_near,
@@ -63,9 +54,9 @@ def rare_statistics(scene: Scene, fitted: Fitted, probability: Floats) -> dict[s
     names = [f"{sign} {way}" for way in ways for sign in ("along", "against")]
     residual = np.empty(axis.shape[:2])
     variance = np.empty(axis.shape[:2])
-    rare_headings(probability, turns.taken, axis, _FLOOR, residual, variance)
-    residual[~fitted.used] = np.nan
-    found = contexts(scene, turns, about)
+    rare_headings(standing.probability, turns.taken, axis, _FLOOR, residual, variance)
+    residual[~standing.fitted.used] = np.nan
+    found = contexts(standing.scene, turns, about)
     sorted_by = {"": np.zeros(len(turns), dtype=np.int64)}
     sorted_by |= {f" by {context}": found[context] for context in _CONTEXTS}
     made = {}
@@ -77,7 +68,7 @@ def rare_statistics(scene: Scene, fitted: Fitted, probability: Floats) -> dict[s
     return made
 
 
-def run_statistics(scene: Scene, fitted: Fitted, rng: np.random.Generator) -> dict[str, float]:
+def run_statistics(standing: Standing, rng: np.random.Generator) -> dict[str, float]:
     """Return how often a fast step follows two, and a slow one two slow ones.
 
     In the model speeds are drawn anew at each step: after two fast steps, one's own or the
@@ -88,9 +79,9 @@ def run_statistics(scene: Scene, fitted: Fitted, rng: np.random.Generator) -> di
     rng
         Orders equal speeds.
     """
-    moves = scene.moves
-    ranks = speed_ranks(moves, speed_factor(scene, fitted), rng)
-    near = surroundings(scene, moves).near
+    scene, moves = standing.scene, standing.scene.moves
+    ranks = speed_ranks(moves, speed_factor(scene, standing.fitted), rng)
+    near = standing.moves.near
     table = np.full((len(scene.k) + 2, scene.states.shape[2]), np.nan)
     track = np.full(table.shape, -1, dtype=np.int64)
     table[moves.at + 2, moves.who], track[moves.at + 2, moves.who] = ranks, moves.track

@@ -1,0 +1,54 @@
+"""A scene under a model: what the statistics of a diagnosis ask of both, worked out once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.surroundings import Surroundings, probabilities, surroundings
+from zfcal.model.fitted import Fitted
+from zfcal.model.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Standing:
+    """A scene under a model.
+
+    Parameters
+    ----------
+    scene
+        Where everybody was.
+    fitted
+        The model that is doubted, at its maximum likelihood on the scene.
+    probability : ndarray, shape (turn, cell)
+        Of each cell of headings under the model, lapses included.
+    turns, moves
+        What the agents of the scene's turns and moves had about them.
+    """
+
+    scene: Scene
+    fitted: Fitted
+    probability: Floats
+    turns: Surroundings
+    moves: Surroundings
+
+
+def standing_of(scene: Scene, fitted: Fitted, table: Floats | None = None) -> Standing:
+    """Return a scene under a model.
+
+    Parameters
+    ----------
+    table : ndarray, shape (turn, cell)
+        The second table of ``fitted.tables()``, where it is at hand.
+    """
+    return Standing(
+        scene=scene,
+        fitted=fitted,
+        probability=probabilities(fitted, table),
+        turns=surroundings(scene, scene.turns),
+        moves=surroundings(scene, scene.moves),
+    )
