@@ -182,6 +182,29 @@ def test_rests_are_not_draws_of_no_speed(arena, model):
     assert gains.gain.values.sum() / gains.expected.values.sum() == pytest.approx(1.0, abs=0.15)
 
 
+def test_rare_rests_among_many_short_draws_are_worth_what_they_are_to_be(arena, model):
+    """A rest of 2 s every 100 s and fish, among a twentieth of draws that are too short.
+
+    Held out the chain gains what a chain like it would, and its own statistic, more steps at rest
+    after steps at rest than short draws make, is large without it and gone with it.
+    """
+    values = {"rate_per_s": 0.01, "duration_s": 2.0}
+    true = dataclasses.replace(model, effects={"freezing": values})
+    training, judging = halves(*simulated(arena, true, 9))
+    base = fit_base(training, model)
+    extended = fit_effects(base, {"freezing": values})
+    there = evaluate(extended, judging), evaluate(base, judging)
+
+    gains = speed_gains(*there, extended, random=np.random.default_rng(0))
+
+    assert gains.gain.values.sum() > 20
+    assert gains.gain.values.sum() / gains.expected.values.sum() == pytest.approx(1.0, abs=0.4)
+    found = extended.fitted.parameters.effects["freezing"]
+    with_, without = (effect_steps(each, extended, "freezing", found).values for each in there)
+    assert without.sum() / np.sqrt((without**2).sum()) > 5
+    assert abs(with_.sum()) < 0.3 * abs(without.sum())
+
+
 def test_sums_by_block_by_hand():
     """Steps at samples 0, 1 and 3 in blocks 0, 0 and 1."""
     steps = Steps(at=np.array([0, 1, 3]), values=np.array([1.0, 2.0, 5.0]))

@@ -28,7 +28,7 @@ def runs_in(still):
         length[step] = min(before, 30)
         before = before + 1 if now else 0
     zeros = np.zeros(len(still), dtype=np.int64)
-    return Runs(open_=zeros, length=length, zone=zeros, now=still)
+    return Runs(open_=zeros, length=length, zone=zeros, now=still, n_zones=1)
 
 
 def probability(still, chain, rest_first):
@@ -63,7 +63,7 @@ def test_a_fish_that_is_still_at_first_has_a_chance_of_its_own(chain):
     still = np.array([True, True, False])
     runs = Runs(
         open_=np.ones(3, dtype=np.int64), length=np.arange(3), zone=np.zeros(3, dtype=np.int64),
-        now=still,
+        now=still, n_zones=1,
     )  # fmt: skip
     told = math.exp(runs.log_chance(chain).sum())
     assert told == pytest.approx(probability(still, chain, 0.4))

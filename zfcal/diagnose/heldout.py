@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import rel_entr
 
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.naming import refit
-from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.speeds import log_density
+from zfcal.diagnose.rests import ChainFit, runs_of
+from zfcal.diagnose.screening import Screen, rested_steps
+from zfcal.diagnose.speeds import chain_of, log_density
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import Fitted
@@ -36,7 +38,6 @@ Effects = Mapping[str, Mapping[str, float]]
 
 _TINY = 1e-300
 _DRAWS = 8
-_SURE = 1e-6
 MIN_SPEEDS = 30
 """With fewer own speeds a zone keeps those of the model."""
 
@@ -278,38 +279,18 @@ def _factor(screen: Screen) -> Floats:
 
 def _stop_gains(model: Screen, trained: Screen) -> tuple[Floats, Floats]:
     """Return gains of a chain of swimming and resting over rests by zone alone."""
-    now, _ = model.still
-    chance, alike = stop_chances(trained, model)
-    log_still, log_moving = np.log(chance / alike), np.log((1 - chance) / (1 - alike))
-    gain = np.where(now, log_still, log_moving)
-    return gain, chance * log_still + (1 - chance) * log_moving
+    runs = runs_of(model)
+    found = _chain(trained)
+    ours, theirs = runs.still_chance(found.chain), runs.still_chance(found.alike)
+    gain = runs.log_chance(found.chain) - runs.log_chance(found.alike)
+    return gain, rel_entr(ours, theirs) + rel_entr(1 - ours, 1 - theirs)
 
 
-def stop_chances(trained: Screen, there: Screen) -> tuple[Floats, Floats]:
-    """Return the chance that a step is at rest, by state and zone, and by zone alone.
-
-    Parameters
-    ----------
-    trained
-        Steps that the chances are taken from.
-    there
-        Steps that they are for.
-    """
-    now, before = trained.still
-    stays = _share(now[before])
-    moves, zone = there.scene.moves, trained.scene.moves.zone
-    _, was = there.still
-    chance, alike = np.zeros(len(moves)), np.zeros(len(moves))
-    for number in np.unique(moves.zone):
-        here, rows = moves.zone == number, zone == number
-        alike[here] = _share(now[rows])
-        chance[here] = np.where(was[here], stays, _share(now[rows & ~before]))
-    return chance, alike
-
-
-def _share(rests: NDArray[np.bool_]) -> float:
-    share = float(rests.mean()) if len(rests) else 0.0
-    return min(max(share, _SURE), 1 - _SURE)
+def _chain(trained: Screen) -> ChainFit:
+    """Return the chain of the steps that a model was fitted on."""
+    effects = trained.fitted.parameters.effects
+    (name,) = (name for name in effects if find_effect(name).stops)
+    return chain_of(runs_of(trained), candidate_of(name, effects[name]), trained.scene.dt_s)
 
 
 def effect_steps(screen: Screen, trained: Screen, name: str, values: Mapping[str, float]) -> Steps:
@@ -333,10 +314,10 @@ def effect_steps(screen: Screen, trained: Screen, name: str, values: Mapping[str
     candidate = candidate_of(name, values)
     effect = candidate.effect
     if effect.stops and name in screen.fitted.parameters.effects:
-        now, before = screen.still
-        chance, _ = stop_chances(trained, screen)
-        cue = before - before.mean()
-        return Steps(at=screen.scene.moves.at, values=cue * (now - chance))
+        # As where the model lacks it, with the chance of a still step that the chain gives.
+        rested, (now, _) = screen.still_for(rested_steps(candidate)), screen.still
+        chance = runs_of(screen).still_chance(_chain(trained).chain)
+        return Steps(at=screen.scene.moves.at, values=np.where(rested, now - chance, 0.0))
     scored = screen.ask(candidate)
     at = screen.scene.moves.at if effect.on_speed else screen.scene.turns.at
     return Steps(at=at, values=scored.steps)

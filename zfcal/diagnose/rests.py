@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +66,7 @@ class Chain:
         return chance
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Runs:
     """For how long fish have been still before each of their steps.
 
@@ -81,17 +80,15 @@ class Runs:
         From 0.
     now : ndarray of bool, shape (move,)
         Whether the step is still.
+    n_zones
+        Zones of the arena.
     """
 
     open_: Ints
     length: Ints
     zone: Ints
     now: Bools
-
-    @cached_property
-    def n_zones(self) -> int:
-        """Zones up to the last in which there is a step."""
-        return int(self.zone.max(initial=0)) + 1
+    n_zones: int
 
     def counts(self, rows: Bools) -> Floats:
         """Return how many of some steps there are, shape (2, steps still before, zone, now)."""
@@ -100,9 +97,13 @@ class Runs:
         np.add.at(counts, at, 1.0)
         return counts
 
+    def still_chance(self, chain: Chain) -> Floats:
+        """Return the chance that each step had to be still, given those before, shape (move,)."""
+        return np.asarray(chain.still()[self.open_, self.length, self.zone])
+
     def log_chance(self, chain: Chain) -> Floats:
         """Return the log of the chance that each step had to be as it was, shape (move,)."""
-        still = chain.still()[self.open_, self.length, self.zone]
+        still = self.still_chance(chain)
         return np.asarray(np.log(np.where(self.now, still, 1 - still)))
 
 
@@ -120,7 +121,10 @@ def runs_of(screen: Screen) -> Runs:
     length, open_ = np.empty(len(order), dtype=np.int64), np.empty(len(order), dtype=np.int64)
     length[order] = np.minimum(np.where(known, here - swam, here - began + 1), _LONGEST)
     open_[order] = ~known
-    return Runs(open_=open_, length=length, zone=moves.zone - 1, now=now)
+    return Runs(
+        open_=open_, length=length, zone=moves.zone - 1, now=now,
+        n_zones=len(screen.scene.arena.zones),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

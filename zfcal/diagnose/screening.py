@@ -347,7 +347,7 @@ class Screen:
         """Return how many more steps at rest follow on steps at rest than short draws make."""
         moves, now = self.scene.moves, self.still[0]
         # A short draw looks like a rest of one step: after several of them few are left.
-        rested = self.still_for(_rested_steps(candidate))
+        rested = self.still_for(rested_steps(candidate))
         share = np.bincount(moves.zone, weights=now) / np.maximum(np.bincount(moves.zone), 1)
         expected = np.where(rested, share[moves.zone], 0.0)
         steps = np.where(rested, now, 0.0) - expected
@@ -358,7 +358,7 @@ class Screen:
         )
 
 
-def _rested_steps(candidate: Candidate) -> int:
+def rested_steps(candidate: Candidate) -> int:
     """Return after how many steps at rest it is asked whether one more follows."""
     duration_s = candidate.shape.get("duration_s", 0.0)
     return 1 + sum(duration_s > limit_s for limit_s in _LONG_RESTS_S)

@@ -167,7 +167,7 @@ def held_out_gain(
     """
     if candidate.effect.stops:
         runs = runs_of(screen)
-        found = _chain_of(runs, learnt, candidate, screen.scene.dt_s)
+        found = chain_of(runs, candidate, screen.scene.dt_s, learnt)
         return runs.log_chance(found.chain) - runs.log_chance(found.alike)
     likelihood = _Likelihood(screen=screen, candidate=candidate, learnt=learnt)
     return likelihood.log_p(likelihood.maximum(start)) - likelihood.without()
@@ -218,7 +218,7 @@ class _alone:  # noqa: N801 - a function of two steps
 def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
     """Return the chain of swimming and resting that fits best; beside it draws by zone alone."""
     runs, dt_s = runs_of(screen), screen.scene.dt_s
-    found = _chain_of(runs, np.ones(len(runs.now), dtype=bool), candidate, dt_s)
+    found = chain_of(runs, candidate, dt_s)
     chain, (error, _) = found.chain, found.errors
     rate = -math.log1p(-chain.begins) / dt_s
     # The error of a logit is that of a log, but for what is left of the chance.
@@ -231,8 +231,23 @@ def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
     )
 
 
-def _chain_of(runs: Runs, rows: NDArray[np.bool_], candidate: Candidate, dt_s: float) -> ChainFit:
-    """Return the chain that fits some of a recording's moves, within the effect's bounds."""
+def chain_of(
+    runs: Runs, candidate: Candidate, dt_s: float, learnt: NDArray[np.bool_] | None = None
+) -> ChainFit:
+    """Return the chain of swimming and resting that fits a recording's moves best.
+
+    Parameters
+    ----------
+    runs
+        Of the moves.
+    candidate
+        The effect, whose bounds hold.
+    dt_s
+        Between samples.
+    learnt : ndarray of bool, shape (move,)
+        Moves that it is taken from; all by default.
+    """
+    rows = np.ones(len(runs.now), dtype=bool) if learnt is None else learnt
     (_, most), (least_s, most_s) = (
         bounds_of(candidate.name, key) for key in (candidate.effect.strength, "duration_s")
     )
