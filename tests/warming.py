@@ -25,15 +25,23 @@ def tank_and_fish():
 
 def simulator():
     """Simulate a few steps, counted and recorded, of a few fish and of a crowd."""
-    from zfcal.model.packing import pack
-    from zfcal.model.simulate import MOST_IN_FULL, simulate_counts, simulate_tracks
+    from zfcal.model.simulate import MOST_IN_FULL, simulate_tracks
 
     tank, fish = tank_and_fish()
     for n_agents in (3, MOST_IN_FULL + 1):
-        simulate_counts(
-            pack([fish], tank), tank, n_agents=n_agents, n_steps=2, seeds=np.arange(1), n_threads=1
-        )
+        count(n_agents)
         simulate_tracks(fish, tank, n_agents=n_agents, n_steps=2, seed=1)
+
+
+def count(n_agents):
+    """Simulate two steps, and count them, as an evaluation does."""
+    from zfcal.model.packing import pack
+    from zfcal.model.simulate import simulate_counts
+
+    tank, fish = tank_and_fish()
+    simulate_counts(
+        pack([fish], tank), tank, n_agents=n_agents, n_steps=2, seeds=np.arange(1), n_threads=1
+    )
 
 
 def observer():

@@ -6,13 +6,17 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from zfcal.calibrate.task import Settings
 from zfcal_cli.main import run
 
-COMMAND = [sys.executable, "-m", "zfcal_cli.main"]
+BRIEF = Path(__file__).resolve().parents[1] / "brief.py"
+COMMAND = [sys.executable, str(BRIEF)]
+"""Words that start zfcal, with rounds that take a moment."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,18 @@ class Outcome:
     def lines(self):
         """The lines of standard output."""
         return self.out.splitlines()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def brief():
+    """Let rounds in this process be as short as those of `COMMAND`."""
+    spec = importlib.util.spec_from_file_location("brief", BRIEF)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in module.LESS.items():
+            patch.setitem(Settings.__init__.__kwdefaults__, name, value)
+        yield
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 distributed = pytest.importorskip("distributed", reason="the extra zfcal[cluster] is not there")
 
-ROUND = ("--generations", "2", "--population", "8", "--steps", "200")
+ROUND = ("--generations", "2", "--population", "8", "--steps", "200", "--no-seed-likelihood")
 
 
 def artifacts(root):

@@ -8,7 +8,7 @@ from zfcal.artifacts import foreign
 from zfcal.artifacts.lock import lock
 from zfcal_cli.foreign import FORMATS, import_options
 
-ROUND = ("--generations", "1", "--population", "4", "--steps", "20")
+ROUND = ("--generations", "1", "--population", "4", "--steps", "20", "--no-seed-likelihood")
 
 
 def test_init_makes_a_trial_and_says_where(zfcal):

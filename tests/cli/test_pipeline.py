@@ -8,7 +8,7 @@ import pytest
 
 from zfcal.model.compiled import cache_folder
 
-ROUND = "--generations 1 --population 4 --steps 20 --seed 1"
+ROUND = "--generations 1 --population 4 --steps 20 --seed 1 --no-seed-likelihood"
 
 
 @pytest.fixture

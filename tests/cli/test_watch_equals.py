@@ -87,7 +87,7 @@ def test_rounds_of_a_watch_with_a_budget_can_be_repeated(trial, zfcal, watching)
     """Each by the generations that it records, and the statistics that it is about."""
     again = shutil.copytree(trial, trial.parent / "again")
     shape = watching.quick[2:]
-    watched = zfcal("watch", "trial", "--once", "--budget", "6s", *shape)
+    watched = zfcal("watch", "trial", "--once", "--budget", "1s", *shape)
     assert watched.code == 0, watched.err
     assert zfcal("analyse", "again").code == 0
     for end in (120, 180):
@@ -96,5 +96,5 @@ def test_rounds_of_a_watch_with_a_budget_can_be_repeated(trial, zfcal, watching)
         stats = f"again/stats/{end:06d}.parquet"
         assert zfcal("calibrate", stats, "--generations", n, *shape).code == 0
     assert watching.contents(trial) == watching.contents(again)
-    untouched = zfcal("calibrate", "trial", "--budget", "6s", *shape)
+    untouched = zfcal("calibrate", "trial", "--budget", "1s", *shape)
     assert "nothing to do" in untouched.err

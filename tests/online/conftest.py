@@ -1,5 +1,6 @@
 """Trials made by hand, without the model: fish that wander in a square tank."""
 
+import functools
 import shutil
 
 import numpy as np
@@ -44,16 +45,28 @@ def put_tracks(root, tracks):
         write_tracks(root / "tracks" / f"{start:06d}.parquet", tracks.take(rows), lineage)
 
 
-@pytest.fixture
-def make_trial(tmp_path):
-    """Return what makes a trial of wandering fish in a square tank, 5 Hz."""
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """Return what makes a trial of wandering fish; of the same fish there is one."""
+    place = tmp_path_factory.mktemp("wandering")
 
-    def make(name="trial", *, seconds=240, n_fish=3, n_robots=0, seed=1):
-        root = tmp_path / name
+    @functools.cache
+    def make(seconds, n_fish, n_robots, seed):
+        root = place / f"{seconds}-{n_fish}-{n_robots}-{seed}"
         new = NewTrial(n_fish=n_fish, n_robots=n_robots, fps=5.0, side_m=1.0, seed=seed)
         create_trial(root, new, say_nothing)
         put_tracks(root, wander(seconds, n_fish=n_fish, n_robots=n_robots, seed=seed))
         return root
+
+    return make
+
+
+@pytest.fixture
+def make_trial(tmp_path, made_once):
+    """Return what makes a trial of wandering fish in a square tank, 5 Hz."""
+
+    def make(name="trial", *, seconds=240, n_fish=3, n_robots=0, seed=1):
+        return shutil.copytree(made_once(seconds, n_fish, n_robots, seed), tmp_path / name)
 
     return make
 

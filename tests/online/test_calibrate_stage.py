@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 import tomllib
 
 import numpy as np
@@ -34,12 +35,31 @@ class Killed(BaseException):
     """What a test throws into a round, as a power cut would."""
 
 
-@pytest.fixture
-def trial(make_trial):
-    """Return a trial of 4 minutes with its statistics."""
-    root = make_trial(seconds=240)
+@pytest.fixture(scope="module")
+def analysed(made_once, tmp_path_factory):
+    """Return a trial of 4 minutes with its statistics, which nobody changes."""
+    root = tmp_path_factory.mktemp("analysed") / "trial"
+    shutil.copytree(made_once(240, 3, 0, 1), root)
     analyse(root, AnalyseOptions(), say_nothing)
     return root
+
+
+@pytest.fixture
+def trial(analysed, tmp_path):
+    """Return a copy of that trial."""
+    return shutil.copytree(analysed, tmp_path / "trial")
+
+
+@pytest.fixture
+def quick(quick):
+    """Return options of a round that takes no estimate from the likelihood, which takes longest."""
+    return dataclasses.replace(quick, seed_likelihood=False)
+
+
+@pytest.fixture
+def in_full(quick):
+    """Return options of a round that has the estimate."""
+    return dataclasses.replace(quick, seed_likelihood=True)
 
 
 def made_of(events):
@@ -95,9 +115,9 @@ def test_the_model_draws_the_speeds_that_were_measured(trial, quick, heard):
         assert zone.speed_frequency == pytest.approx(own / own.sum())
 
 
-def test_each_round_starts_from_the_one_before(trial, quick, heard):
+def test_each_round_starts_from_the_one_before(trial, in_full, heard):
     """Its population is an input of the next, and comes back from the file as it was."""
-    calibrate(trial, quick, heard.append)
+    calibrate(trial, in_full, heard.append)
     first, second = (read_lineage(trial / "models" / f"{end}.toml") for end in ("000120", "000180"))
     assert set(first.inputs) == {
         "models/000000.toml",
