@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from zfcal.vision.assign import assign
 from zfcal.vision.background import background_of
 from zfcal.vision.detect import Corners, Limits, compare, find_blobs, shape_of
-from zfcal.vision.splitting import Pose, by_clusters, by_darkness, fit_bodies, template_of
+from zfcal.vision.splitting import by_clusters, by_darkness
 
 
 def blobs_of(drawn, bodies, *, corners=None, min_blob_px=12.0):
@@ -71,21 +71,6 @@ def test_clusters_start_where_fish_are_expected(drawn):
 
     assert right.x_px == pytest.approx(112.0, abs=2.0)
     assert left.x_px == pytest.approx(90.0, abs=2.0)
-
-
-def test_bodies_that_cross_are_moved_to_where_they_lie(drawn):
-    """An X, which clusters cut wrongly: bodies 3 px and 0.3 rad off come within 1.5 px."""
-    (alone,) = blobs_of(drawn, [(60.0, 60.0, 0.0)])
-    body = template_of(alone.pixels, alone.weights, 0.0)
-    bodies = [(100.0, 100.0, 0.5), (101.0, 101.0, -1.0)]
-    (blob,) = blobs_of(drawn, bodies)
-    start = [Pose(x_px=x + 2, y_px=y - 2, axis_rad=a + 0.3) for x, y, a in bodies]
-
-    found = fit_bodies(blob, [body, body], start)
-
-    for shape, (x, y, heading) in zip(found, bodies, strict=True):
-        assert math.hypot(shape.x_px - x, shape.y_px - y) < 1.5
-        assert abs(shape.axis_rad - heading) < 0.1
 
 
 def test_pairs_cost_least_together_and_stay_within_the_gate():

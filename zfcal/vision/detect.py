@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.vision._kernels import moments, shades
 from zfcal.vision.background import Background, Grey
 
 Floats = NDArray[np.float64]
@@ -128,14 +129,28 @@ class Contrast:
         The empty tank.
     foreground : ndarray of uint8, shape (height, width)
         255 where it is not the tank, closed.
-    core : ndarray of uint8, shape (height, width)
-        255 where it is surely not: a blob without any is noise, or shadow.
+    mask : ndarray of uint8, shape (height, width)
+        The same before it was closed.
+    inner : ndarray of uint8, shape (height, width), optional
+        What is darker surely is animal.
     """
 
     grey: Grey
     background: Background
     foreground: Grey
-    core: Grey
+    mask: Grey
+    inner: Grey | None = None
+
+    def core(self, crop: tuple[slice, slice]) -> Grey:
+        """Return what is surely not the tank, in a part of the image; it is noise without any.
+
+        Right for what hangs together and lies a pixel within that part.
+        """
+        if self.inner is None:
+            return np.asarray(cv2.morphologyEx(self.mask[crop], cv2.MORPH_OPEN, _KERNEL), np.uint8)
+        # Of three by three pixels: one of them alone is noise.
+        mean = cv2.blur(self.grey[crop], (3, 3))
+        return np.asarray(cv2.compare(mean, self.inner[crop], cv2.CMP_LT), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,13 +163,10 @@ class Limits:
         What is darker may be, if it hangs together with what surely is.
     inner : ndarray of uint8, shape (height, width), optional
         What is darker surely is; without, what is left of the foreground when it is opened.
-    region : ndarray of uint8, shape (height, width), optional
-        255 where animals can be.
     """
 
     outer: Grey
     inner: Grey | None = None
-    region: Grey | None = None
 
 
 def compare(grey: Grey, background: Background, limits: Limits) -> Contrast:
@@ -164,19 +176,13 @@ def compare(grey: Grey, background: Background, limits: Limits) -> Contrast:
     opened foreground only tells which pieces count; their extent is that before.
     """
     mask = cv2.compare(grey, limits.outer, cv2.CMP_LT)
-    if limits.region is not None:
-        mask = cv2.bitwise_and(mask, limits.region)
-    if limits.inner is None:
-        core = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _KERNEL)
-    else:
-        # Of three by three pixels: one of them alone is noise.
-        core = cv2.compare(cv2.blur(grey, (3, 3)), limits.inner, cv2.CMP_LT)
     closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _KERNEL)
     return Contrast(
         grey=grey,
         background=background,
         foreground=np.asarray(closed, np.uint8),
-        core=np.asarray(core, np.uint8),
+        mask=np.asarray(mask, np.uint8),
+        inner=limits.inner,
     )
 
 
@@ -205,19 +211,21 @@ def _blob(view: Contrast, contour: NDArray[np.int32]) -> Blob | None:
     crop = np.s_[top : y0 + height + 1, left : x0 + width + 1]
     inside = np.zeros(view.grey[crop].shape, np.uint8)
     cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-left, -top))
-    if not (view.core[crop] & inside).any():
+    if not (view.core(crop) & inside).any():
         return None
-    rows, columns = np.nonzero(cv2.dilate(inside, _KERNEL))
-    level = view.background.level[crop][rows, columns].astype(np.float64)
-    share = (level - view.grey[crop][rows, columns]) / np.maximum(level, 1.0)
-    kept = share > 0
-    share = share[kept]
+    pixels, share = shades(
+        np.asarray(cv2.dilate(inside, _KERNEL), np.uint8),
+        view.grey[crop].copy(),
+        view.background.level[crop].copy(),
+        left,
+        top,
+    )
     if not len(share):
         return None
     # Weighted by itself: the more of faint edge there is around a body, the same.
     darkness = float(share @ share / share.sum())
     return Blob(
-        pixels=np.column_stack([columns[kept] + left, rows[kept] + top]).astype(np.float64),
+        pixels=pixels,
         weights=np.minimum(share / (FULL * darkness), 1.0),
         shares=share,
         darkness=darkness,
@@ -277,23 +285,17 @@ def shape_of(pixels: Floats, weights: Floats, corners: Floats | None = None) -> 
     corners : ndarray, shape (corner, 2), optional
         The strongest first.
     """
-    total = float(weights.sum())
-    centre = weights @ pixels / total
-    away = pixels - centre
-    spread = (away * weights[:, None]).T @ away / total
-    angle = 0.5 * math.atan2(2 * spread[0, 1], spread[0, 0] - spread[1, 1])
-    axis = np.array([math.cos(angle), math.sin(angle)])
-    along = away @ axis
+    total, x, y, angle, (second, both, third) = moments(pixels, weights)
     # A pixel is a twelfth of a square pixel wide by itself.
-    long = float(weights @ along**2) / total + 1 / 12
-    wide = max(float(spread[0, 0] + spread[1, 1]) + 1 / 6 - long, 1 / 12)
-    skew = float(weights @ along**3) / total / long**1.5
-    lean = -skew / _SKEW
+    long = float(second) + 1 / 12
+    wide = max(float(both) + 1 / 6 - long, 1 / 12)
+    lean = -float(third) / long**1.5 / _SKEW
     if corners is not None and len(corners):
-        lean += _CORNER * float((corners[0] - centre) @ axis) / (2 * math.sqrt(long))
+        ahead = (corners[0, 0] - x) * math.cos(angle) + (corners[0, 1] - y) * math.sin(angle)
+        lean += _CORNER * float(ahead) / (2 * math.sqrt(long))
     return Shape(
-        x_px=float(centre[0]),
-        y_px=float(centre[1]),
+        x_px=x,
+        y_px=y,
         axis_rad=angle if lean >= 0 else math.remainder(angle + math.pi, 2 * math.pi),
         head=min(abs(lean), 1.0),
         length_px=4 * math.sqrt(long),

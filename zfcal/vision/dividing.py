@@ -76,7 +76,7 @@ def _areas(blob: Blob, trails: list[Trail], usual: Body) -> float:
     if not usual.area_px > 0:
         return 1.0
     own = [trail.own_area_px(usual.area_px) for trail in trails]
-    return blob.area_px / (float(np.mean(own)) if own else usual.area_px)
+    return blob.area_px / (sum(own) / len(own) if own else usual.area_px)
 
 
 def _count(areas: float, expected: int, *, known: bool) -> int:

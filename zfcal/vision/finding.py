@@ -47,7 +47,7 @@ class Finder:
         self.background = background
         self._region = None if region is None else (region * np.uint8(255)).astype(np.uint8)
         self._darkness = 0.0
-        self._limits = Limits(outer=background.low, region=self._region)
+        self._limits = Limits(outer=self._within(background.low))
 
     def find(self, grey: Grey, usual: Body) -> list[Blob]:
         """Return the blobs of an image that are dark enough for an animal.
@@ -77,13 +77,17 @@ class Finder:
     def _compared(self, grey: Grey) -> Contrast:
         return compare(grey, self.background, self._limits)
 
+    def _within(self, limit: Grey) -> Grey:
+        """Return a limit below which there is nothing outside the region."""
+        return limit if self._region is None else limit & self._region
+
     def _fit(self, darkness: float) -> None:
         level, low = self.background.level, self.background.low
         outer = np.minimum(low, (level * (1 - _OUTER * darkness)).astype(np.uint8))
         inner = None
         if self._options.method == SILHOUETTE:
             inner = (level * (1 - _INNER * darkness)).astype(np.uint8)
-        self._limits = Limits(outer=outer, inner=inner, region=self._region)
+        self._limits = Limits(outer=self._within(outer), inner=inner)
         self._darkness = darkness
 
 

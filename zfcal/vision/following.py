@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.vision._kernels import least_squares, step_costs
 from zfcal.vision.assign import Match, assign
 from zfcal.vision.detect import Blob
 from zfcal.vision.identity import Identities
@@ -86,7 +86,7 @@ class Trails:
                 continue
             at = trail.predicted(time_s)
             away = [_distance(blob, at, near) for blob in blobs]
-            nearest = int(np.argmin(away))
+            nearest = away.index(min(away))
             if away[nearest] < near:
                 thought[nearest].append(trail)
         return thought
@@ -101,10 +101,17 @@ class Trails:
         matches: list[Match] = []
         for late in (False, True):
             rows = np.flatnonzero(lost == late)
+            if not rows.size:
+                continue
             taken = {match.detection for match in matches}
             columns = np.array([k for k in range(len(detections)) if k not in taken], int)
             matches += [
-                replace(m, track=int(rows[m.track]), detection=int(columns[m.detection]))
+                Match(
+                    track=int(rows[m.track]),
+                    detection=int(columns[m.detection]),
+                    cost=m.cost,
+                    margin=m.margin,
+                )
                 for m in assign(cost[np.ix_(rows, columns)], gate[rows] ** 2)
             ]
         self._mixed = self._crossings(matches, detections, cost, ages_s)
@@ -139,19 +146,15 @@ class Trails:
         """
         if not self._trails or not detections:
             return np.empty((len(self._trails), len(detections)))
-        due = [t.predicted(time_s) for t in self._trails]
-        at = np.array(
-            [[*xy, t.heading_rad, t.mass] for xy, t in zip(due, self._trails, strict=True)]
-        )
+        unit = self._bodies.length_px
+        at = np.array([(*t.predicted(time_s), t.heading_rad) for t in self._trails])
         shapes = [d.shape for d in detections]
-        to = np.array([[s.x_px, s.y_px, s.axis_rad] for s in shapes])
-        away = _apart(at, to) / self._bodies.length_px**2
-        odd = np.abs(np.log(at[:, 3:] / np.array([d.mass for d in detections]))) - _ALIKE
+        to = np.array([(s.x_px, s.y_px, s.axis_rad, s.head) for s in shapes])
+        away = step_costs(at, to, 1 / _ALONG, _HEADING * unit**2) / unit**2
+        mass = np.array([[t.mass] for t in self._trails])
+        odd = np.abs(np.log(mass / np.array([d.mass for d in detections]))) - _ALIKE
         # Of those that were not told apart nobody knows how dark each is.
         away += _SIZE * np.nan_to_num(np.maximum(odd, 0.0)) ** 2
-        turn = at[:, None, 2] - to[None, :, 2]
-        head = np.array([s.head for s in shapes])
-        away += _HEADING * (1 - head * np.cos(turn) - (1 - head) * np.abs(np.cos(turn)))
         return away
 
     def _take(self, matches: list[Match], detections: list[Detection], time_s: float) -> None:
@@ -231,34 +234,7 @@ class Trails:
 def _distance(blob: Blob, at: Floats, near: float) -> float:
     """Return how far a point is from a blob, infinite where it is farther than near."""
     x, y, width, height = blob.box
-    left, top = at[0] - x, at[1] - y
+    left, top = float(at[0]) - x, float(at[1]) - y
     if not (-near <= left <= width + near and -near <= top <= height + near):
         return math.inf
-    return float(np.sqrt(((blob.pixels - at) ** 2).sum(axis=1).min()))
-
-
-def _apart(at: Floats, to: Floats) -> Floats:
-    """Return squared distances, those along the body shortened: fish do not move sideways.
-
-    Parameters
-    ----------
-    at : ndarray, shape (track, 3 or more)
-        x, y and heading.
-    to : ndarray, shape (detection, 3 or more)
-        The same.
-
-    Returns
-    -------
-    ndarray, shape (track, detection)
-    """
-    step = to[None, :, :2] - at[:, None, :2]
-    middle = (
-        at[:, None, 2]
-        + np.arctan2(
-            np.sin(to[None, :, 2] - at[:, None, 2]), np.cos(to[None, :, 2] - at[:, None, 2])
-        )
-        / 2
-    )
-    along = step[..., 0] * np.cos(middle) + step[..., 1] * np.sin(middle)
-    across = step[..., 1] * np.cos(middle) - step[..., 0] * np.sin(middle)
-    return (along / _ALONG) ** 2 + across**2
+    return math.sqrt(least_squares(at[None], blob.pixels)[0])

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from zfcal.vision._kernels import balance
 from zfcal.vision.trail import Trail
 from zfcal.vision.usual import Body
 
@@ -169,16 +170,8 @@ class Identities:
         tells = -0.5 * odd.sum(axis=2)
         tells = np.maximum(tells - tells.max(axis=1, keepdims=True), -_OUTLIER)
         self._chance[rows] *= np.exp(weight * tells)
-        self._balance()
+        balance(self._chance, _LEAST, _ROUNDS)
         self._learn(rows, seen, np.log([t.shape.length_px for t in trails]))
-
-    def _balance(self) -> None:
-        """Make rows and columns sum to one again (Sinkhorn)."""
-        chance = np.maximum(self._chance, _LEAST)
-        for _ in range(_ROUNDS):
-            chance /= chance.sum(axis=1, keepdims=True)
-            chance /= chance.sum(axis=0)
-        self._chance = chance
 
     def _learn(self, rows: NDArray[np.intp], seen: Floats, lengths: Floats) -> None:
         for row, each, length in zip(rows, seen, lengths, strict=True):

@@ -12,6 +12,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.vision._kernels import read_grid
 from zfcal.vision.camera import Projection
 
 Floats = NDArray[np.float64]
@@ -41,7 +42,8 @@ class Plane:
         self._shape = tuple(side // _STEP_PX + 2 for side in size_px)
         x, y = np.meshgrid(*(_STEP_PX * np.arange(n) for n in self._shape), indexing="ij")
         points = np.column_stack([x.ravel(), y.ravel()]).astype(np.float64)
-        self._grid = projection.to_metres(points).reshape(*self._shape, 2)
+        grid = projection.to_metres(points).reshape(*self._shape, 2)
+        self._grid = np.ascontiguousarray(grid, np.float64)
         self._is_right = self._checked(points[::_SOME] + _STEP_PX / 2)
 
     def _checked(self, xy_px: Floats) -> bool:
@@ -61,14 +63,4 @@ class Plane:
 
     def _read(self, xy_px: Floats) -> Floats:
         """Return what the grid tells; NaN beyond it."""
-        at = xy_px / _STEP_PX
-        low = np.clip(np.floor(at).astype(int), 0, np.array(self._shape) - 2)
-        right, down = (at - low).T[..., None]
-        i, j = low.T
-        grid = self._grid
-        upper = (1 - right) * grid[i, j] + right * grid[i + 1, j]
-        lower = (1 - right) * grid[i, j + 1] + right * grid[i + 1, j + 1]
-        found = (1 - down) * upper + down * lower
-        beyond = ((at < low) | (at > low + 1)).any(axis=1)
-        found[beyond] = np.nan
-        return np.asarray(found, np.float64)
+        return read_grid(self._grid, xy_px / _STEP_PX)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from zfcal.vision.detect import FULL, Blob, Shape
 from zfcal.vision.fitting import Build
-from zfcal.vision.splitting import Pose, Template, ellipse, template_of
 from zfcal.vision.usual import Body as Look
 
 Floats = NDArray[np.float64]
@@ -89,7 +88,6 @@ class Trail:
 
     __slots__ = (
         "_alone",
-        "_body",
         "_crowded",
         "_evidence",
         "agent",
@@ -139,26 +137,11 @@ class Trail:
         self.doubt = 0.0
         self._alone = 1 if detection.shared == 1 else 0
         self._crowded = 0
-        self._body: Template | None = None
         self._evidence = shape.head
 
     def predicted(self, time_s: float) -> Floats:
         """Return where the animal should be at a time, in pixels, shape (2,)."""
         return self.xy + _KEPT * self.velocity * min(time_s - self.time_s, _GLIDE_S)
-
-    def pose(self, time_s: float) -> Pose:
-        """Return where the body should be at a time."""
-        x, y = self.predicted(time_s)
-        return Pose(x_px=float(x), y_px=float(y), axis_rad=self.heading_rad)
-
-    def body(self, usual: Look) -> Template:
-        """Return the body as last seen alone, or else the usual one."""
-        if self._body is None and self.shared == 1:
-            self._body = template_of(self.blob.pixels, self.blob.weights, self.heading_rad)
-        if self._body is None:
-            length = usual.length_px
-            self._body = ellipse(length, 4 / math.pi * usual.area_px / length)
-        return self._body
 
     def build(self, usual: Look) -> Build:
         """Return the body as it was when it was alone; the usual where it hardly was."""
@@ -196,8 +179,6 @@ class Trail:
         self.velocity = step if self.hits == 1 else trust * step + (1 - trust) * self.velocity
         self._turn(shape, to - self.xy, shared=detection.shared)
         self.is_clear = detection.shared == 1 and self.shared == 1
-        if detection.shared == 1:
-            self._body = None
         self.xy, self.time_s, self.shape, self.blob = to, time_s, shape, detection.blob
         self.shared, self.darkness = detection.shared, detection.darkness
         self.hits += 1

@@ -1,0 +1,229 @@
+"""What is compiled of finding blobs: their pixels, moments, distances, clusters.
+
+Formulas on arrays alone; what they are for is told by who calls them. Arrays are contiguous,
+so that each is compiled once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Grey = NDArray[np.uint8]
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(function: F, **options: Any) -> F:
+    """Compile a function, and keep it for the next start where there is a place to."""
+    try:
+        compiled: Any = njit(cache=True, nogil=True, **options)(function)
+    except RuntimeError:
+        compiled = njit(nogil=True, **options)(function)
+    return compiled
+
+
+def summing(function: F) -> F:
+    """Compile a function that may add up in any order."""
+    return kernel(function, fastmath={"reassoc", "contract"})
+
+
+@kernel
+def shades(inside: Grey, grey: Grey, level: Grey, left: int, top: int) -> tuple[Floats, Floats]:
+    """Return the pixels within a mask that are darker than the tank, and by which share of it.
+
+    Parameters
+    ----------
+    inside, grey, level : ndarray of uint8, shape (height, width)
+        The mask, the image and the empty tank.
+    left, top
+        Where they were cut out of the whole image.
+
+    Returns
+    -------
+    pixels : ndarray, shape (pixel, 2)
+        x and y in the whole image, row by row.
+    shares : ndarray, shape (pixel,)
+    """
+    height, width = inside.shape
+    n = 0
+    for y in range(height):
+        for x in range(width):
+            n += inside[y, x] > 0 and level[y, x] > grey[y, x]
+    pixels, shares = np.empty((n, 2)), np.empty(n)
+    n = 0
+    for y in range(height):
+        for x in range(width):
+            if inside[y, x] > 0 and level[y, x] > grey[y, x]:
+                pixels[n, 0], pixels[n, 1] = x + left, y + top
+                tank = float(level[y, x])
+                shares[n] = (tank - grey[y, x]) / tank
+                n += 1
+    return pixels, shares
+
+
+@kernel
+def moments(pixels: Floats, weights: Floats) -> tuple[float, float, float, float, Floats]:
+    """Return mass, centre and long axis of weighted pixels, and their moments along it.
+
+    Returns
+    -------
+    total, x, y, angle_rad : float
+    central : ndarray, shape (3,)
+        Second moment along the axis, second moments of both axes together, third along it.
+    """
+    total, x, y = 0.0, 0.0, 0.0
+    for p in range(weights.size):
+        total += weights[p]
+        x += weights[p] * pixels[p, 0]
+        y += weights[p] * pixels[p, 1]
+    x, y = x / total, y / total
+    xx, yy, xy = 0.0, 0.0, 0.0
+    for p in range(weights.size):
+        dx, dy = pixels[p, 0] - x, pixels[p, 1] - y
+        xx += weights[p] * dx * dx
+        yy += weights[p] * dy * dy
+        xy += weights[p] * dx * dy
+    angle = 0.5 * math.atan2(2 * xy, xx - yy)
+    cos, sin = math.cos(angle), math.sin(angle)
+    second, third = 0.0, 0.0
+    for p in range(weights.size):
+        along = (pixels[p, 0] - x) * cos + (pixels[p, 1] - y) * sin
+        second += weights[p] * along**2
+        third += weights[p] * along**3
+    return total, x, y, angle, np.array([second, xx + yy, third]) / total
+
+
+@kernel
+def least_squares(pixels: Floats, points: Floats) -> Floats:
+    """Return how far each pixel is from the nearest of some points, squared, shape (pixel,)."""
+    found = np.empty(len(pixels))
+    for p in range(len(pixels)):
+        best = np.inf
+        for k in range(len(points)):
+            dx, dy = pixels[p, 0] - points[k, 0], pixels[p, 1] - points[k, 1]
+            best = min(best, dx * dx + dy * dy)
+        found[p] = best
+    return found
+
+
+@kernel
+def clusters(pixels: Floats, weights: Floats, centres: Floats, rounds: int) -> NDArray[np.int64]:
+    """Return the cluster of each pixel by k-means; the centres are moved in place.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (pixel, 2)
+    weights : ndarray, shape (pixel,)
+    centres : ndarray, shape (cluster, 2)
+        Where they begin; one without any pixel stays.
+    rounds
+        At most.
+    """
+    whose = np.full(len(pixels), -1, np.int64)
+    for _ in range(rounds):
+        moved = 0
+        total, sums = np.zeros(len(centres)), np.zeros(centres.shape)
+        for p in range(len(pixels)):
+            best, nearest = np.inf, 0
+            for k in range(len(centres)):
+                dx, dy = pixels[p, 0] - centres[k, 0], pixels[p, 1] - centres[k, 1]
+                away = dx * dx + dy * dy
+                if away < best:
+                    best, nearest = away, k
+            moved += whose[p] != nearest
+            whose[p] = nearest
+            total[nearest] += weights[p]
+            for axis in range(2):
+                sums[nearest, axis] += weights[p] * pixels[p, axis]
+        if moved == 0:
+            break
+        for k in range(len(centres)):
+            if total[k] > 0:
+                centres[k] = sums[k] / total[k]
+    return whose
+
+
+@kernel
+def step_costs(at: Floats, to: Floats, along_share: float, heading: float) -> Floats:
+    """Return how far sightings are from where tracks are due, and how else they lie, squared.
+
+    Parameters
+    ----------
+    at : ndarray, shape (track, 3 or more)
+        x, y and heading.
+    to : ndarray, shape (sighting, 4 or more)
+        x, y, direction of the axis, and what speaks for its head.
+    along_share
+        Ways along the body, half-way through its turn, count by this share.
+    heading
+        What a turn by a right angle is worth.
+    """
+    found = np.empty((len(at), len(to)))
+    for t in range(len(at)):
+        for d in range(len(to)):
+            turn = to[d, 2] - at[t, 2]
+            middle = at[t, 2] + math.atan2(math.sin(turn), math.cos(turn)) / 2
+            dx, dy = to[d, 0] - at[t, 0], to[d, 1] - at[t, 1]
+            cos, sin = math.cos(middle), math.sin(middle)
+            along, across = dx * cos + dy * sin, dy * cos - dx * sin
+            head, facing = to[d, 3], math.cos(turn)
+            faces = head * facing + (1 - head) * abs(facing)
+            found[t, d] = (along * along_share) ** 2 + across**2 + heading * (1 - faces)
+    return found
+
+
+@kernel
+def read_grid(grid: Floats, at: Floats) -> Floats:
+    """Return what lies between the points of a grid, by straight lines; NaN beyond it.
+
+    Parameters
+    ----------
+    grid : ndarray, shape (column, row, 2)
+    at : ndarray, shape (point, 2)
+        In steps of the grid.
+    """
+    found = np.full(at.shape, np.nan)
+    for p in range(len(at)):
+        i, j = math.floor(at[p, 0]), math.floor(at[p, 1])
+        i, j = min(max(i, 0), grid.shape[0] - 2), min(max(j, 0), grid.shape[1] - 2)
+        right, down = at[p, 0] - i, at[p, 1] - j
+        if not (0 <= right <= 1 and 0 <= down <= 1):
+            continue
+        for axis in range(2):
+            upper = (1 - right) * grid[i, j, axis] + right * grid[i + 1, j, axis]
+            lower = (1 - right) * grid[i, j + 1, axis] + right * grid[i + 1, j + 1, axis]
+            found[p, axis] = (1 - down) * upper + down * lower
+    return found
+
+
+@kernel
+def balance(chance: Floats, least: float, rounds: int) -> None:
+    """Make rows and columns of a matrix sum to one, in place (Sinkhorn 1964)."""
+    n = len(chance)
+    for i in range(n):
+        for j in range(n):
+            chance[i, j] = max(chance[i, j], least)
+    for _ in range(rounds):
+        for i in range(n):
+            chance[i] /= chance[i].sum()
+        for j in range(n):
+            chance[:, j] /= chance[:, j].sum()
+
+
+def prepare() -> None:
+    """Compile all, so that no frame has to wait for it."""
+    mask, level, dark = (np.full((2, 2), value, np.uint8) for value in (1, 9, 3))
+    pixels, weights = shades(mask, dark, level, 0, 0)
+    moments(pixels, weights)
+    least_squares(pixels, pixels)
+    clusters(pixels, weights, pixels.copy(), 1)
+    some = np.ones((2, 4))
+    step_costs(some, some, 1.0, 1.0)
+    read_grid(np.ones((2, 2, 2)), pixels)
+    balance(np.ones((2, 2)), 0.1, 1)
