@@ -1,9 +1,15 @@
 """What a tracker did to positions, found from the positions alone."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import shapely
 
+from scipy import stats
+
+from zfcal.diagnose import noise
 from zfcal.diagnose.noise import beyond_wall, estimate_noise, from_frames, quantum_of
 
 FPS = 15.0
@@ -142,3 +148,18 @@ def test_a_real_recording_is_exact_to_a_fraction_of_a_pixel(recording, worlds):
     assert found.how == "quiet stretches"
     assert 2e-4 < found.sd_m < 8e-4
     assert found.quantum_m == pytest.approx(1.11 / 10240, rel=1e-6)
+
+
+@pytest.mark.parametrize(("share", "df"), [(0.1, 3.0), (0.25, 29.9), (0.5, 120.0)])
+def test_quantiles_of_chi_square_are_those_of_scipy(share, df):
+    """They are taken where scipy.stats need not be imported."""
+    assert noise._chi2_quantile(share, df) == pytest.approx(stats.chi2.ppf(share, df))
+
+
+def test_a_tracker_starts_without_the_statistics_of_scipy():
+    """Their import takes as long as that of all the rest."""
+    line = "import sys, zfcal.online.track; print('scipy.stats' in sys.modules)"
+
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+
+    assert done.stdout.strip() == "False"

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammainc, gammaincinv
 
 from zfcal.arena import Arena
 from zfcal.tracks import Tracks
@@ -193,7 +193,7 @@ def _of_quiet(differences: Floats, stretch: Ints, *, quiet: float) -> float:
         return math.nan
     # Neighbouring second differences share frames: their squares correlate by (4/6)^2, then 1/36.
     df = 2 * usual / 1.94
-    return math.sqrt(float(np.quantile(mean, quiet)) / (6 * chi2.ppf(quiet, df) / df))
+    return math.sqrt(float(np.quantile(mean, quiet)) / (6 * _chi2_quantile(quiet, df) / df))
 
 
 def _of_smooth(near: Floats, far: Floats, stretch: Ints) -> float:
@@ -206,11 +206,16 @@ def _of_smooth(near: Floats, far: Floats, stretch: Ints) -> float:
     calm = first <= np.quantile(first, _QUIET)
     # Stretches were chosen for small first differences: what that does to noise alone.
     df = 2 * float(np.median(count)) / 1.94
-    edge = chi2.ppf(_QUIET, df)
-    shrunk = chi2.cdf(edge, df + 2) / _QUIET
+    edge = _chi2_quantile(_QUIET, df)
+    shrunk = float(gammainc(df / 2 + 1, edge / 2)) / _QUIET
     most = float(first[calm].mean()) / (6 * shrunk)
     curved = (float(second[calm].mean()) - float(first[calm].mean()) / shrunk) / 15
     return math.sqrt(max(most - max(curved, 0.0) / 6, 0.0))
+
+
+def _chi2_quantile(share: float, df: float) -> float:
+    # As scipy.stats has it, whose import takes longer than all the rest of a tracker's.
+    return 2 * float(gammaincinv(df / 2, share))
 
 
 def _mean_squares(squares: Floats, stretch: Ints) -> tuple[Ints, Floats]:
