@@ -39,7 +39,7 @@ def as_tracks(told: Sequence[Sequence[Row]], truth: Tracks, *, fps: float) -> Tr
             for k, (agent, x, y) in enumerate(seen)
         ]
         rows += [(frame / fps, frame, *each) for each in sorted(named)]
-    time_s, frame, agent, kind, x, y = (np.array(column) for column in zip(*rows, strict=True))
+    time_s, frame, agent, kind, x, y = np.array(rows, np.float64).reshape(-1, 6).T
     return Tracks(
         time_s=time_s,
         frame=frame.astype(np.int64),

@@ -6,7 +6,6 @@ import sys
 import numpy as np
 import pytest
 import shapely
-
 from scipy import stats
 
 from zfcal.diagnose import noise
