@@ -1,5 +1,6 @@
 """Trials made by hand, without the model: fish that wander in a square tank."""
 
+import dataclasses
 import functools
 import shutil
 
@@ -85,7 +86,7 @@ def heard():
 
 @pytest.fixture
 def quick():
-    """Return options under which a round takes a moment."""
+    """Return options under which a round takes a moment: it has no estimate of the likelihood."""
     settings = Settings(
         population=8,
         generations=3,
@@ -95,7 +96,13 @@ def quick():
         long_s=20.0,
         n_windows=4,
     )
-    return CalibrateOptions(settings=settings)
+    return CalibrateOptions(settings=settings, seed_likelihood=False)
+
+
+@pytest.fixture
+def in_full(quick):
+    """Return options of a round that has the estimate."""
+    return dataclasses.replace(quick, seed_likelihood=True)
 
 
 @pytest.fixture

@@ -50,18 +50,6 @@ def trial(analysed, tmp_path):
     return shutil.copytree(analysed, tmp_path / "trial")
 
 
-@pytest.fixture
-def quick(quick):
-    """Return options of a round that takes no estimate from the likelihood, which takes longest."""
-    return dataclasses.replace(quick, seed_likelihood=False)
-
-
-@pytest.fixture
-def in_full(quick):
-    """Return options of a round that has the estimate."""
-    return dataclasses.replace(quick, seed_likelihood=True)
-
-
 def made_of(events):
     """Return the names of the files that were made."""
     return [event.path.name for event in events if isinstance(event, Made)]

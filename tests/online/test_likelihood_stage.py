@@ -85,13 +85,13 @@ def test_the_robot_is_a_neighbour_but_not_a_sample(make_trial):
     assert found.found.n_steps <= 2 * 600
 
 
-def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, quick):
+def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full):
     """[result.likelihood] is there, and the window's segments are inputs."""
     root = make_trial()
     swim(root)
     analyse(root, AnalyseOptions(), say_nothing)
 
-    calibrate(root, quick, say_nothing)
+    calibrate(root, in_full, say_nothing)
 
     model = root / "models" / "000180.toml"
     assert read_result(model)["likelihood"]["n_steps"] > 500
@@ -105,7 +105,7 @@ def test_the_papers_way_reads_no_tracks(make_trial, quick):
     root = make_trial()
     analyse(root, AnalyseOptions(), say_nothing)
 
-    calibrate(root, replace(quick, seed_likelihood=False), say_nothing)
+    calibrate(root, quick, say_nothing)
 
     model = root / "models" / "000120.toml"
     assert "likelihood" not in read_result(model)
@@ -113,28 +113,28 @@ def test_the_papers_way_reads_no_tracks(make_trial, quick):
     assert read_lineage(model).options["seed_likelihood"] is False
 
 
-def test_without_tracks_the_round_goes_on_and_says_so(make_trial, quick, heard):
+def test_without_tracks_the_round_goes_on_and_says_so(make_trial, in_full, heard):
     """Another computer may have the statistics alone."""
     root = make_trial()
     analyse(root, AnalyseOptions(), say_nothing)
     for path in (root / "tracks").glob("*.parquet"):
         path.unlink()
 
-    calibrate(root, quick, heard.append)
+    calibrate(root, in_full, heard.append)
 
     assert (root / "models" / "000240.toml").exists()
     notes = [event.text for event in heard if isinstance(event, Note)]
     assert any("no tracks, so no likelihood estimate" in text for text in notes)
 
 
-def test_a_damaged_segment_costs_the_estimate_alone(make_trial, quick, heard):
+def test_a_damaged_segment_costs_the_estimate_alone(make_trial, in_full, heard):
     """The statistics were whole: the round is made, without the estimate, and exit code 3 tells."""
     root = make_trial()
     analyse(root, AnalyseOptions(), say_nothing)
     path = root / "tracks" / "000060.parquet"
     path.write_bytes(path.read_bytes()[:1000])
 
-    calibrate(root, quick, heard.append)
+    calibrate(root, in_full, heard.append)
 
     left_out = [event.problem for event in heard if isinstance(event, LeftOut)]
     assert any("000060.parquet" in text and "no likelihood estimate" in text for text in left_out)

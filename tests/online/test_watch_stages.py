@@ -26,16 +26,10 @@ def trial(make_trial):
 
 
 @pytest.fixture
-def quicker(quick):
-    """Return options under which a round takes a moment, without the likelihood."""
-    return dataclasses.replace(quick, seed_likelihood=False)
-
-
-@pytest.fixture
-def within(quicker):
+def within(quick):
     """Return options with a budget instead of generations."""
-    settings = dataclasses.replace(quicker.settings, generations=None)
-    return dataclasses.replace(quicker, settings=settings, budget_s=50.0)
+    settings = dataclasses.replace(quick.settings, generations=None)
+    return dataclasses.replace(quick, settings=settings, budget_s=50.0)
 
 
 def stage(root, options, now_s=0.0):
@@ -48,20 +42,20 @@ def models(root):
     return [int(path.stem) for path in sorted((root / "models").glob("*.toml"))][1:]
 
 
-def test_one_window_a_turn_until_there_are_no_more(trial, quicker, heard):
+def test_one_window_a_turn_until_there_are_no_more(trial, quick, heard):
     """Oldest first; the last turn has nothing to do."""
     turn = Turn(seen_s={240: 0.0, 120: 0.0, 180: 0.0})
-    outcomes = [stage(trial, quicker)(turn, heard.append).end_s for _ in range(4)]
+    outcomes = [stage(trial, quick)(turn, heard.append).end_s for _ in range(4)]
     assert outcomes == [120, 180, 240, None]
     assert models(trial) == [120, 180, 240]
     assert [event.end_s for event in heard if isinstance(event, Takes)] == [120, 180, 240]
 
 
-def test_what_is_overdue_is_passed_over_and_written_down(trial, quicker, heard):
+def test_what_is_overdue_is_passed_over_and_written_down(trial, quick, heard):
     """A round took two minutes: the next ones are skipped, and the newest starts from before."""
     seen_s = {120: 0.0, 180: 60.0, 240: 120.0, 300: 180.0}
-    stage(trial, quicker)(Turn(seen_s={120: 0.0}, due_after_s=60.0), say_nothing)
-    outcome = stage(trial, quicker, 200.0)(Turn(seen_s=seen_s, due_after_s=60.0), heard.append)
+    stage(trial, quick)(Turn(seen_s={120: 0.0}, due_after_s=60.0), say_nothing)
+    outcome = stage(trial, quick, 200.0)(Turn(seen_s=seen_s, due_after_s=60.0), heard.append)
     assert outcome.end_s == 300
     assert skipped_ends(trial) == {180, 240}
     assert models(trial) == [120, 300]
@@ -71,11 +65,11 @@ def test_what_is_overdue_is_passed_over_and_written_down(trial, quicker, heard):
     assert document["because"] == "It waited for 140 s while a round before it overran."
 
 
-def test_offline_after_a_skip_there_is_nothing_to_do(trial, quicker, heard):
+def test_offline_after_a_skip_there_is_nothing_to_do(trial, quick, heard):
     """The record is honoured by the command, which says so."""
     seen_s = {120: 0.0, 180: 60.0}
-    stage(trial, quicker, 100.0)(Turn(seen_s=seen_s, due_after_s=60.0), say_nothing)
-    calibrate(trial, quicker, heard.append, task=Task(ends_s=frozenset(seen_s)))
+    stage(trial, quick, 100.0)(Turn(seen_s=seen_s, due_after_s=60.0), say_nothing)
+    calibrate(trial, quick, heard.append, task=Task(ends_s=frozenset(seen_s)))
     assert models(trial) == [180]
     assert not [event for event in heard if isinstance(event, Made)]
     assert any(
@@ -112,7 +106,7 @@ def test_without_hurry_the_budget_is_whole(trial, within, heard, monkeypatch):
     assert [event.budget_s for event in heard if isinstance(event, Takes)] == [50.0]
 
 
-def test_a_round_with_a_budget_is_made_once(trial, within, quicker):
+def test_a_round_with_a_budget_is_made_once(trial, within, quick):
     """A window that comes late would change those after it: they stay the record of the drive."""
     brief = dataclasses.replace(within, budget_s=0.01)
     late = (trial / "stats" / "000120.parquet").rename(trial / "late")
@@ -120,7 +114,7 @@ def test_a_round_with_a_budget_is_made_once(trial, within, quicker):
     late.rename(trial / "stats" / "000120.parquet")
     assert stage(trial, brief)(Turn(seen_s={120: 0.0}), say_nothing).end_s == 120
     assert stage(trial, brief)(Turn(seen_s={120: 0.0, 180: 0.0}), say_nothing).end_s is None
-    counted = stage(trial, quicker)
+    counted = stage(trial, quick)
     assert counted(Turn(seen_s={120: 0.0, 180: 0.0}), say_nothing).end_s == 120
 
 
@@ -137,16 +131,16 @@ def test_rounds_with_a_budget_repeat_bit_by_bit(trial, within, copy_trial, read_
     assert read_all(trial) == read_all(again)
 
 
-def test_damaged_statistics_are_left_out_and_come_with_the_outcome(trial, quicker, heard):
+def test_damaged_statistics_are_left_out_and_come_with_the_outcome(trial, quick, heard):
     """Every turn says anew what is left out, so that what was mended is not counted."""
     path = trial / "stats" / "000120.parquet"
     path.write_bytes(b"PAR1")
     turn = Turn(seen_s={120: 0.0, 180: 0.0})
-    outcome = stage(trial, quicker)(turn, heard.append)
+    outcome = stage(trial, quick)(turn, heard.append)
     assert list(outcome.left_out) == [str(path)]
     assert outcome.end_s == 180
     analyse(trial, AnalyseOptions(), say_nothing)
-    assert stage(trial, quicker)(turn, heard.append).left_out == {}
+    assert stage(trial, quick)(turn, heard.append).left_out == {}
     assert any(isinstance(event, LeftOut) for event in heard)
 
 
@@ -193,9 +187,9 @@ def test_every_event_of_a_stage_has_a_line_that_fits_the_schema(tmp_path):
     assert Happened(at_s=0.0, kind="back", values={"path": "x"}).as_dict()["event"] == "back"
 
 
-def test_an_order_without_windows_makes_the_stage_ready(trial, quicker, heard):
+def test_an_order_without_windows_makes_the_stage_ready(trial, quick, heard):
     """The simulator is compiled before the first window comes; nothing is written or told."""
     before = sorted(trial.rglob("*"))
-    assert stage(trial, quicker)(Turn(seen_s={}), heard.append).end_s is None
+    assert stage(trial, quick)(Turn(seen_s={}), heard.append).end_s is None
     assert sorted(trial.rglob("*")) == before
     assert heard == []
