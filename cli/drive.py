@@ -82,6 +82,7 @@ def command(
     Example:
         zfcal drive trial --port /dev/rfcomm5
         zfcal drive trial --port virtual --pattern pid --duration 30min
+        zfcal drive trial --port virtual --json
         zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
     """
@@ -97,6 +98,8 @@ def command(
     from zfcal.online.opening import Task
     from zfcal.online.pilot import Manner
 
+    from .driving import DriveVoice
+
     if port is None:
         raise click.UsageError("Missing option '--port': a serial port, or virtual.")
     manner = Manner(
@@ -105,7 +108,12 @@ def command(
     options = DriveOptions(
         port=port, manner=manner, clock=clock, duration_s=duration_s, verbose=out.verbose > 0
     )
-    out.attempt(lambda: drive(trial, options, out.tell, task=Task(force=force)))
+
+    def work() -> None:
+        with DriveVoice(out) as voice:
+            voice.because = drive(trial, options, voice.hear, task=Task(force=force))
+
+    out.attempt(work)
 
 
 def _publish(

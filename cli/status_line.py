@@ -1,4 +1,4 @@
-"""The status line of `zfcal watch`, on standard error when it is a terminal."""
+"""The status line of `zfcal watch` and `zfcal drive`, on standard error when it is a terminal."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, final
 if TYPE_CHECKING:
     from rich.live import Live
 
+    from zfcal.online.drive_events import DriveStatus
     from zfcal.online.watch_events import StageStatus, Status
 
 
@@ -34,6 +35,20 @@ def _stage(name: str, stage: StageStatus) -> str:
     return f"{name}: waits" if stage.last_s is None else f"{name}: done to {stage.last_s} s"
 
 
+def describe_drive(status: DriveStatus) -> str:
+    """Return the state of a driver on one line."""
+    if status.time_s is None:
+        return f"drive: waits for poses · {status.model}"
+    total = "" if status.total_s is None else f" of {status.total_s:.0f}"
+    parts = [f"drive: {status.time_s:.0f}{total} s", status.model]
+    latencies = {"pose": status.pose_to_state_s, "tick": status.tick_to_byte_s}
+    late = [f"{name} {1e3 * s:.0f} ms" for name, s in latencies.items() if s is not None]
+    parts += [", ".join(late)] if late else []
+    parts += [f"missed {status.steps_missed}"] if status.steps_missed else []
+    parts += [f"held: {status.held}"] if status.held else []
+    return " · ".join(parts)
+
+
 @final
 class StatusLine:
     """One line that is drawn again and again, and wiped before anything else is written.
@@ -48,14 +63,14 @@ class StatusLine:
         self._shown = shown
         self._live: Live | None = None
 
-    def show(self, status: Status) -> None:
+    def show(self, state: str) -> None:
         """Draw the state."""
         if not self._shown:
             return
         from rich.text import Text
 
         live = self._live or self._start()
-        live.update(Text(describe(status), no_wrap=True, overflow="ellipsis"), refresh=True)
+        live.update(Text(state, no_wrap=True, overflow="ellipsis"), refresh=True)
 
     def clear(self) -> None:
         """Wipe the line."""

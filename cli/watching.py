@@ -15,7 +15,7 @@ from click.core import ParameterSource
 
 from .calibration import choose
 from .output import Output
-from .status_line import StatusLine
+from .status_line import StatusLine, describe
 from .tracking import track_options
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Voice:
         from zfcal.online.watch_events import Status
 
         if isinstance(told, Status):
-            self._line.show(told)
+            self._line.show(describe(told))
             return
         if self._out.as_json:
             self._line.clear()

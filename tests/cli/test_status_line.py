@@ -38,7 +38,7 @@ def test_it_says_what_is_amiss():
 def test_nothing_is_drawn_without_a_terminal(capsys):
     """Nor wiped."""
     line = StatusLine(shown=False)
-    line.show(AT_WORK)
+    line.show(describe(AT_WORK))
     line.clear()
     assert capsys.readouterr() == ("", "")
 

@@ -15,6 +15,7 @@ import pytest
 
 from zfcal.artifacts.drive_files import drive_files, read_drive
 from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.validation import check
 from zfcal.errors import LockedError
 from zfcal.online.drive_models import DriveModels
 from zfcal.online.drive_replay import replay
@@ -52,13 +53,21 @@ class Rig:
         self.poses = driven.LivePoses(root, frames)
         self.drivers = []
         self._heard = []
+        self._lines = root.parent / "told.jsonl"
 
     def start(self, *words):
         """Start a driver as a process."""
         command = [sys.executable, "-m", "zfcal_cli.main", "drive", str(self.root)]
-        command += ["--port", str(self.robot.port), *words]
-        self.drivers.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
-        return self.drivers[-1]
+        command += ["--port", str(self.robot.port), "--json", *words]
+        with self._lines.open("a") as lines:
+            driver = subprocess.Popen(command, stdout=lines, stderr=subprocess.PIPE, text=True)
+        self.drivers.append(driver)
+        return driver
+
+    def told(self, event):
+        """Return what was told of a kind, as lines of JSON."""
+        lines = map(json.loads, self._lines.read_text().splitlines())
+        return [line for line in lines if line["event"] == event]
 
     def heard(self):
         """Return all that the robot has heard, as times and frames."""
@@ -99,6 +108,9 @@ class Rig:
                 driver.kill()
             driver.wait()
             driver.stderr.close()
+        if self._lines.exists():
+            for line in self._lines.read_text().splitlines():
+                check(json.loads(line), "drive-event", "a line")
         self.robot.control.close()
         self.robot.close()
 
@@ -127,9 +139,13 @@ def test_silence_stops_the_robot_and_it_goes_on(rig):
     moves = rig.moves()
     rig.poses.thaw()
     rig.until(lambda: rig.moves() > moves + 5)
-    faults = [(f["fault"], f["ended"]) for f in rig.items("fault")]
-    assert ("stale-pose", False) in faults
-    assert ("stale-pose", True) in faults
+    for found in (rig.items("fault"), rig.told("fault")):
+        faults = [(f["fault"], f["ended"]) for f in found]
+        assert ("stale-pose", False) in faults
+        assert ("stale-pose", True) in faults
+    # Its steps are those of five targets a second.
+    (missed,) = rig.told("missed")
+    assert missed["steps"] >= 3
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
@@ -145,6 +161,7 @@ def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     files = list(drive_files(rig.root).values())
     assert all(overview(path).whole for path in files)
     assert replay(rig.root, say_nothing).is_same
+    assert rig.told("ended")[0]["because"] == {143: "SIGTERM", 130: "Ctrl-C"}[code]
 
 
 def test_a_driver_that_is_killed_has_its_last_word_and_goes_on(rig):
@@ -245,6 +262,8 @@ def test_unplugged_and_back(rig):
     assert len(lost) >= 4
     assert not any(c["sent"] for c in lost)
     rig.end()
+    told = [(t["fault"], t["ended"]) for t in rig.told("fault")]
+    assert [t for t in told if t[0] == "port-lost"] == [("port-lost", False), ("port-lost", True)]
     assert replay(rig.root, say_nothing).is_same
 
 
@@ -291,6 +310,7 @@ def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     driver.send_signal(signal.SIGTERM)
     assert driver.wait(10) == 143
     said = driver.stderr.read()
+    assert [t["model"] for t in rig.told("model")] == ["models/000000.toml", NEW]
     assert "models/000120.toml drives" in said
     assert "000180.toml" in said
 
@@ -355,15 +375,19 @@ def test_a_second_driver_is_refused_and_a_port_that_is_not_there(rig, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_the_end_is_told_as_json(rig):
-    """One document: what was made, how quick it was; the driver ends after --duration."""
-    words = [sys.executable, "-m", "zfcal_cli.main", "drive", str(rig.root), "--json", "-q"]
-    words += ["--port", str(rig.robot.port), "--duration", "2s", "--pattern", "pid"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    document = json.loads(done.stdout)
-    (result,) = document["results"]
+def test_a_drive_is_told_as_lines_of_json(rig):
+    """From its beginning to its end: by whom and by what it drives, how quick it was."""
+    driver = rig.start("--duration", "2s", "--pattern", "pid", "-q")
+    assert driver.wait(30) == 0
+    (began,), (ended,) = rig.told("began"), rig.told("ended")
+    assert (began["pattern"], began["port"]) == ("pid", str(rig.robot.port))
+    assert ended["because"] == "the duration is over"
+    assert [told["robot"] for told in rig.told("answered")] == ["F"]
+    assert [told["model"] for told in rig.told("model")] == ["models/000000.toml"]
+    result = rig.told("result")[0]["value"]
     assert result["commands"] >= 15
     assert result["latency"]["tick_to_byte_s"]["n"] >= 15
     assert result["latency"]["pose_to_state_s"]["n"] >= 20
-    assert [Path(a["path"]).name for a in document["artifacts"]] == ["000000.mcap"]
-    assert Path(document["artifacts"][0]["path"]).exists()
+    assert [Path(told["path"]).name for told in rig.told("made")] == ["000000.mcap"]
+    assert driver.stderr.read() == ""
+    assert Path(rig.told("made")[0]["path"]).exists()

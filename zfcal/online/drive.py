@@ -20,10 +20,11 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import PoseFollower
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.drive_clock import DriveClock, PoseClock, WallClock
+from zfcal.online.drive_events import DriveTell
 from zfcal.online.drive_log import DriveLog
 from zfcal.online.drive_models import DriveModels
 from zfcal.online.driving import Crew, Driver
-from zfcal.online.events import LeftOut, Note, Progress, Result, Tell
+from zfcal.online.events import LeftOut, Note, Result, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.online.pilot import Manner
 from zfcal.robot.fishbot import FishBot, Watchdog
@@ -39,6 +40,7 @@ _LOOK_S = 0.003
 _FOLDER_S = 0.02
 """How often the folder is searched for the next minute; a file that grows is seen at once."""
 
+_STATUS_S = 0.5
 _OPENING_S = 3.0
 _ANSWER_S = 2.0
 _END_S = 2.0
@@ -73,7 +75,7 @@ class DriveOptions:
     verbose: bool = False
 
 
-def drive(root: Path, options: DriveOptions, tell: Tell, *, task: Task | None = None) -> None:
+def drive(root: Path, options: DriveOptions, tell: DriveTell, *, task: Task | None = None) -> str:
     """Drive a robot by the model of a trial, until the poses end or somebody stops it.
 
     Parameters
@@ -83,9 +85,14 @@ def drive(root: Path, options: DriveOptions, tell: Tell, *, task: Task | None = 
     options
         What is asked.
     tell
-        Hears of faults, of models, and of every file when it is closed.
+        Hears of faults, of models, of every file when it is closed, and now and then how it goes.
     task
         Whether to remove what an earlier drive left.
+
+    Returns
+    -------
+    str
+        Why it ended.
 
     Raises
     ------
@@ -105,7 +112,7 @@ def drive(root: Path, options: DriveOptions, tell: Tell, *, task: Task | None = 
     with at_work(root, "drive", task):
         _make_room(opened, options, tell, task)
         with contextlib.ExitStack() as stack:
-            _drive(opened, options, tell, stack)
+            return _drive(opened, options, tell, stack)
 
 
 def lineage_of(opened: OpenTrial, options: DriveOptions) -> Lineage:
@@ -136,8 +143,8 @@ def _make_room(opened: OpenTrial, options: DriveOptions, tell: Tell, task: Task)
 
 
 def _drive(
-    opened: OpenTrial, options: DriveOptions, tell: Tell, stack: contextlib.ExitStack
-) -> None:
+    opened: OpenTrial, options: DriveOptions, tell: DriveTell, stack: contextlib.ExitStack
+) -> str:
     is_live = options.clock == "wall"
     robot, virtual = _robot(opened, options, stack)
     clock: DriveClock = WallClock() if is_live else PoseClock(opened.trial.fps)
@@ -160,7 +167,23 @@ def _drive(
     stack.callback(robot.close)
     if watchdog is not None:
         stack.enter_context(watchdog)
-    _Loop(opened, options, driver, crew, follower, virtual).run()
+    tell(_began(opened, options))
+    return _Loop(opened, options, driver, crew, follower, virtual, tell).run()
+
+
+def _began(opened: OpenTrial, options: DriveOptions) -> Note:
+    """Return what is told when all is ready."""
+    manner = options.manner
+    values = {
+        "trial": str(opened.trial.root),
+        "port": options.port,
+        "robot": manner.letter,
+        "pattern": manner.pattern,
+        "free_running": manner.free_running,
+        "clock": options.clock,
+    }
+    text = f"drive: FishBot {manner.letter} of {opened.trial.root} at {options.port}."
+    return Note(text=text, kind="began", values=values)
 
 
 def _robot(
@@ -234,6 +257,7 @@ class _Loop:
         crew: Crew,
         follower: PoseFollower,
         virtual: VirtualProcess | None,
+        tell: DriveTell,
     ) -> None:
         self._opened, self._options = opened, options
         self._driver, self._crew = driver, crew
@@ -243,11 +267,12 @@ class _Loop:
         self._size = (-1, -1)
         self._searched_s = 0.0
         self._first_s: float | None = None
-        self._last_s = 0.0
+        self._tell, self._told_s = tell, 0.0
         self._quiet_since_s = time.monotonic()
         self._asked_s = time.monotonic()
 
-    def run(self) -> None:
+    def run(self) -> str:
+        """Go on until it is over, and return why it is."""
         for batch in self._batches():
             self._driver.listen()
             self._greet()
@@ -260,7 +285,15 @@ class _Loop:
                 self._crew.log.flush()
                 self._step_virtual()
             if batch and self._is_over(batch[-1].time_s):
-                return
+                return "the duration is over"
+            self._show()
+        return "the poses have ended"
+
+    def _show(self) -> None:
+        """Tell how it goes, now and then."""
+        if time.monotonic() - self._told_s >= _STATUS_S:
+            self._tell(self._driver.status(self._options.duration_s))
+            self._told_s = time.monotonic()
 
     def _batches(self) -> Iterator[list[Any]]:
         """Yield what has come, again and again; often nothing."""
@@ -315,12 +348,7 @@ class _Loop:
         self._first_s = time_s if self._first_s is None else self._first_s
         if duration_s is None:
             return False
-        done_s = time_s - self._first_s
-        if int(done_s) > int(self._last_s):
-            total = round(duration_s)
-            self._crew.tell(Progress(stage="drive", done=min(int(done_s), total), total=total))
-        self._last_s = done_s
-        return done_s >= duration_s - 1e-6
+        return time_s - self._first_s >= duration_s - 1e-6
 
     def _check_logs(self, now_s: float) -> None:
         """Refuse to write before what an earlier drive has written."""

@@ -17,6 +17,9 @@ from zfcal.units import SEGMENT_S
 
 TICK_TO_BYTE, POSE_TO_STATE = "tick_to_byte_s", "pose_to_state_s"
 
+_LATELY = 300
+"""Measurements: half a minute of ticks."""
+
 _RETRY_S = 1.0
 _MOST_KEPT = 60_000
 """Messages that wait for the disk: half an hour at 15 Hz, some 50 MB."""
@@ -118,11 +121,17 @@ class DriveLog:
         time_s = self._kept[-1]["time_s"] if self._kept else float(self._start_s)
         item = {"what": "fault", "time_s": time_s, "fault": "log", "says": says, "ended": ended}
         self._kept.append(item)
-        self._tell(Note(text=says, warning=not ended))
+        values = {"time_s": time_s, "fault": "log", "ended": ended}
+        self._tell(Note(text=says, warning=not ended, kind="fault", values=values))
 
     def measure(self, what: str, seconds: float) -> None:
         """Note a latency."""
         self._taken[what].append(seconds)
+
+    def lately(self, what: str) -> float | None:
+        """Return the 95th percentile of the newest measurements of a latency; None without any."""
+        values = self._taken[what][-_LATELY:]
+        return float(np.quantile(values, 0.95)) if values else None
 
     def latencies(self) -> dict[str, Any]:
         """Return number, median, 95th percentile and largest of each latency, in seconds."""

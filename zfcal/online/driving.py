@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from zfcal.online.drive_clock import DriveClock, WallClock
+from zfcal.online.drive_events import DriveStatus
 from zfcal.online.drive_log import POSE_TO_STATE, TICK_TO_BYTE, DriveLog
 from zfcal.online.drive_models import DriveModels
 from zfcal.online.events import Note, Tell
@@ -82,6 +83,7 @@ class Driver:
         self.n_targets = 0
         self.n_commands = 0
         self.is_answered = False
+        self._time_of_frame_s: float | None = None
         self.models_used: list[str] = []
 
     def warm_up(self) -> None:
@@ -125,8 +127,29 @@ class Driver:
         now_s = self._time_s()
         for said in self._crew.robot.listen():
             self._complaints.hear(said, now_s)
-            if said.what == "described" and said.robot == self._letter:
+            if said.what == "described" and said.robot == self._letter and not self.is_answered:
                 self.is_answered = True
+                text = f"FishBot {self._letter} answers."
+                self._crew.tell(Note(text=text, kind="answered", values={"robot": self._letter}))
+
+    def status(self, total_s: float | None) -> DriveStatus:
+        """Return the state of now.
+
+        Parameters
+        ----------
+        total_s
+            Seconds after which the driver is to end; None for no end.
+        """
+        log = self._crew.log
+        return DriveStatus(
+            time_s=self._time_of_frame_s,
+            total_s=total_s,
+            model=self._model.name,
+            held=self._held,
+            steps_missed=self.pilot.n_missed,
+            pose_to_state_s=log.lately(POSE_TO_STATE),
+            tick_to_byte_s=log.lately(TICK_TO_BYTE),
+        )
 
     def _begin(self, time_s: float, *, now_s: float) -> None:
         self._begun = True
@@ -137,9 +160,10 @@ class Driver:
     def _take(self, poses: FramePoses, *, fresh: bool) -> None:
         if self.pilot.is_due(poses.frame):
             self._look_for_model(poses.time_s)
-        before = self.pilot.pose
+        before, n_missed = self.pilot.pose, self.pilot.n_missed
         target = self.pilot.see(poses, self._model)
-        pose = self.pilot.pose
+        pose, self._time_of_frame_s = self.pilot.pose, poses.time_s
+        self._tell_missed(poses.time_s, self.pilot.n_missed - n_missed)
         seen = pose is not None and pose is not before
         if seen and fresh:
             self._freshen()
@@ -150,6 +174,12 @@ class Driver:
         item = {"what": "pose", "time_s": poses.time_s, "frame": poses.frame, "agents": agents}
         self._crew.log.add(item | place)
         self._note(target)
+
+    def _tell_missed(self, time_s: float, steps: int) -> None:
+        if steps:
+            text = f"{time_s:.1f} s: {steps} steps of the model were missed: no frame came in time."
+            values = {"time_s": time_s, "steps": steps, "total": self.pilot.n_missed}
+            self._crew.tell(Note(text=text, warning=True, kind="missed", values=values))
 
     def _freshen(self) -> None:
         """Take what is known of the robot as known now."""
@@ -205,7 +235,9 @@ class Driver:
     def _fault(self, time_s: float, fault: str, says: str, *, ended: bool = False) -> None:
         item = {"what": "fault", "time_s": time_s, "fault": fault, "says": says, "ended": ended}
         self._crew.log.add(item)
-        self._crew.tell(Note(text=f"{time_s:.1f} s: {says}", warning=not ended))
+        values = {"time_s": time_s, "fault": fault, "ended": ended}
+        text = f"{time_s:.1f} s: {says}"
+        self._crew.tell(Note(text=text, warning=not ended, kind="fault", values=values))
 
     def _look_for_model(self, time_s: float) -> None:
         found = self._crew.models.look()
@@ -227,7 +259,9 @@ class Driver:
             "begins": begins,
         }
         self._crew.log.add(item)
-        self._crew.tell(Note(text=f"{time_s:.1f} s: {model.name} drives."))
+        values = {"time_s": time_s, "model": model.name, "sha256": model.sha256}
+        text = f"{time_s:.1f} s: {model.name} drives."
+        self._crew.tell(Note(text=text, kind="model", values=values))
 
     def _time_s(self) -> float:
         """Return the time by which silence is measured."""

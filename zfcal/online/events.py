@@ -6,8 +6,8 @@ caller's business (the command line, or a loop that waits for new segments).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -67,10 +67,22 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Note:
-    """Something worth knowing, or a warning."""
+    """Something worth knowing, or a warning.
+
+    Parameters
+    ----------
+    text
+        What, in a sentence.
+    warning
+        Whether it is one.
+    kind, values
+        What happened, for lines of JSON: its name there, and what belongs to it.
+    """
 
     text: str
     warning: bool = False
+    kind: str = ""
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

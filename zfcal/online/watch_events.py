@@ -130,14 +130,15 @@ WatchTell: TypeAlias = Callable[[Happened | Status], None]
 
 def told_by(stage: str, event: object, at_s: float) -> Happened | None:
     """Return what a stage's event is in the log; None for what is not logged."""
-    kind, values = _said(event)
+    kind, values = said(event)
     if not kind:
         return None
     spoken = event if isinstance(event, of.Event) else None
     return Happened(at_s=at_s, kind=kind, stage=stage, values=values, event=spoken)
 
 
-def _said(event: object) -> tuple[str, dict[str, Any]]:
+def said(event: object) -> tuple[str, dict[str, Any]]:
+    """Return an event's kind in a line of JSON, and its values; an empty kind for none."""
     match event:
         case of.Made():
             return "made", {"path": str(event.path), "reason": event.reason}
