@@ -210,6 +210,8 @@ def test_several_trials_make_one_report(small_trial, tmp_path):
     }
     text = " ".join(read_page(out).text)
     assert "2 trials" in text
+    assert "compared,feature,end_s,n,mean,sd" in (out / "intervals.csv").read_text()
+    assert out / "intervals.csv" in made
     assert [row["trial"] for row in read_json(out / "integration.json")["trials"]] == ["one", "two"]
     assert report_reason(roots, out) is None
     assert report_reason(roots[::-1], out) is not None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from zfcal.artifacts.atomic import sha256_of, storage_error, write_text_whole, write_whole
@@ -18,6 +18,7 @@ from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.document import SCHEMA, integration_document
 from zfcal.report.gather import Damage, gather, input_files
+from zfcal.report.intervals import intervals_csv
 from zfcal.report.panels import Picture, write_picture
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
@@ -26,6 +27,7 @@ from zfcal.report.views import TrialView
 FOLDER = "report"
 PAGE = "index.html"
 NUMBERS = "integration.json"
+TABLE = "intervals.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +56,8 @@ def write_report(
     Returns
     -------
     list of Path
-        The page, the pictures and the numbers of integration, which come last:
+        The page, the pictures, of several trials the table of their intervals, and the
+        numbers of integration, which come last:
         whoever finds these finds the others too.
 
     Raises
@@ -66,7 +69,10 @@ def write_report(
     """
     place = _place(roots, out_dir)
     lineage = _lineage(roots, place)
-    views = [gather(root, on_damage or _ignore, alone=len(roots) == 1) for root in roots]
+    views = [
+        replace(gather(root, on_damage or _ignore, alone=len(roots) == 1), label=label)
+        for root, label in zip(roots, labels_of(roots), strict=True)
+    ]
     _check_one_arena(views)
     pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []
@@ -74,6 +80,9 @@ def write_report(
         path = place.folder / f"{picture.name}.png"
         write_whole(path, _drawer(picture))
         written.append(path)
+    if len(views) > 1:
+        write_text_whole(place.folder / TABLE, intervals_csv(views))
+        written.append(place.folder / TABLE)
     page = place.folder / PAGE
     write_text_whole(page, render_page(views, pictures, lineage))
     written.append(page)
@@ -139,13 +148,27 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
 def _lineage(roots: Sequence[Path], place: _Place) -> Lineage:
     files = [path for root in roots for path in input_files(root)]
     # The order of the trials bears on the order of the tables.
-    names: list[JSON] = [root.resolve().name for root in roots]
+    names: list[JSON] = [*labels_of(roots)]
     return Lineage(
         schema=SCHEMA,
         command="report",
         options={"trials": names},
         inputs=hash_inputs(place.base, files),
     )
+
+
+def labels_of(roots: Sequence[Path]) -> list[str]:
+    """Return what trials are called: the end of each path that tells all of them apart.
+
+    >>> labels_of([Path("a/trial"), Path("b/trial")])
+    ['a/trial', 'b/trial']
+    """
+    parts = [root.resolve().parts for root in roots]
+    for n in range(1, max(map(len, parts)) + 1):
+        labels = ["/".join(each[-n:]) for each in parts]
+        if len(set(labels)) == len(labels):
+            break
+    return labels
 
 
 def _check_one_arena(views: Sequence[TrialView]) -> None:
@@ -169,7 +192,7 @@ def _remove_outdated(folder: Path, made: set[str]) -> None:
     except (DamagedError, InputError):
         return
     for name in set(before) - made:
-        if Path(name).name == name and name.endswith(".png"):
+        if Path(name).name == name and name.endswith((".png", ".csv")):
             try:
                 (folder / name).unlink(missing_ok=True)
             except OSError as error:

@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from zfcal.artifacts.lineage import Lineage, to_json
 from zfcal.report import theme
+from zfcal.report.intervals import interval_tables
 from zfcal.report.numbers import lineage_table, tables, trials_table
 from zfcal.report.panels import Entry, Picture, entry_svg, panel_svg
 from zfcal.report.summary import gaps, statements
@@ -90,7 +91,7 @@ def _of_several(views: Sequence[TrialView]) -> dict[str, Any]:
         "facts": ", ".join(view.name for view in views),
         "statements": statements_of_trials(views),
         "gaps": gaps_of_trials(views),
-        "tables": [trials_table(views), lineage_table(views)],
+        "tables": [trials_table(views), *interval_tables(views), lineage_table(views)],
     }
 
 

@@ -218,6 +218,8 @@ class TrialView:
         The artifacts that were read.
     left_out
         One line per file that could not be read.
+    label
+        What it is called among several; empty for the directory's name.
     scoring
         ``paper`` or ``legacy``, as the scores say.
     has_control_trials
@@ -235,13 +237,14 @@ class TrialView:
     integration: Integration
     sources: Sequence[Source]
     left_out: Sequence[str] = ()
+    label: str = ""
     scoring: str = "paper"
     has_control_trials: bool = False
 
     @property
     def name(self) -> str:
-        """The directory's name, as people call the trial."""
-        return self.root.resolve().name
+        """The directory's name, as people call the trial, or its label."""
+        return self.label or self.root.resolve().name
 
     @property
     def calibrated(self) -> Round | None:
