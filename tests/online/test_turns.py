@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from zfcal.online import turns
-from zfcal.online.turns import LEAST_S, SPARE_S, Choice, budget_of, choose
+from zfcal.online.turns import LEAST_S, SPARE_S, Choice, Overruns, budget_of, choose
 
 
 def test_examples_of_the_module_hold():
@@ -78,6 +78,35 @@ def test_a_round_is_over_before_the_next_one_is_due(now_s, expected_s):
     budget_s = budget_of(50.0, seen_s=0.0, now_s=now_s)
     assert budget_s == pytest.approx(expected_s)
     assert now_s + budget_s <= 60 - SPARE_S or budget_s == LEAST_S
+
+
+def test_what_rounds_overran_is_kept_free_in_the_next_ones():
+    """The worst of the last three, and a tenth more; never less than the reserve."""
+    overruns = Overruns()
+    assert overruns.reserve_s == SPARE_S
+    overruns.add(took_s=49.0, budget_s=50.0)
+    assert overruns.reserve_s == SPARE_S
+    overruns.add(took_s=68.0, budget_s=48.0)
+    assert overruns.reserve_s == pytest.approx(22.0)
+    assert budget_of(50.0, seen_s=0.0, now_s=3.0, reserve_s=22.0) == pytest.approx(35.0)
+    for _ in range(3):
+        overruns.add(took_s=40.0, budget_s=38.0)
+    assert overruns.reserve_s == SPARE_S
+
+
+@given(fixed_s=st.floats(0, 40), slower=st.floats(1.0, 1.09))
+def test_rounds_come_back_into_their_minute(fixed_s, slower):
+    """Whatever takes up to 40 s beyond each budget: after the first rounds none misses it."""
+    overruns, now_s, late = Overruns(), 0.0, []
+    for number in range(10):
+        seen_s = 60.0 * number
+        now_s = max(now_s, seen_s)
+        budget_s = budget_of(50.0, seen_s=seen_s, now_s=now_s, reserve_s=overruns.reserve_s)
+        took_s = budget_s + fixed_s * (slower if number % 2 else 1.0)
+        overruns.add(took_s, budget_s)
+        now_s += took_s
+        late.append(now_s > seen_s + 60.0)
+    assert not any(late[5:])
 
 
 def test_a_stage_that_is_too_slow_never_falls_farther_behind():

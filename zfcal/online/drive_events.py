@@ -27,7 +27,7 @@ class DriveStatus:
     held
         Why the robot is held; empty if it is not.
     steps_missed
-        Steps of the model for which no frame came in time.
+        Steps of the model that no command followed: no frame came in time, or the driver was late.
     pose_to_state_s, tick_to_byte_s
         95th percentiles of late, in seconds; None where there are none.
     """

@@ -84,6 +84,7 @@ class Driver:
         self.n_commands = 0
         self.is_answered = False
         self._time_of_frame_s: float | None = None
+        self._n_late = 0
         self.models_used: list[str] = []
 
     def warm_up(self) -> None:
@@ -103,6 +104,8 @@ class Driver:
         """
         # What was written before the driver came is history: it is seen, and not driven by.
         fresh = self._begun or not self._crew.clock.is_live or (age_s or 1.0) <= PATIENCE_S
+        if self._begun and self._crew.clock.is_live:
+            self._count_late(frames)
         if frames and not self._begun:
             self._begin(frames[0].time_s, now_s=frames[-1].time_s)
         for poses in frames:
@@ -120,7 +123,7 @@ class Driver:
             began_s = time.perf_counter()
         if isinstance(self._crew.clock, WallClock):
             self._crew.log.n_ticks_skipped = self._crew.clock.n_skipped
-        self._crew.log.n_steps_missed = self.pilot.n_missed
+        self._crew.log.n_steps_missed = self.n_missed
 
     def listen(self) -> None:
         """Hear what the robot says."""
@@ -146,7 +149,7 @@ class Driver:
             total_s=total_s,
             model=self._model.name,
             held=self._held,
-            steps_missed=self.pilot.n_missed,
+            steps_missed=self.n_missed,
             pose_to_state_s=log.lately(POSE_TO_STATE),
             tick_to_byte_s=log.lately(TICK_TO_BYTE),
         )
@@ -163,7 +166,7 @@ class Driver:
         before, n_missed = self.pilot.pose, self.pilot.n_missed
         target = self.pilot.see(poses, self._model)
         pose, self._time_of_frame_s = self.pilot.pose, poses.time_s
-        self._tell_missed(poses.time_s, self.pilot.n_missed - n_missed)
+        self._tell_missed(poses.time_s, self.pilot.n_missed - n_missed, "no frame came in time")
         seen = pose is not None and pose is not before
         if seen and fresh:
             self._freshen()
@@ -175,10 +178,22 @@ class Driver:
         self._crew.log.add(item | place)
         self._note(target)
 
-    def _tell_missed(self, time_s: float, steps: int) -> None:
+    def _count_late(self, frames: list[FramePoses]) -> None:
+        """Count steps that nobody swims by, since frames of the next one have come as well."""
+        due = len({self.pilot.step_of(poses.frame) for poses in frames} - {self.pilot.step})
+        if due > 1:
+            self._n_late += due - 1
+            self._tell_missed(frames[-1].time_s, due - 1, "the driver was held up")
+
+    @property
+    def n_missed(self) -> int:
+        """Steps of the model that no command followed, though the trial went on."""
+        return self.pilot.n_missed + self._n_late
+
+    def _tell_missed(self, time_s: float, steps: int, because: str) -> None:
         if steps:
-            text = f"{time_s:.1f} s: {steps} steps of the model were missed: no frame came in time."
-            values = {"time_s": time_s, "steps": steps, "total": self.pilot.n_missed}
+            text = f"{time_s:.1f} s: {steps} steps of the model were missed: {because}."
+            values = {"time_s": time_s, "steps": steps, "total": self.n_missed, "because": because}
             self._crew.tell(Note(text=text, warning=True, kind="missed", values=values))
 
     def _freshen(self) -> None:

@@ -150,6 +150,10 @@ class Pilot:
         """Number of the last step that was due; -1 before the first."""
         return -1 if self._step is None else self._step
 
+    def step_of(self, frame: int) -> int:
+        """Return the number of the step in whose time a frame falls."""
+        return frame // self._stride
+
     def is_due(self, frame: int) -> bool:
         """Return whether a step of the model falls on a frame, or between it and the last one."""
         if self._step is None:

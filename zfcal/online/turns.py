@@ -5,7 +5,8 @@
     a window is due       60 s after its segments were there
     a stage that is free  takes the oldest window; those that are past due are passed
                           over as soon as one waits that came later
-    a round               gets its budget, or what is left until it is due
+    a round               gets its budget, or what is left until it is due, less what the
+                          rounds before it took beyond theirs
 
 So a stage that overran first catches up by shorter rounds, then by skipping; what
 waits never grows without bound. Of a recording that has ended all windows are made,
@@ -14,8 +15,10 @@ oldest first, each with its whole budget.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import final
 
 from zfcal.units import SEGMENT_S
 
@@ -24,6 +27,11 @@ SPARE_S = 5.0
 
 LEAST_S = 5.0
 """A round that starts late still gets so much."""
+
+_MEMORY = 3
+"""Rounds whose overruns count."""
+
+_MARGIN = 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +81,28 @@ def choose(waiting: Mapping[int, float], *, now_s: float, due_after_s: float | N
     return Choice(end_s=next(end for end in ends if end not in passed), passed_over=passed)
 
 
-def budget_of(asked_s: float, *, seen_s: float, now_s: float) -> float:
+@final
+class Overruns:
+    """By how much the last rounds overran their budgets.
+
+    No budget shortens the first population, the confirmation and the ceiling: on a busy
+    computer these take what the next round has to do without.
+    """
+
+    def __init__(self) -> None:
+        self._lately: deque[float] = deque(maxlen=_MEMORY)
+
+    def add(self, took_s: float, budget_s: float) -> None:
+        """Note a round."""
+        self._lately.append(took_s - budget_s)
+
+    @property
+    def reserve_s(self) -> float:
+        """Seconds to be kept free at the end of the next round."""
+        return max(SPARE_S, _MARGIN * max(self._lately, default=0.0))
+
+
+def budget_of(asked_s: float, *, seen_s: float, now_s: float, reserve_s: float = SPARE_S) -> float:
     """Return the seconds that a round may take, so that the next one finds the stage free.
 
     Parameters
@@ -84,11 +113,13 @@ def budget_of(asked_s: float, *, seen_s: float, now_s: float) -> float:
         When its window's data were there.
     now_s
         When it starts, on the same clock.
+    reserve_s
+        What is kept free at its end.
 
     Examples
     --------
     >>> budget_of(50.0, seen_s=0.0, now_s=25.0)
     30.0
     """
-    left_s = seen_s + SEGMENT_S - SPARE_S - now_s
+    left_s = seen_s + SEGMENT_S - reserve_s - now_s
     return min(asked_s, max(left_s, LEAST_S))

@@ -17,7 +17,7 @@ from zfcal.online.opening import Task, open_trial
 from zfcal.online.recording import starts_between, stretch_of
 from zfcal.online.segments import Segments, segment_path, segment_starts
 from zfcal.online.skipping import write_skipped
-from zfcal.online.turns import budget_of, choose
+from zfcal.online.turns import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, Takes
 from zfcal.online.worker import Job
 
@@ -127,11 +127,14 @@ class CalibrateStage:
         How; its budget is that of a round which starts in time.
     clock
         The one of the orders.
+    overruns
+        What rounds took beyond their budgets.
     """
 
     root: Path
     options: CalibrateOptions
     clock: Callable[[], float] = time.monotonic
+    overruns: Overruns = field(default_factory=Overruns)
 
     def __call__(self, turn: Turn, tell: Tell) -> Outcome:
         """Choose a window, write down which are passed over, and make its round.
@@ -154,11 +157,15 @@ class CalibrateStage:
         options = self.options
         if options.budget_s is not None and turn.due_after_s is not None:
             seen_s = waiting[choice.end_s]
-            budget_s = budget_of(options.budget_s, seen_s=seen_s, now_s=now_s)
+            budget_s = budget_of(
+                options.budget_s, seen_s=seen_s, now_s=now_s, reserve_s=self.overruns.reserve_s
+            )
             options = dataclasses.replace(options, budget_s=budget_s)
         ear.hear(Takes(end_s=choice.end_s, budget_s=options.budget_s))
         task = Task(ends_s=frozenset({choice.end_s}))
         calibrate(self.root, options, ear.hear, task=task)
+        if options.budget_s is not None:
+            self.overruns.add(self.clock() - now_s, options.budget_s)
         return Outcome(end_s=choice.end_s, left_out=ear.left_out)
 
     def _get_ready(self) -> None:
