@@ -255,3 +255,47 @@ def test_looking_where_it_is_bright_finds_what_looking_everywhere_does(with_mask
 def test_an_image_without_any_light_has_no_blobs():
     """Quickly, too."""
     assert led_blobs(np.full((480, 640, 3), 60, np.uint8), LedOptions()).shape == (0, 2)
+
+
+def wandering(seed, *, n=600, sharp=0.05):
+    """Return places and headings of a robot that turns as sharply as a fish, every third image.
+
+    Some turns, a share of them, are any; the others are small. It drives 5 mm from image to image.
+    """
+    rng = np.random.default_rng(seed)
+    turns = np.where(
+        rng.random(n) < sharp, rng.uniform(-math.pi, math.pi, n), rng.normal(0.0, 0.3, n)
+    )
+    heading = np.cumsum(np.where(np.arange(n) % 3 == 0, turns, 0.0))
+    steps = 0.005 * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    return np.cumsum(steps, axis=0), heading
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_robot_that_turns_as_sharply_as_a_fish_has_its_front_told_soon(seed):
+    """With LEDs right to 0.3 mm and axes to 2 degrees the other end is told in 2 % of images."""
+    rng = np.random.default_rng(seed)
+    places, headings = wandering(seed)
+    seen_m = places + rng.normal(0.0, 3e-4, places.shape)
+    axes = headings + rng.normal(0.0, 0.03, len(headings)) + math.pi * rng.integers(0, 2, 600)
+    front = Front()
+
+    told = [
+        front.step(k / FPS, xy, (axis + math.pi) % (2 * math.pi) - math.pi)
+        for k, (xy, axis) in enumerate(zip(seen_m, axes, strict=True))
+    ]
+
+    off = np.array([away(one, other) for one, other in zip(told, headings, strict=True)])
+    assert np.isfinite(off).mean() > 0.99
+    assert np.mean(off > math.pi / 2) < 0.02
+
+
+def test_a_robot_that_stops_and_backs_off_by_eight_centimetres_keeps_its_front():
+    """It stands for a third of a second, drives back; after 25 cm it has turned."""
+    front = Front()
+    x_m = np.concatenate([0.005 * np.arange(40), np.full(5, 0.195), 0.195 - 0.005 * np.arange(60)])
+
+    told = [front.step(k / FPS, np.array([x, 0.0]), 0.0) for k, x in enumerate(x_m)]
+
+    assert max(away(heading, 0.0) for heading in told[5 : 45 + 16]) < 1e-9
+    assert away(told[-1], math.pi) < 1e-9

@@ -2,8 +2,9 @@
 
 Both LEDs shine in one colour, so their axis tells the heading but for half a turn.
 Which end is the front is told by motion: the robot drives forwards more than backwards.
-Once told it is kept, since from one frame to the next the robot turns little; only a long
-drive backwards overrules it, or a short drive after a turn that may have been either.
+Once told it is kept, since from one frame to the next the robot turns little. A robot that
+stops and then drives back keeps its front for eight centimetres; one that seems to drive back
+without having stopped has turned.
 """
 
 from __future__ import annotations
@@ -30,18 +31,26 @@ NEAR_M = 0.05
 NEAR_S = 0.05
 """Two images of different cameras belong together if no more lies between them."""
 
-_NATS_PER_M = 200.0
-"""What a way along the axis tells of the front: the odds rise by e for each half centimetre."""
+_NATS_PER_M, _NATS = 2000.0, 4.0
+"""What a way along the axis tells of where it drives to, by the half millimetre, and at most:
+positions are right to a third of one."""
 
-_TELL, _OVERRULE, _SUREST = 2.0, 2.0, 14.0
-"""Log odds from which the front is told, from which against it it is changed, and at most.
+_BACK_NATS_PER_M = 30.0
+"""What each metre driven backwards costs: the odds fall by e for every 33 mm."""
 
-So a robot that was sure of its front may back off a wall by eight centimetres.
-"""
+_BACK = 0.02
+"""Chance of driving backwards, for a robot that was not seen before."""
 
-_TURN_RAD = math.radians(15.0)
-_ANY_TURN = 1e-6
-"""Turns between two images: small ones, and rarely any; near a quarter nobody knows which way."""
+_STILL_M, _REVERSES_STILL, _REVERSES = 0.0007, 0.05, 1e-6
+"""Chances of another gear from one image to the next: of a robot that stood still between the two
+before, and of one that was under way, which has to brake first."""
+
+_TELL, _OVERRULE, _SUREST = 2.0, 0.5, 14.0
+"""Log odds from which the front is told, from which it is told anew, and at most."""
+
+_TURN_RAD = math.radians(25.0)
+_ANY_TURN = 5e-3
+"""Turns between two images: small ones, and now and then any: near a quarter it may be either."""
 
 _LOST_S = 1.0
 """A robot that was lost for so long may have turned: its front is told anew."""
@@ -273,16 +282,18 @@ def _axis(leds_m: Floats) -> float:
 class Front:
     """Tells which way along its axis the robot looks.
 
-    A filter with two states, the ends of the axis. A turn mixes them, the less the smaller
-    it is; a way along the axis speaks for the end that is ahead.
+    A filter with four states: which end of the axis is the front, and whether the robot drives
+    forwards or backwards. A turn mixes the ends, the less the smaller it is; a robot changes gear
+    rarely, and hardly ever while it is under way. So one that seems to back off at full speed,
+    after an image in which its axis has turned, has turned by more than a quarter.
     """
 
     def __init__(self) -> None:
         self._heading_rad = math.nan
-        self._odds = 0.0
         self._is_told = False
         self._time_s = -math.inf
         self._middle_m: Floats = np.full(2, np.nan)
+        self._begin(math.nan)
 
     def step(self, time_s: float, middle_m: Floats, axis_rad: float) -> float:
         """Return the heading; NaN while it is not told.
@@ -299,12 +310,18 @@ class Front:
         if not math.isfinite(axis_rad):
             return math.nan
         if not time_s - self._time_s <= _LOST_S:
-            self._heading_rad, self._odds, self._is_told = _wrapped(axis_rad), 0.0, False
+            self._begin(axis_rad)
         else:
             turned_rad = self._turn(axis_rad)
             self._drive(middle_m - self._middle_m, self._heading_rad - turned_rad / 2)
         self._time_s, self._middle_m = time_s, middle_m
         return self._heading_rad if self._is_told else math.nan
+
+    def _begin(self, axis_rad: float) -> None:
+        self._heading_rad, self._is_told = _wrapped(axis_rad), False
+        self._moved_m = math.inf
+        # The end that the heading names is the front, or the other; forwards or backwards.
+        self._chance: Floats = np.array([[1 - _BACK, _BACK], [1 - _BACK, _BACK]]) / 2
 
     def _turn(self, axis_rad: float) -> float:
         """Follow the axis by less than a quarter turn, and return by how much."""
@@ -312,23 +329,27 @@ class Front:
         if abs(away) > math.pi / 2:
             away = _wrapped(away + math.pi)
         self._heading_rad = _wrapped(self._heading_rad + away)
-        right = 1 / (1 + math.exp(-self._odds))
         other = _likely_turn(math.pi - abs(away))
         mixed = other / (other + _likely_turn(abs(away)))
-        right = right * (1 - mixed) + (1 - right) * mixed
-        self._odds = math.log(right / (1 - right))
+        self._chance = (1 - mixed) * self._chance + mixed * self._chance[::-1]
         return away
 
     def _drive(self, step_m: Floats, heading_rad: float) -> None:
         """Take what a way says, made with the heading half-way between two images."""
         along_m = float(step_m[0] * math.cos(heading_rad) + step_m[1] * math.sin(heading_rad))
-        self._odds = min(max(self._odds + _NATS_PER_M * along_m, -_SUREST), _SUREST)
-        if self._odds <= -(_OVERRULE if self._is_told else _TELL):
+        reverses = _REVERSES_STILL if self._moved_m < _STILL_M else _REVERSES
+        chance = (1 - reverses) * self._chance + reverses * self._chance[:, ::-1]
+        tells = math.exp(min(max(_NATS_PER_M * along_m, -_NATS), _NATS) / 2)
+        chance = chance * np.array([[tells, 1 / tells], [1 / tells, tells]])
+        chance[:, 1] *= math.exp(-_BACK_NATS_PER_M * abs(along_m))
+        chance = np.maximum(chance / chance.sum(), math.exp(-_SUREST) / 2)
+        self._moved_m = float(np.hypot(*step_m))
+        odds = math.log(chance[0].sum() / chance[1].sum())
+        if odds <= -(_OVERRULE if self._is_told else _TELL):
             self._heading_rad = _wrapped(self._heading_rad + math.pi)
-            self._odds = -self._odds
-            self._is_told = True
-        elif self._odds >= _TELL:
-            self._is_told = True
+            chance = chance[::-1]
+        self._chance = chance
+        self._is_told = self._is_told or abs(odds) >= _TELL
 
 
 def _likely_turn(angle_rad: float) -> float:
