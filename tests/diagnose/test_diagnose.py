@@ -6,8 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.diagnose.diagnose import diagnose
+from zfcal.diagnose.confirming import Confirmed
+from zfcal.diagnose.diagnose import _explains, _kept, diagnose
 from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
 from zfcal.errors import InputError
 from zfcal.model.effects import all_effects
@@ -15,10 +17,10 @@ from zfcal.tracks import ROBOT
 
 
 @pytest.fixture(scope="module")
-def ask(tank, fish):
-    """Return what diagnoses samples; keywords change the question."""
+def question(tank, fish):
+    """Return what asks for samples; keywords change the question."""
 
-    def of(samples, *, tell=lambda _stage, _done, _all: None, **changes):
+    def of(samples, **changes):
         known = {
             "noise_m": 0.0,
             "noise_source": "known",
@@ -27,9 +29,17 @@ def ask(tank, fish):
             "seed": 1,
             "n_workers": 2,
         }
-        return diagnose(
-            Question(samples=samples, arena=tank, model=fish, **{**known, **changes}), tell
-        )
+        return Question(samples=samples, arena=tank, model=fish, **{**known, **changes})
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def ask(question):
+    """Return what diagnoses samples; keywords change the question."""
+
+    def of(samples, *, tell=lambda _stage, _done, _all: None, **changes):
+        return diagnose(question(samples, **changes), tell)
 
     return of
 
@@ -205,3 +215,29 @@ def test_a_clear_effect_is_named_in_spite_of_noise(ask, record):
     found = ask(dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m), noise_m=0.0005)
     assert found.effects[0].name == "turning-bias"
     assert found.effects[0].ties == ()
+
+
+@pytest.mark.parametrize(
+    ("left", "noise_m", "stands"), [(0.5, 0.0, True), (1e-6, 0.0, False), (0.5, 0.002, False)]
+)
+def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
+    question, record, left, noise_m, stands
+):
+    """A strong effect whose true form is another one; not where something is left, or might be."""
+    asks = question(record(23, BIAS, minutes=6.0), noise_m=noise_m)
+    told = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True, steady=False)
+    steady = dataclasses.replace(told, steady=True)
+    steps = ("the first", "the last")
+    asked = []
+
+    def after(step):
+        asked.append(step)
+        return Omnibus(p=left, worst="", z=0.0)
+
+    explained = _explains(asks, steps, (steady, told), after)
+
+    assert explained == stands
+    assert asked == ([] if noise_m else ["the last"])
+    kept = _kept(steps, (steady, told), explained=explained)
+    assert kept == (steps if stands else steps[:1])
+    assert _kept(steps, (dataclasses.replace(told, holds=False), told), explained=True) == ()

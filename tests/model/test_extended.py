@@ -8,7 +8,7 @@ import pytest
 from scipy.special import i0e
 
 from zfcal.model.extended import bounds_of, maximise, start_of, with_effect, without_effects
-from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_scores, zone_turns
+from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_log_p, zone_scores, zone_turns
 from zfcal.model.kernels.extended import BASE, COLUMNS, EXTRA, densities, extended_sums, make_cells
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.likelihood import fit
@@ -219,6 +219,17 @@ def test_an_empty_room_by_hand(two_rooms, make_natural):
     scene = one_step(two_rooms, [(0.22, 0.77)], [0.4], 0.9, 0.06)
     by_hand = kappa * (math.cos(0.5) - 1) - math.log(2 * math.pi * i0e(kappa))
     assert log_density(scene, model, 3) == pytest.approx(by_hand, abs=1e-3)
+
+
+@pytest.mark.parametrize("effects", HOOKS.values(), ids=HOOKS.keys())
+def test_the_density_alone_is_that_with_derivatives(scene, model, effects):
+    """Step by step, at other parameters than those that the scene was made with."""
+    changed = having(model, effects)
+    view = view_of(scene, changed)
+    for x, turns in zip(start_of(changed), zone_turns(scene), strict=True):
+        x[:3], x[-1] = x[:3] * [1.5, 0.7, 0.8], 0.02
+        x[3:-1] -= 0.1 * np.arange(x.size - 4)
+        assert zone_log_p(x, turns, view) == pytest.approx(nats_of(x, turns, view), abs=1e-9)
 
 
 def test_a_lapse_is_a_share_of_uniform_headings(scene, model):

@@ -75,8 +75,13 @@ def is_suspicious(question: Question, omnibus: Omnibus) -> bool:
 
     A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
     """
+    return can_suspect(question) and omnibus.p < _UNEXPLAINED
+
+
+def can_suspect(question: Question) -> bool:
+    """Tell whether the omnibus test has a null: positions are sharp, or replicates asked for."""
     sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
-    return (not question.quick or sharp) and omnibus.p < _UNEXPLAINED
+    return not question.quick or sharp
 
 
 def has_noise(question: Question) -> bool:

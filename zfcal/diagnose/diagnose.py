@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, is_suspicious, open_case
+from zfcal.diagnose.case import (
+    QUICK_REPLICATES,
+    Case,
+    can_suspect,
+    has_noise,
+    is_suspicious,
+    open_case,
+)
 from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
 from zfcal.diagnose.controls import NAMES, ask_controls
 from zfcal.diagnose.findings import (
@@ -49,6 +56,7 @@ from zfcal.diagnose.telling import says
 from zfcal.diagnose.tracing import trace
 
 Floats = NDArray[np.float64]
+Asks = Callable[[Step], Omnibus]
 
 
 _GENERIC_REPLICATES = 8
@@ -72,6 +80,19 @@ class _Row:
     listed: Floats
     controls: Floats | None
     at_large: tuple[Residuals, dict[str, float]] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judged:
+    """Effects that stand, of those that were selected; the omnibus test with them in the model.
+
+    ``confirmed`` holds what held-out steps say of all that were selected.
+    """
+
+    kept: tuple[Step, ...]
+    confirmed: tuple[Confirmed, ...]
+    omnibus: Omnibus
+    suspicious: bool
 
 
 def diagnose(question: Question, tell: Tell) -> Diagnosis:
@@ -109,13 +130,30 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         told=tell,
     )
     selection = selector.select(case.screen, scores)
-    confirmed = [confirm(step) for step in selection.steps]
-    kept = _kept(selection.steps, confirmed)
+    judged = _judged(case, rows, selection, omnibus)
+    return _diagnosis(case, rows, selection, judged, _where(own[0], rows))
+
+
+def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omnibus) -> _Judged:
+    """Return which of the effects that were selected stand, and what is left then."""
+    confirmed = tuple(confirm(step) for step in selection.steps)
+    nulls = [row.at_large[1] for row in rows if row.at_large]
+
+    def after(step: Step) -> Omnibus:
+        return judge(case.at_large(0, step.choice.best.screen)[1], nulls)
+
+    explained = _explains(case.question, selection.steps, confirmed, after)
+    kept = _kept(selection.steps, confirmed, explained=explained)
     if kept:
-        final = case.at_large(0, kept[-1].choice.best.screen)
-        omnibus = judge(final[1], [row.at_large[1] for row in rows if row.at_large])
-    where = _where(own[0], rows)
-    return _diagnosis(case, rows, selection, (kept, confirmed), (where, omnibus))
+        omnibus = after(kept[-1])
+    # What is there at times is something, though nothing that is listed.
+    wavers = not explained and any(told.holds and not told.steady for told in confirmed)
+    return _Judged(
+        kept=kept,
+        confirmed=confirmed,
+        omnibus=omnibus,
+        suspicious=wavers or is_suspicious(case.question, omnibus),
+    )
 
 
 def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]:
@@ -188,11 +226,27 @@ def _rivals(case: Case, screen: Screen) -> list[Best]:
     return best_of(family, [best.score for best in found])
 
 
-def _kept(steps: Sequence[Step], confirmed: Sequence[Confirmed]) -> tuple[Step, ...]:
+def _explains(
+    question: Question, steps: Sequence[Step], confirmed: Sequence[Confirmed], after: Asks
+) -> bool:
+    """Return whether what seems to be there at times is all that there is.
+
+    Where an effect is strong and its true form another one than ours, what is left over goes by the
+    fish's distances, say, which change within a minute: it looks like an effect that comes
+    and goes. With our form in the model nothing is left then that the omnibus test would notice.
+    """
+    if all(told.steady for told in confirmed) or not can_suspect(question):
+        return False
+    return not is_suspicious(question, after(steps[-1]))
+
+
+def _kept(
+    steps: Sequence[Step], confirmed: Sequence[Confirmed], *, explained: bool
+) -> tuple[Step, ...]:
     """Return the effects up to the first that held-out steps or times do not bear out."""
     kept = []
     for step, told in zip(steps, confirmed, strict=True):
-        if not (told.holds and told.steady):
+        if not (told.holds and (told.steady or explained)):
             break
         kept.append(step)
     return tuple(kept)
@@ -202,26 +256,22 @@ def _diagnosis(
     case: Case,
     rows: Sequence[_Row],
     selection: Selection,
-    kept: tuple[tuple[Step, ...], Sequence[Confirmed]],
-    at_large: tuple[tuple[Located, ...], Omnibus],
+    judged: _Judged,
+    where: tuple[Located, ...],
 ) -> Diagnosis:
-    (steps, confirmed), (where, omnibus) = kept, at_large
+    steps = judged.kept
     effects = tuple(
         _effect(step, held, ties_of(step.choice, [each.choice for each in steps[number:]]))
-        for number, (step, held) in enumerate(zip(steps, confirmed, strict=False), start=1)
+        for number, (step, held) in enumerate(zip(steps, judged.confirmed, strict=False), start=1)
     )
-    # What is there at times is something, though nothing that is listed.
-    wavers = any(told.holds and not told.steady for told in confirmed)
     final = steps[-1].choice.best.screen if steps else case.screen
     screened = _screened(case, selection.screened)
     return Diagnosis(
-        verdict=_verdict(
-            effects, screened, suspicious=wavers or is_suspicious(case.question, omnibus)
-        ),
+        verdict=_verdict(effects, screened, suspicious=judged.suspicious),
         where=where,
         effects=effects,
         screened=screened,
-        notes=_notes(case, rows, final, omnibus),
+        notes=_notes(case, rows, final, judged.omnibus),
         base=case.screen.fitted.parameters,
         extended=final.fitted.parameters,
         minutes=case.scene.duration_s / 60,

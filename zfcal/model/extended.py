@@ -21,7 +21,15 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from zfcal.model.effects import find_effect
-from zfcal.model.fitted import SCALES, Fitted, Free, ZoneTurns, zone_scores, zone_turns
+from zfcal.model.fitted import (
+    SCALES,
+    Fitted,
+    Free,
+    ZoneTurns,
+    zone_log_p,
+    zone_scores,
+    zone_turns,
+)
 from zfcal.model.scene import Scene
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters, ZoneParameters
@@ -98,7 +106,7 @@ def nats_at(scene: Scene, parameters: Parameters, start: Sequence[Floats]) -> fl
         Per zone, as `zone_scores` takes it.
     """
     climb = _Climb(scene=scene, free=(), seen=view_of(scene, without_effects(parameters)))
-    return climb.at(parameters, start).nats
+    return float(np.nansum(climb.log_p(parameters, start)))
 
 
 def without_effects(parameters: Parameters) -> Parameters:
@@ -149,6 +157,15 @@ class _Climb:
             free=self.free,
         )
 
+    def log_p(self, parameters: Parameters, x: Sequence[Floats]) -> Floats:
+        """Return the log density of each turn at a point; NaN in zones that are not fitted."""
+        view = view_of(self.scene, parameters, self.seen)
+        found = np.full(len(self.scene.turns), np.nan)
+        for own, turns in zip(x, self.turns, strict=True):
+            if turns.enough:
+                found[turns.rows] = zone_log_p(own, turns, view)
+        return found
+
     def differences(self, here: Fitted) -> Floats:
         """Return the scores of the effects' parameters, in units of their ranges."""
         columns = np.zeros((len(here.log_p), len(self.free)))
@@ -158,8 +175,8 @@ class _Climb:
             by = _DIFFERENCE * (high - low)
             by = by if value + by <= high else -by
             moved = with_effect(here.parameters, name, {key: value + by})
-            there = self.at(moved, here.x)
-            columns[:, p] = np.nan_to_num(there.log_p - here.log_p) / by * (high - low)
+            there = self.log_p(moved, here.x)
+            columns[:, p] = np.nan_to_num(there - here.log_p) / by * (high - low)
         return columns
 
     def step(self, here: Fitted) -> Fitted | None:

@@ -23,6 +23,7 @@ from zfcal.model.kernels.extended import (
     SOCIAL,
     SOCIAL_SLOPE,
     cell_table,
+    extended_density,
     extended_sums,
 )
 from zfcal.model.scene import Scene
@@ -158,6 +159,23 @@ def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats
     scores[:, 3:-1] = -by_zone / whole[:, None]
     scores[np.arange(n), 3 + landing] += 1.0
     return _with_lapse(log_p, scores, float(x[-1]))
+
+
+def zone_log_p(x: Floats, turns: ZoneTurns, view: View) -> Floats:
+    """Return the first that `zone_scores` does, in less than half of the time."""
+    own, gamma = x[:3] * SCALES, np.exp(x[3:-1])
+    n, rows = len(turns.rows), turns.rows
+    here, whole = np.empty(n), np.empty(n)
+    first, second = constants(own[:2])
+    extended_density(
+        turns.base_of(view), view.toward[rows], view.angle_sr[rows], turns.taken, turns.share,
+        view.parts[rows], view.tilt[rows] if len(view.tilt) else view.tilt, (own[0], own[1]),
+        (first, own[2] * second), gamma, here, whole,
+    )  # fmt: skip
+    density = gamma[turns.landing - 1] * here / whole
+    if len(view.tilt):
+        density *= np.maximum(view.tilt_taken[rows], 1e-300)
+    return np.asarray(np.log((1 - x[-1]) * density + x[-1] * _UNIFORM))
 
 
 def _with_lapse(log_p: Floats, scores: Floats, lapse: float) -> tuple[Floats, Floats, Floats]:

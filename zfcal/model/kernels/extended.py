@@ -167,6 +167,59 @@ def extended_sums(
 
 
 @kernel
+def extended_density(
+    base: Floats, toward: Floats, angle_sr: Floats, taken: Floats, share: NDArray[np.uint8],
+    parts: Floats, tilt: Floats, kappas: tuple[float, float], scales: tuple[float, float],
+    gamma: Floats, at_taken: Floats, whole: Floats,
+) -> None:  # fmt: skip
+    """Write what `extended_sums` comes to at one alpha and gamma, without the derivatives.
+
+    Parameters
+    ----------
+    base, toward, angle_sr, taken, share, parts, tilt
+        As for `extended_sums`.
+    kappas, scales
+        Likewise; alpha is in the second scale.
+    gamma : ndarray, shape (zone,)
+    at_taken : ndarray, shape (step,)
+        Receives the mixture at the heading taken.
+    whole : ndarray, shape (step,)
+        Receives its integral, tilted, over all that lands inside, weighted by gamma.
+    """
+    n_cells, n_zones = share.shape[1], share.shape[2]
+    per = 2.0 * math.pi / n_cells / PER_CELL
+    gx, gy, cosine, value, columns = make_cells(n_cells)
+    mixture, weight = columns[0], np.empty(n_cells)
+    modes = base.shape[1]
+    for s in range(base.shape[0]):
+        gx[-1], gy[-1] = taken[s, 0], taken[s, 1]
+        mixture[:] = 0.0
+        for m in range(modes):
+            x, y, own = base[s, m, 0], base[s, m, 1], scales[0] / modes
+            bell(x, y, kappas[0], own, gx, gy, cosine, value, mixture)
+        for j in range(toward.shape[1]):
+            if angle_sr[s, j] > 0.0:
+                x, y, own = toward[s, j, 0], toward[s, j, 1], angle_sr[s, j] * scales[1]
+                bell(x, y, kappas[1], own, gx, gy, cosine, value, mixture)
+        for c in range(parts.shape[1]):
+            if parts[s, c, 0] > 0.0:
+                x, y, kappa = parts[s, c, 1], parts[s, c, 2], parts[s, c, 3]
+                own = parts[s, c, 0] * one_over_integral(kappa)
+                bell(x, y, kappa, own, gx, gy, cosine, value, mixture)
+        weight[:] = 0.0
+        for zone in range(n_zones):
+            for g in range(n_cells):
+                weight[g] += per * gamma[zone] * share[s, g, zone]
+        if tilt.shape[0] > 0:
+            for g in range(n_cells):
+                weight[g] *= tilt[s, g]
+        total = 0.0
+        for g in range(n_cells):
+            total += weight[g] * mixture[g]
+        at_taken[s], whole[s] = mixture[n_cells], total
+
+
+@kernel
 def cell_table(
     base: Floats, toward: Floats, angle_sr: Floats, taken: Floats, share: NDArray[np.uint8],
     parts: Floats, tilt: Floats, kappas: tuple[float, float], scales: tuple[float, float],
