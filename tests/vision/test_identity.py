@@ -169,3 +169,24 @@ def test_a_lost_id_that_is_found_elsewhere_at_once_is_not_told_yet():
     film.show({0: LARGE, 1: SMALL}, 30)
     told = [film.show({0: LARGE, 6: SMALL}, 1) for _ in range(4)]
     assert told == [{0: 0}, {0: 0}, {0: 0, 6: 1}, {0: 0, 6: 1}]
+
+
+def test_two_that_share_a_blob_from_the_start_are_learnt_when_they_part():
+    """Nothing is known of either, so there is no doubt: their looks become theirs."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 5, mixed={(0, 1): 0.5})
+
+    ids = film.show({0: LARGE, 1: SMALL}, 60)
+
+    looks = [film.names.look(ids[key]) for key in (0, 1)]
+    assert [look.area_px for look in looks] == pytest.approx([LARGE[0], SMALL[0]], rel=0.05)
+
+
+def test_who_is_known_is_not_settled_by_who_is_not():
+    """A doubt between an animal that was seen and a new one stays until looks tell."""
+    film = Film()
+    film.show({0: LARGE}, 60)
+
+    film.show({0: LARGE, 1: LARGE}, 1, mixed={(0, 1): 0.5})
+
+    assert film.names._chance[0, 0] < 0.9

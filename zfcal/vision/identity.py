@@ -51,7 +51,7 @@ _MEMORY = 3000.0
 _SURE = 0.85
 """Chance from which a sighting is learnt from."""
 
-_MEND = 3.0
+_MEND = 4.5
 """Log odds from which ids are exchanged."""
 
 _APART = 2.0
@@ -108,6 +108,7 @@ class Identities:
         for (one, other), chance in mixed.items():
             if one in rows and other in rows:
                 self._mix(rows[one], rows[other], chance)
+        self._settle()
         dt_s = min(max(time_s - self._time_s, 0.0), _ALIKE_S)
         self._time_s = time_s
         seen = [(rows[t.key], t) for t in trails if t.is_clear]
@@ -153,6 +154,19 @@ class Identities:
         a, b = self._chance[one].copy(), self._chance[other].copy()
         self._chance[one] = (1 - chance) * a + chance * b
         self._chance[other] = (1 - chance) * b + chance * a
+
+    def _settle(self) -> None:
+        """Take away doubts between those of whom nothing is known yet: their names are free.
+
+        Two that share a blob from the first frame on would else never be sure enough to be learnt.
+        """
+        new = self._n < _KNOWN
+        if np.count_nonzero(new) < 2:
+            return
+        for row in np.flatnonzero(new[self._name]):
+            total = self._chance[row, new].sum()
+            self._chance[row, new] = 0.0
+            self._chance[row, self._name[row]] = total
 
     def _look(self, rows: NDArray[np.intp], trails: list[Trail], weight: float) -> None:
         """Let what tracks look like speak, and learn what they look like."""
