@@ -219,6 +219,15 @@ def test_the_document_tells_latency_and_memory(script):
             "latency_ms": {"median": 5.0, "p95": 9.0, "max": 30.0},
         },
     }
+    found["robot"] = {
+        "frames": 900,
+        "seen": 1.0,
+        "heading_told": 0.999,
+        "front_wrong": 0.02,
+        "heading_median_deg": 1.5,
+        "position_95_mm": 2.0,
+        "fish_ids": 4,
+    }
     hour = {"video_s": 3600, "took_s": 150.0, "grows_mb": 0.5, "most_mb": 250.0}
     hour["memory_mb"] = {"0": 240.0, "60": 249.0, "660": 249.0, "3600": 250.0}
 
@@ -226,6 +235,7 @@ def test_the_document_tells_latency_and_memory(script):
     long = live.markdown({**found, "hour": hour})
 
     assert "| 5 | 9 | 30 | 0 | 0 |" in short
+    assert "| 1 | 0.999 | 0.02 | 1.5 | 2 | 4 |" in short
     assert "Memory" not in short
     assert "| 3,600 | 250 |" in long
     assert "660" not in long

@@ -21,10 +21,10 @@ class Blob:
     confidence: float = 0.9
 
 
-def robot(x_m=math.nan, y_m=math.nan, heading_rad=1.0):
-    """Return a robot seen there at 0 s; without a place it is lost."""
+def robot(x_m=math.nan, y_m=math.nan, heading_rad=1.0, *, time_s=0.0):
+    """Return a robot seen there; without a place it is lost."""
     leds = () if math.isnan(x_m) else ((0.0, 0.0), (9.0, 0.0))
-    return RobotSeen(time_s=0.0, x_m=x_m, y_m=y_m, heading_rad=heading_rad, leds_px=leds)
+    return RobotSeen(time_s=time_s, x_m=x_m, y_m=y_m, heading_rad=heading_rad, leds_px=leds)
 
 
 def kinds(agents):
@@ -130,3 +130,49 @@ def test_ids_begin_with_the_first_that_is_free(first):
     fuser = Fuser(first)
     assert [agent.agent for agent in fuser.step(FOUR, None, 0.0)] == [first, first + 1, first + 2]
     assert fuser.next_agent == first + 3
+
+
+def test_where_ids_are_kept_no_name_is_made_for_a_fish_that_was_the_robot():
+    """However often the tracker swaps the robot with a fish, two fish have two names."""
+    fuser = Fuser(keeps=True)
+    seen = {}
+    for k in range(60):
+        at = FOUR[k // 5 % 3]
+        for agent in fuser.step(FOUR, robot(at.x_m, at.y_m, time_s=k / 15), k / 15):
+            assert seen.setdefault(agent.agent, agent.kind) == agent.kind
+    assert sorted(seen.values()) == [FISH, FISH, ROBOT]
+
+
+def test_the_fish_s_name_goes_over_to_the_track_that_was_the_robot_s():
+    """A tracker that mistook one for the other is mended beside them at once."""
+    near = [Blob(7, 0.50, 0.5), Blob(8, 0.53, 0.5)]
+    fuser = Fuser(keeps=True)
+    (fish,) = (a.agent for a in fuser.step(near, robot(0.5, 0.5), 0.0) if a.kind == FISH)
+
+    after = fuser.step(near, robot(0.54, 0.5), 0.05)
+
+    assert {(a.agent, a.x_m) for a in after if a.kind == FISH} == {(fish, 0.50)}
+
+
+def test_a_name_that_goes_over_to_another_place_is_not_told_for_a_fifth_of_a_second():
+    """So no fish jumps across the tank from one step of the model to the next."""
+    fuser = Fuser(keeps=True)
+    two = FOUR[:2]
+    fuser.step(two, robot(0.1, 0.1), 0.0)
+
+    told = [fuser.step(two, robot(0.5, 0.5, time_s=k / 15), k / 15) for k in range(1, 5)]
+
+    assert [sum(a.kind == FISH for a in agents) for agents in told] == [0, 0, 1, 1]
+    assert [a.x_m for a in told[-1] if a.kind == FISH] == [0.1]
+
+
+def test_a_fish_s_name_is_free_where_the_robot_is_seen_late():
+    """Three were told as fish before the LEDs shone: two stay, and the third name is not lost."""
+    fuser = Fuser(keeps=True)
+    fuser.step(FOUR, robot(), 0.0)
+
+    after = kinds(fuser.step(FOUR, robot(0.5, 0.5), 0.05))
+    later = kinds(fuser.step([*FOUR, Blob(10, 0.3, 0.9)], robot(0.5, 0.5, time_s=1.0), 1.0))
+
+    assert after == {0: FISH, 2: FISH, 3: ROBOT}
+    assert later == {0: FISH, 1: FISH, 2: FISH, 3: ROBOT}

@@ -71,7 +71,9 @@ class Following:
         self._resumed = resumed or Resumed()
         self._fps = plan.opened.trial.fps
         self._numbers = FrameClock(self._fps, after=self._resumed.last)
-        self._fuser = Fuser(self._resumed.next_agent)
+        self._fuser = Fuser(
+            self._resumed.next_agent, keeps=plan.options.tracker.n_agents is not None
+        )
         self._outcome = Outcome(plan, self._numbers.tally, tell)
         if origins.is_live:
             origins = dataclasses.replace(origins, clock=self._said_clock)

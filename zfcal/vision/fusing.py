@@ -13,7 +13,7 @@ from typing import Protocol, final
 import numpy as np
 
 from zfcal.tracks import FISH, ROBOT, AgentPose
-from zfcal.vision.robot import RobotSeen, nearest_blob
+from zfcal.vision.robot import NEAR_M, RobotSeen, nearest_blob
 
 ALONE = 0.6
 """Confidence of a robot that the camera below alone sees."""
@@ -23,6 +23,9 @@ GUESSED = 0.4
 
 _STAYS_M = 0.01
 """How much nearer to the LEDs than the robot's track another must be, to be the robot."""
+
+_BREAK_S = 0.2
+"""For so long a fish whose name goes over to a track elsewhere is not told: a step of the model."""
 
 _FORGET_S = 60.0
 """Far longer than any tracker keeps the id of an animal that it does not see."""
@@ -65,6 +68,10 @@ class Fuser:
     ----------
     first_agent
         The first id that is free.
+    keeps
+        Whether the tracker's ids are those of animals, for good. Then names are kept as well: where
+        a track that was a fish's turns out to be the robot's, its name goes over to the one
+        that was taken for the robot.
 
     Attributes
     ----------
@@ -72,8 +79,11 @@ class Fuser:
         The next id that is free.
     """
 
-    def __init__(self, first_agent: int = 0) -> None:
+    def __init__(self, first_agent: int = 0, *, keeps: bool = False) -> None:
         self.next_agent = first_agent
+        self._keeps = keeps
+        self._free: list[int] = []
+        self._last: dict[int, tuple[int, float, float, float]] = {}
         self._fish: dict[int, tuple[int, float]] = {}
         self._tidied_s = 0.0
         self._robot: int | None = None
@@ -94,15 +104,28 @@ class Fuser:
             Of the overhead image.
         """
         which = None if robot is None else self._which(blobs, robot, time_s)
-        self._robot_blob = None if which is None else blobs[which].agent
-        if self._robot_blob is not None:
-            # Should the track be told to be a fish again, nobody is sure that it is the same one.
-            self._fish.pop(self._robot_blob, None)
+        self._take_robot(None if which is None else blobs[which].agent)
         self._forget(time_s)
-        agents = [self._fish_pose(blob, time_s) for k, blob in enumerate(blobs) if k != which]
+        agents = [
+            pose
+            for k, blob in enumerate(blobs)
+            if k != which and (pose := self._fish_pose(blob, time_s)) is not None
+        ]
         if robot is not None:
             agents += self._robot_pose(None if which is None else blobs[which], robot)
         return tuple(sorted(agents, key=lambda agent: agent.agent))
+
+    def _take_robot(self, blob: int | None) -> None:
+        """Take a track for the robot's; the fish that it was taken for is another one."""
+        before, self._robot_blob = self._robot_blob, blob
+        if blob is None or blob not in self._fish:
+            return
+        # Should the track be told to be a fish again, nobody is sure that it is the same one.
+        name = self._fish.pop(blob)
+        if self._keeps and before is not None and before not in self._fish:
+            self._fish[before] = name
+        elif self._keeps:
+            self._free.append(name[0])
 
     def _which(self, blobs: Sequence[Blob], robot: RobotSeen, time_s: float) -> int | None:
         xy_m = np.array([(blob.x_m, blob.y_m) for blob in blobs], np.float64).reshape(-1, 2)
@@ -123,7 +146,7 @@ class Fuser:
 
     def _forget(self, time_s: float) -> None:
         """Drop the names of tracks that the tracker has dropped long ago."""
-        if time_s >= self._tidied_s + _FORGET_S:
+        if not self._keeps and time_s >= self._tidied_s + _FORGET_S:
             self._fish = {
                 old: (new, last_s)
                 for old, (new, last_s) in self._fish.items()
@@ -131,10 +154,15 @@ class Fuser:
             }
             self._tidied_s = time_s
 
-    def _fish_pose(self, blob: Blob, time_s: float) -> AgentPose:
+    def _fish_pose(self, blob: Blob, time_s: float) -> AgentPose | None:
+        """Return a fish; None while its name has just come from elsewhere."""
         known = self._fish.get(blob.agent)
-        agent = self._new() if known is None else known[0]
+        agent = self._name() if known is None else known[0]
         self._fish[blob.agent] = (agent, time_s)
+        if self._keeps and self._is_jump(agent, blob, time_s):
+            return None
+        if self._keeps:
+            self._last[agent] = (blob.agent, time_s, blob.x_m, blob.y_m)
         return AgentPose(
             agent=agent,
             kind=FISH,
@@ -143,6 +171,17 @@ class Fuser:
             heading_rad=blob.heading_rad,
             confidence=blob.confidence,
         )
+
+    def _name(self) -> int:
+        return self._free.pop(0) if self._free else self._new()
+
+    def _is_jump(self, agent: int, blob: Blob, time_s: float) -> bool:
+        """Tell whether a name was a moment ago that of another track, elsewhere."""
+        if agent not in self._last:
+            return False
+        before, last_s, x_m, y_m = self._last[agent]
+        moved_m = math.hypot(blob.x_m - x_m, blob.y_m - y_m)
+        return before != blob.agent and time_s - last_s < _BREAK_S and moved_m > NEAR_M
 
     def _robot_pose(self, blob: Blob | None, robot: RobotSeen) -> list[AgentPose]:
         """Return the robot where it was seen: above if it can be, in the fish's own measure."""
