@@ -21,6 +21,9 @@ def measures(
 ) -> dict[str, Any]:
     """Return how tracks compare with the truth.
 
+    Where the truth lacks an animal, who is told there counts as nobody: ``precision_of_whole`` is
+    that of the frames in which the truth knows everybody.
+
     Parameters
     ----------
     truth : ndarray, shape (frame, agent, 2)
@@ -35,13 +38,17 @@ def measures(
     found = motmetrics.MOTAccumulator(auto_id=True)
     errors: list[float] = []
     exact = 0
+    hits, rows_of_whole = 0, 0
     for places, rows in zip(truth, told, strict=True):
         known = np.flatnonzero(np.isfinite(places).all(axis=1))
         at = np.array([row[1:] for row in rows], float).reshape(-1, 2)
         away = np.hypot(*np.moveaxis(places[known, None] - at[None], -1, 0))
         found.update(list(known), [row[0] for row in rows], np.where(away < gate, away, np.nan))
         pairs = linear_sum_assignment(np.minimum(away, 10 * gate))
-        errors += [float(e) for e in away[pairs] if e < gate]
+        near = [float(e) for e in away[pairs] if e < gate]
+        errors += near
+        if len(known) == len(places):
+            hits, rows_of_whole = hits + len(near), rows_of_whole + len(rows)
         exact += len(rows) == truth.shape[1]
     names = ["mota", "idf1", "precision", "recall", "num_switches", "num_misses"]
     host = motmetrics.metrics.create()
@@ -51,6 +58,7 @@ def measures(
         "mota": float(told_of["mota"]),
         "idf1": float(told_of["idf1"]),
         "precision": float(told_of["precision"]),
+        "precision_of_whole": hits / rows_of_whole if rows_of_whole else float("nan"),
         "recall": float(told_of["recall"]),
         "switches_per_fish_minute": float(told_of["num_switches"]) / minutes,
         "missed": float(told_of["num_misses"]),

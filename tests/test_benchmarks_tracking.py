@@ -198,6 +198,19 @@ def test_who_is_missed_and_who_is_nobody_are_counted(measures):
     assert found["exact"] == 0
 
 
+def test_whom_the_truth_does_not_know_is_nobody_but_not_where_it_is_whole(measures):
+    """Two animals, one of them not known in half of the frames, and both told in all."""
+    xy_mm = np.array([[(0.0, 0.0), (100.0, 0.0)]] * 10)
+    told = told_of(xy_mm)
+    xy_mm[5:, 1] = np.nan
+
+    found = measures(xy_mm, told)
+
+    assert found["precision"] == 0.75
+    assert found["precision_of_whole"] == 1.0
+    assert found["recall"] == 1.0
+
+
 def test_a_film_goes_to_its_end_and_back(script):
     """Without showing its last image, or its first, twice in a row."""
     live = script("bench_tracking_live")
