@@ -97,9 +97,13 @@ def markdown(found: dict[str, Any]) -> str:
         )
     ]
     head = ("latency", "median (ms)", "95 % (ms)", "largest (ms)")
-    missed = f"Steps missed: {found['latency']['steps_missed']}."
+    missed = (
+        f"Steps missed: {found['latency']['steps_missed']}, those included that came too late for "
+        f"any command; ticks left out: {found['latency']['ticks_skipped']}, which count as late as "
+        "the one after them. A pose that waited behind another one counts from its own time."
+    )
     text = textwrap.fill(" ".join(said.split()), 120)
-    return f"# The driver\n\n{text}\n\n{table(head, rows)}\n{missed}\n"
+    return f"# The driver\n\n{text}\n\n{table(head, rows)}\n{textwrap.fill(missed, 120)}\n"
 
 
 def ratios(found: dict[str, Any]) -> dict[str, Ratio]:

@@ -97,6 +97,12 @@ def recording():
 
 
 @pytest.fixture(scope="session")
+def forking():
+    """Return the module whose `Forks` runs commands that a test kills at work."""
+    return _module("forks")
+
+
+@pytest.fixture(scope="session")
 def streaming():
     """Return the module whose `Camera` serves images over HTTP in real time."""
     return _module("streaming")

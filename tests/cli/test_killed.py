@@ -1,14 +1,9 @@
 """kill -9 at random instants: what is run again ends in the bytes of an undisturbed run."""
 
-import contextlib
-import json
-import os
+import math
 import shutil
-import signal
-import subprocess
-import sys
-import time
 
+import cv2
 import numpy as np
 import pytest
 
@@ -19,6 +14,11 @@ CALIBRATE = ("calibrate", "trial", "--generations", "6", "--population", "12", "
 CALIBRATE += ("--no-seed-likelihood",)
 IMPORT = ("import", "tracks.csv", "trial", "--format", "csv")
 ANALYSE = ("analyse", "trial")
+TRACK = ("track", "trial", "--overhead", "day3.avi")
+TRACK += ("--corners", "-0.5,199.5 199.5,199.5 199.5,-0.5 -0.5,-0.5")
+
+BESIDE = ("init", "trial", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5", "--seed", "1")
+FILMED = ("init", "trial", "--side-m", "0.4", "--fish", "3", "--fps", "5")
 
 
 def contents(root):
@@ -30,79 +30,70 @@ def contents(root):
     }
 
 
-class Forks:
-    """Runs commands in forks of a process that has loaded what they need."""
-
-    def __init__(self, script):
-        self._process = subprocess.Popen(
-            [sys.executable, str(script)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def run(self, folder, words, *, kill_after_s=None):
-        """Run a command; with a time, kill it then. Return whether it had ended by itself."""
-        print(
-            json.dumps({"words": words, "cwd": str(folder)}), file=self._process.stdin, flush=True
-        )
-        process = json.loads(self._process.stdout.readline())["process"]
-        if kill_after_s is not None:
-            time.sleep(kill_after_s)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
-        code = json.loads(self._process.stdout.readline())["code"]
-        assert code in {0, -signal.SIGKILL}
-        return code == 0
-
-    def close(self):
-        """End the process."""
-        self._process.stdin.close()
-        assert self._process.wait(60) == 0
-        self._process.stdout.close()
+@pytest.fixture(scope="module")
+def forks(forking):
+    """Return what runs commands and kills them."""
+    with forking.Forks() as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
-def forks(repository):
-    """Return what runs commands and kills them."""
-    made = Forks(repository / "tests" / "forks.py")
-    yield made
-    made.close()
+def film(tmp_path_factory, drawn_tank):
+    """Return a video of 70 s at 5 Hz: three bodies on a circle, 24 s a round."""
+    path = tmp_path_factory.mktemp("film") / "day3.avi"
+    paths = drawn_tank.circling(120, turn=2 * np.pi / 120)
+    images = [frame.image for frame in drawn_tank.frames(paths)]
+    code = cv2.VideoWriter.fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), code, 5.0, (200, 200), isColor=False)
+    for k in range(350):
+        writer.write(images[k % 120])
+    writer.release()
+    return path
+
+
+@pytest.fixture
+def sources(tracks_csv, film, tmp_path):
+    """Put tracks of 250 s, and the video, into the folder of the test."""
+    tracks_csv(seconds=250)
+    (tmp_path / film.name).symlink_to(film)
 
 
 @pytest.mark.parametrize(
     ("before", "words", "seed"),
-    [((), IMPORT, 1), ((IMPORT,), ANALYSE, 2), ((IMPORT, ANALYSE), CALIBRATE, 3)],
-    ids=["import", "analyse", "calibrate"],
+    [
+        ((BESIDE,), IMPORT, 1),
+        ((BESIDE, IMPORT), ANALYSE, 2),
+        ((BESIDE, IMPORT, ANALYSE), CALIBRATE, 3),
+        ((FILMED,), TRACK, 4),
+    ],
+    ids=["import", "analyse", "calibrate", "track"],
 )
-def test_a_command_killed_twenty_times_ends_in_the_same_bytes(
-    forks, tracks_csv, tmp_path, before, words, seed
-):
+@pytest.mark.usefixtures("sources")
+def test_a_command_killed_twenty_times_ends_in_the_same_bytes(forks, tmp_path, before, words, seed):
     """At random instants of its work, from its first read to its last write.
 
-    Whatever stands there in between is whole: a half-written file would be read by the next
-    run, or differ in the end. A run that comes to its end begins anew.
+    Whatever stands there in between is whole, but for poses, which grow in place: a half-written
+    file would be read by the next run, or differ in the end. A run that comes to its end begins
+    anew.
     """
-    tracks_csv(seconds=250)
-    tank = ("--side-m", "1", "--fish", "3", "--robot", "--fps", "5", "--seed", "1")
-    for earlier in (("init", "trial", *tank), *before):
+    for earlier in before:
         assert forks.run(tmp_path, earlier)
     root, start = tmp_path / "trial", tmp_path / "start"
     shutil.copytree(root, start)
-    began_s = time.monotonic()
     assert forks.run(tmp_path, words)
-    takes_s = time.monotonic() - began_s
     undisturbed = contents(root)
 
     rng = np.random.default_rng(seed)
-    n_killed, n_ended = 0, 1
+    n_killed, has_ended, takes_s = 0, True, math.inf
     while n_killed < KILLS:
-        if n_ended:
+        if has_ended:
+            # The first run may have compiled something.
+            takes_s = min(takes_s, forks.took_s)
             shutil.rmtree(root)
             shutil.copytree(start, root)
-        n_ended = forks.run(tmp_path, words, kill_after_s=rng.uniform(0.0, 0.9) * takes_s)
-        n_killed += not n_ended
-        found = contents(root)
+        has_ended = forks.run(tmp_path, words, kill_after_s=rng.uniform(0.0, 0.9) * takes_s)
+        n_killed += not has_ended
+        found = {k: v for k, v in contents(root).items() if has_ended or not k.startswith("poses")}
         assert all(undisturbed[name] == found[name] for name in found)
     assert forks.run(tmp_path, words)
     assert contents(root) == undisturbed

@@ -31,6 +31,7 @@ driven = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(driven)
 
 STOP = "000000000100"
+KILLS = 20
 SECONDS = 40
 
 
@@ -115,6 +116,13 @@ class Rig:
         self.robot.close()
 
 
+@pytest.fixture(scope="module")
+def forks(forking):
+    """Return what runs drivers that are killed at work."""
+    with forking.Forks() as made:
+        yield made
+
+
 @pytest.fixture
 def rig(template, tmp_path):
     """Return a rig whose poses have begun."""
@@ -164,26 +172,31 @@ def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     assert rig.told("ended")[0]["because"] == {143: "SIGTERM", 130: "Ctrl-C"}[code]
 
 
-def test_a_driver_that_is_killed_has_its_last_word_and_goes_on(rig):
-    """By SIGKILL at random instants, from its start on: the robot stops each time.
+def test_a_driver_that_is_killed_has_its_last_word_and_goes_on(rig, forks):
+    """By SIGKILL, twenty times at random instants, from its start on: the robot stops each time.
 
     A new driver adds to the same log, which loses nothing but what passed meanwhile.
     """
     rng = np.random.default_rng(7)
     kept = []
-    for number in range(5):
-        driver, moves = rig.start(), rig.moves()
+    for number in range(KILLS):
+        moves = rig.moves()
+        forks.start(rig.root.parent, "drive", rig.root, "--port", rig.robot.port)
         if number % 2 == 0:
-            rig.until(lambda moves=moves: rig.moves() > moves + 5)
-        time.sleep(rng.uniform(0.0, 0.8))
-        driver.kill()
-        driver.wait()
+            rig.until(lambda moves=moves: rig.moves() > moves + 3)
+        time.sleep(rng.uniform(0.0, 0.6))
+        assert not forks.kill()
         rig.until(lambda: rig.wheels() == 0.0, 5.0)
-        assert not rig.moves() or rig.heard()[-1][1] == STOP
+        # One that was killed before it moved anything has nothing to stop.
+        rig.until(
+            lambda moves=moves: (
+                rig.heard()[-1:] == [] or rig.heard()[-1][1] == STOP or rig.moves() == moves
+            )
+        )
         found = rig.items("command")
         assert found[: len(kept)] == kept
         kept = found
-    assert len(kept) >= 15
+    assert len(kept) >= 50
     rig.start()
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 10)
@@ -333,22 +346,40 @@ def test_what_the_robot_complains_of_is_heard(rig):
     assert replay(rig.root, say_nothing).is_same
 
 
-def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
-    """Its main thread waits for a disk for 1.5 s: STOP comes in time, from the other thread."""
+def start_hanging(rig, method):
+    """Start a driver of which one method takes 1.5 s, once it has driven for a while."""
+    module, owner, name = method.rsplit(".", 2)
     program = (
         "import sys, time\n"
-        "from zfcal.online import drive_log\n"
+        f"from {module} import {owner}\n"
         "from zfcal_cli.main import run\n"
-        "flush, calls = drive_log.DriveLog.flush, []\n"
+        f"was, calls = {owner}.{name}, []\n"
         "def hang(self):\n"
-        "    calls.append(flush(self))\n"
+        "    calls.append(was(self))\n"
         "    if len(calls) == 150:\n"
         "        time.sleep(1.5)\n"
-        "drive_log.DriveLog.flush = hang\n"
+        f"{owner}.{name} = hang\n"
         "sys.exit(run(['drive', *sys.argv[1:]]))\n"
     )
     command = [sys.executable, "-c", program, str(rig.root), "--port", str(rig.robot.port)]
     rig.drivers.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+
+
+def test_a_disk_that_is_slow_holds_up_the_log_alone(rig):
+    """A write takes 1.5 s: not a tick is left out meanwhile, and all of it is written then."""
+    start_hanging(rig, "zfcal.online.drive_log.DriveLog._write")
+    rig.until(lambda: rig.moves() > 100, 60.0)
+    rig.end()
+    times = [c["time_s"] for c in rig.items("command")]
+    assert np.diff(times).max() < 0.35
+    assert rig.items("fault") == []
+    assert "held up" not in rig.drivers[-1].stderr.read()
+    assert replay(rig.root, say_nothing).is_same
+
+
+def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
+    """Its main thread waits for something for 1.5 s: STOP comes in time, from the other thread."""
+    start_hanging(rig, "zfcal.online.driving.Driver.tick")
     rig.until(lambda: any(f["fault"] == "watchdog" for f in rig.items("fault")))
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 5)

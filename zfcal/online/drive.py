@@ -7,6 +7,7 @@ import dataclasses
 import gc
 import json
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -41,6 +42,7 @@ _FOLDER_S = 0.02
 """How often the folder is searched for the next minute; a file that grows is seen at once."""
 
 _STATUS_S = 0.5
+_SWITCH_S = 0.0005
 _OPENING_S = 3.0
 _ANSWER_S = 2.0
 _END_S = 2.0
@@ -161,6 +163,8 @@ def _drive(
     driver = Driver(opened, options.manner, crew)
     driver.warm_up()
     _hurry(options, tell, stack)
+    if is_live:
+        log.write_behind()
     follower = PoseFollower(opened.trial.root, newest=is_live)
     # The robot's own end comes first on the way out: whatever fails later, it stands.
     stack.callback(lambda: _conclude(driver, log, tell))
@@ -216,6 +220,9 @@ def _hurry(options: DriveOptions, tell: Tell, stack: contextlib.ExitStack) -> No
     gc.collect()
     gc.freeze()
     stack.callback(gc.unfreeze)
+    # Other threads write and talk: when a tick is due they let go of the interpreter soon.
+    stack.callback(sys.setswitchinterval, sys.getswitchinterval())
+    sys.setswitchinterval(_SWITCH_S)
     try:
         before = os.getpriority(os.PRIO_PROCESS, 0)
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)

@@ -24,9 +24,12 @@ class DriveClock(Protocol):
     is_live
         Whether time passes by itself. If not, silence means nothing, and it lasts as long
         as it lasts.
+    n_skipped
+        Ticks that fell out because the one before took too long.
     """
 
     is_live: bool
+    n_skipped: int
 
     def take_frame(self, time_s: float) -> None:
         """Hear that a frame of poses has come that is of this second of the trial."""
@@ -43,13 +46,7 @@ class DriveClock(Protocol):
 
 @final
 class WallClock:
-    """The computer's clock, from the first frame on; it is never set back.
-
-    Attributes
-    ----------
-    n_skipped
-        Ticks that fell out because the one before took too long.
-    """
+    """The computer's clock, from the first frame on; it is never set back."""
 
     is_live = True
 
@@ -97,6 +94,7 @@ class PoseClock:
     is_live = False
 
     def __init__(self, fps: float) -> None:
+        self.n_skipped = 0
         self._frame_s = 1.0 / fps
         self._time_s = 0.0
         self._next: int | None = None

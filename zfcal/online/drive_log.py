@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from itertools import takewhile
+from queue import SimpleQueue
 from typing import Any, final
 
 import numpy as np
@@ -49,7 +51,12 @@ class DriveLog:
         self._lineage = lineage
         self._tell = tell
         self._is_patient = is_patient
+        self._added: SimpleQueue[dict[str, Any]] = SimpleQueue()
         self._kept: list[dict[str, Any]] = []
+        self._scribe: threading.Thread | None = None
+        self._wanted = threading.Event()
+        self._ends = False
+        self._problem: StorageError | None = None
         self._failed = False
         self._retry_s = 0.0
         self._writer: DriveWriter | None = None
@@ -61,16 +68,42 @@ class DriveLog:
 
     def add(self, item: dict[str, Any]) -> None:
         """Take a message, for the file of its minute; the next `flush` writes it."""
-        self._kept.append(item)
+        self._added.put(item)
+
+    def write_behind(self) -> None:
+        """Write from a thread of its own from now on: nobody waits for a disk that is busy."""
+        self._scribe = threading.Thread(target=self._write_on, daemon=True)
+        self._scribe.start()
 
     def flush(self) -> None:
-        """Hand over what was added.
+        """Write what was added, or have it written.
 
         Raises
         ------
         StorageError
             The place cannot be written, and it is not waited for, or not any longer.
         """
+        if self._scribe is None:
+            self._flush()
+            return
+        if self._problem is not None:
+            raise self._problem
+        if self._failed or not self._added.empty():
+            self._wanted.set()
+
+    def _write_on(self) -> None:
+        while not self._ends:
+            self._wanted.wait()
+            self._wanted.clear()
+            try:
+                self._flush()
+            except StorageError as error:
+                self._problem = error
+                return
+
+    def _flush(self) -> None:
+        while not self._added.empty():
+            self._kept.append(self._added.get())
         if self._failed and time.monotonic() < self._retry_s:
             return
         try:
@@ -158,8 +191,13 @@ class DriveLog:
         StorageError
             The place cannot be written; there is nothing more to wait for.
         """
+        if self._scribe is not None:
+            self._ends = True
+            self._wanted.set()
+            self._scribe.join()
+            self._scribe = None
         self._is_patient, self._retry_s = False, 0.0
-        self.flush()
+        self._flush()
         self._close_file()
 
     def _close_file(self) -> None:

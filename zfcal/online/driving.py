@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import Any, final
 
-from zfcal.online.drive_clock import DriveClock, WallClock
+from zfcal.online.drive_clock import DriveClock
 from zfcal.online.drive_events import DriveStatus
 from zfcal.online.drive_log import POSE_TO_STATE, TICK_TO_BYTE, DriveLog
 from zfcal.online.drive_models import DriveModels
@@ -16,6 +16,7 @@ from zfcal.online.opening import OpenTrial
 from zfcal.online.pilot import InForce, Manner, Pilot, Target, command_item, target_item
 from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import PATIENCE_S, FishBot, Watchdog
+from zfcal.robot.motion import TICK_S
 from zfcal.tracks import FramePoses
 
 _SAYS = {
@@ -111,8 +112,11 @@ class Driver:
         for poses in frames:
             self._crew.clock.take_frame(poses.time_s)
             self._take(poses, fresh=fresh)
-        if frames and age_s is not None:
-            self._crew.log.measure(POSE_TO_STATE, age_s)
+        if age_s is not None:
+            # The first ones of several have waited for longer.
+            for poses in frames:
+                waited_s = frames[-1].time_s - poses.time_s
+                self._crew.log.measure(POSE_TO_STATE, age_s + waited_s)
 
     def tick(self) -> None:
         """Do the ticks that are due."""
@@ -121,8 +125,7 @@ class Driver:
             late_s = max(0.0, self._crew.clock.now_s() - time_s) if self._crew.clock.is_live else 0
             self._tick(time_s, began_s - late_s)
             began_s = time.perf_counter()
-        if isinstance(self._crew.clock, WallClock):
-            self._crew.log.n_ticks_skipped = self._crew.clock.n_skipped
+        self._crew.log.n_ticks_skipped = self._crew.clock.n_skipped
         self._crew.log.n_steps_missed = self.n_missed
 
     def listen(self) -> None:
@@ -216,11 +219,17 @@ class Driver:
         command = self.pilot.tick(time_s, held)
         sent = self._crew.robot.send(command.message)
         if sent and self._crew.clock.is_live:
-            self._crew.log.measure(TICK_TO_BYTE, time.perf_counter() - due_s)
+            self._measure(time.perf_counter() - due_s)
         self.n_commands += 1
         self._tell_changes(time_s, held)
         told = {"sent": sent, "n_sent": self._crew.robot.n_sent}
         self._crew.log.add(command_item(command, self._letter) | told)
+
+    def _measure(self, late_s: float) -> None:
+        """Note how late a tick was, and those that fell out before it."""
+        skipped = self._crew.clock.n_skipped - self._crew.log.n_ticks_skipped
+        for before in range(skipped + 1):
+            self._crew.log.measure(TICK_TO_BYTE, late_s + before * TICK_S)
 
     def _reason(self) -> str:
         """Return why the robot may not be driven on; empty if it may."""
