@@ -65,6 +65,13 @@ def scene(walk, two_rooms):
     return make_scene(walk, two_rooms)
 
 
+@pytest.fixture(scope="module")
+def short_scene(two_rooms, model):
+    """Return the first 200 s of them, for what is asked of each step."""
+    xy_m, _ = simulate_tracks(model, two_rooms, n_agents=5, n_steps=1000, seed=7)
+    return make_scene(samples_of(xy_m), two_rooms)
+
+
 def having(model, effects):
     """Return a model with effects."""
     return dataclasses.replace(model, effects=effects)
@@ -106,18 +113,19 @@ def test_the_maximum_does_not_depend_on_the_start(scene, model):
 
 
 @pytest.mark.parametrize("effects", HOOKS.values(), ids=HOOKS.keys())
-def test_scores_are_the_derivatives_of_the_log_density(scene, model, effects):
+def test_scores_are_the_derivatives_of_the_log_density(short_scene, model, effects):
     """By central differences, step by step, for each parameter of each zone."""
     changed = having(model, effects)
-    view = view_of(scene, changed)
-    for x, turns in zip(start_of(changed), zone_turns(scene), strict=True):
+    view = view_of(short_scene, changed)
+    for x, turns in zip(start_of(changed), zone_turns(short_scene), strict=True):
+        assert len(turns.rows) > 20
         x[-1] = 0.02
         _, scores, _ = zone_scores(x, turns, view)
         for p in range(x.size):
             up, down = x.copy(), x.copy()
             up[p], down[p] = x[p] + 1e-5, x[p] - 1e-5
             slope = (nats_of(up, turns, view) - nats_of(down, turns, view)) / 2e-5
-            assert scores[:, p] == pytest.approx(slope, rel=1e-4, abs=1e-4)
+            np.testing.assert_allclose(scores[:, p], slope, rtol=1e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize("effects", HOOKS.values(), ids=HOOKS.keys())
