@@ -1,5 +1,6 @@
 """What a tracker did to positions, found from the positions alone."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -162,3 +163,36 @@ def test_a_tracker_starts_without_the_statistics_of_scipy():
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
 
     assert done.stdout.strip() == "False"
+
+
+def filmed_with(worlds, walk, errors_of):
+    """Return tracks of a film of the walk, with errors of position."""
+    tracks = worlds.filmed(walk, fps=FPS, noise_m=0.0, rng=None)
+    off = errors_of(tracks)
+    return dataclasses.replace(tracks, x_m=tracks.x_m + off[:, 0], y_m=tracks.y_m + off[:, 1])
+
+
+def test_noise_that_differs_from_time_to_time_counts_in_the_mean_square(worlds, walk):
+    """Half of the time 0.5 mm, half 1.5 mm: the mean square is that of 1.118 mm, to a twentieth."""
+
+    def errors(tracks):
+        sd_m = np.where(tracks.frame // 60 % 2 == 0, 0.5e-3, 1.5e-3)
+        return np.random.default_rng(4).normal(0, 1, (len(tracks), 2)) * sd_m[:, None]
+
+    sd, how = from_frames(filmed_with(worlds, walk, errors), fps=FPS, per_step=3)
+
+    assert how == "straight steps"
+    assert sd == pytest.approx(np.sqrt((0.5e-3**2 + 1.5e-3**2) / 2), rel=0.05)
+
+
+def test_a_jump_now_and_then_is_no_noise(worlds, walk):
+    """One fish is taken for another, 5 cm off, from six times on: 3 % more at most."""
+
+    def errors(tracks):
+        at = np.searchsorted(np.linspace(100, 4000, 6), tracks.frame)
+        noise = np.random.default_rng(4).normal(0, 1e-3, (len(tracks), 2))
+        return noise + 0.05 * ((at % 2 == 1) & (tracks.agent == tracks.agent[0]))[:, None]
+
+    sd, _ = from_frames(filmed_with(worlds, walk, errors), fps=FPS, per_step=3)
+
+    assert sd == pytest.approx(1e-3, rel=0.03)

@@ -41,6 +41,9 @@ _QUIET = 0.1
 """Quantile of stretches that counts as quiet."""
 
 _LEAST_STRETCHES = 20
+_JUMP = 12.0
+"""Times the usual mean square beyond which a stretch holds a change of id, which is no noise."""
+
 _LEAST_BEYOND = 50
 _LARGEST_M = 0.02
 """Farther beyond the wall than that is no noise."""
@@ -152,7 +155,7 @@ def from_frames(tracks: Tracks, *, fps: float, per_step: int) -> tuple[float, st
     stretch = _stretches(frame, track, fps)
     if straight or not len(far):
         kept = ~corner
-        return _of_quiet(near[kept], stretch[kept], quiet=0.5), "straight steps"
+        return _of_straight(near[kept], stretch[kept]), "straight steps"
     both = _matched(frame, track, far_frame, far_track)
     return _of_smooth(near[both[0]], far[both[1]], stretch[both[0]]), "quiet stretches"
 
@@ -184,16 +187,13 @@ def _stretches(frame: Ints, track: NDArray[np.int32], fps: float) -> Ints:
                      return_inverse=True)[1].ravel()  # fmt: skip
 
 
-def _of_quiet(differences: Floats, stretch: Ints, *, quiet: float) -> float:
-    """Return the noise from the quiet stretches' mean squares, each a scaled chi-square."""
+def _of_straight(differences: Floats, stretch: Ints) -> float:
+    """Return the noise from the mean squares of stretches, all but those with a jump."""
     count, mean = _mean_squares((differences**2).sum(axis=1) / 2, stretch)
-    usual = np.median(count)
-    mean = mean[count >= usual]
+    mean = mean[count >= np.median(count)]
     if len(mean) < _LEAST_STRETCHES:
         return math.nan
-    # Neighbouring second differences share frames: their squares correlate by (4/6)^2, then 1/36.
-    df = 2 * usual / 1.94
-    return math.sqrt(float(np.quantile(mean, quiet)) / (6 * _chi2_quantile(quiet, df) / df))
+    return math.sqrt(float(mean[mean <= _JUMP * np.median(mean)].mean()) / 6)
 
 
 def _of_smooth(near: Floats, far: Floats, stretch: Ints) -> float:
