@@ -38,7 +38,7 @@ from zfcal.online.rounds import (
     read_control,
     read_previous,
     result_table,
-    score_table,
+    summary_of,
     write_round,
 )
 from zfcal.online.skipping import skipped_path, without_skipped
@@ -394,12 +394,3 @@ def baseline_scores(
             round_task, options.settings, genes=champion
         ).scores.S
     return {name: None if math.isnan(value) else value for name, value in scores.items()}
-
-
-def summary_of(result: RoundResult, baselines: dict[str, JSON]) -> dict[str, JSON]:
-    """Return the numbers of a round that people ask for first."""
-    return {
-        "generations": result.generations,
-        **score_table(result.scores, result.ceiling),
-        "baselines": baselines,
-    }

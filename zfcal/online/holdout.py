@@ -32,7 +32,6 @@ from zfcal.online.calibrate import (
     calibrate_options,
     make_group,
     run_search,
-    summary_of,
 )
 from zfcal.online.events import Made, Result, Tell
 from zfcal.online.likelihood import estimate
@@ -42,6 +41,7 @@ from zfcal.online.rounds import (
     checkpoint_key,
     result_table,
     score_table,
+    summary_of,
 )
 from zfcal.online.segments import STEP_S, Segments, segment_path, segment_starts
 from zfcal.parameters import Parameters, to_genes

@@ -226,6 +226,15 @@ def result_table(
     }  # fmt: skip
 
 
+def summary_of(result: RoundResult, baselines: dict[str, JSON]) -> dict[str, JSON]:
+    """Return the numbers of a round that people ask for first."""
+    return {
+        "generations": result.generations,
+        **score_table(result.scores, result.ceiling),
+        "baselines": baselines,
+    }
+
+
 def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
     """Return S, its features and its ceiling as the entries of a table."""
     mean, low, high = ceiling.of("S")
