@@ -105,16 +105,17 @@ class Driver:
         """
         # What was written before the driver came is history: it is seen, and not driven by.
         fresh = self._begun or not self._crew.clock.is_live or (age_s or 1.0) <= PATIENCE_S
-        if self._begun and self._crew.clock.is_live:
+        has_begun = self._begun
+        if has_begun and self._crew.clock.is_live:
             self._count_late(frames)
         if frames and not self._begun:
             self._begin(frames[0].time_s, now_s=frames[-1].time_s)
         for poses in frames:
             self._crew.clock.take_frame(poses.time_s)
             self._take(poses, fresh=fresh)
-        if age_s is not None:
-            # The first ones of several have waited for longer.
-            for poses in frames:
+        if age_s is not None and fresh:
+            # The first ones of several have waited for longer, but not those before the driver.
+            for poses in frames if has_begun else frames[-1:]:
                 waited_s = frames[-1].time_s - poses.time_s
                 self._crew.log.measure(POSE_TO_STATE, age_s + waited_s)
 
