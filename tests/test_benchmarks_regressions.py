@@ -8,7 +8,7 @@ import sys
 import pytest
 
 COMMITTED = ("calibration", "closed_loop", "cluster", "drive", "growth", "long", "main_job",
-             "optimisers", "roofline", "rounds", "tracking")  # fmt: skip
+             "optimisers", "roofline", "rounds", "tracking", "tracking_live")  # fmt: skip
 
 SCRIPTS = (*(f"bench_{name}" for name in COMMITTED), "growth_document", "measuring", "naive",
            "optimisers", "optimisers_document", "regressions", "rounds_document",
