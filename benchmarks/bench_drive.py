@@ -52,8 +52,8 @@ def measure(seconds: int, busy: int) -> dict[str, Any]:
             words += ["--duration", str(seconds)]
             driver = subprocess.Popen([*ZFCAL, *words], stdout=subprocess.PIPE, text=True)
             write_poses(root, driver)
-            told = [json.loads(line) for line in driver.communicate()[0].splitlines()]
-    found: dict[str, Any] = next(e["value"] for e in told if e["event"] == "result")["latency"]
+            document = json.loads(driver.communicate()[0])
+    found: dict[str, Any] = document["results"][0]["latency"]
     return found
 
 

@@ -11,7 +11,7 @@ from .options import PLACE, speaks
 from .output import Output
 
 _LETTERS = tuple("ABCDEFGHIJ")
-_DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "force"}
+_DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "events", "force"}
 
 
 @click.command("drive")
@@ -53,6 +53,9 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "f
     metavar="ZONE,...",
     help="For each zone of that rig one of the trial's.  [default: the trial's, in order]",
 )
+@click.option(
+    "--events", is_flag=True, help="Write a line of JSON for all that happens, in place of paths."
+)
 @click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
 @click.option("--force", is_flag=True, help="Remove what an earlier drive left.")
 @speaks
@@ -69,6 +72,7 @@ def command(
     duration_s: float | None,
     publish: str | None,
     publish_zones: str | None,
+    events: bool,
     replay: bool,
     force: bool,
 ) -> None:
@@ -82,7 +86,7 @@ def command(
     Example:
         zfcal drive trial --port /dev/rfcomm5
         zfcal drive trial --port virtual --pattern pid --duration 30min
-        zfcal drive trial --port virtual --json
+        zfcal drive trial --port virtual --events
         zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
     """
@@ -102,6 +106,10 @@ def command(
 
     if port is None:
         raise click.UsageError("Missing option '--port': a serial port, or virtual.")
+    if events and out.as_json:
+        raise click.UsageError(
+            "--events or --json: lines while it drives, or a document at the end."
+        )
     manner = Manner(
         pattern=pattern, free_running=free_running, letter=robot, radius_m=radius_mm / 1000
     )
@@ -110,7 +118,7 @@ def command(
     )
 
     def work() -> None:
-        with DriveVoice(out) as voice:
+        with DriveVoice(out, events=events) as voice:
             voice.because = drive(trial, options, voice.hear, task=Task(force=force))
 
     out.attempt(work)

@@ -1,4 +1,4 @@
-"""How `zfcal drive` speaks: as lines, as JSON lines, and on the status line."""
+"""How `zfcal drive` speaks: as lines, as lines of JSON, and on the status line."""
 
 from __future__ import annotations
 
@@ -35,6 +35,8 @@ class DriveVoice:
     ----------
     out
         The command's own voice.
+    events
+        Whether standard output gets a line of JSON for each event, in place of all else.
 
     Attributes
     ----------
@@ -42,9 +44,10 @@ class DriveVoice:
         Why the drive ended, once it has.
     """
 
-    def __init__(self, out: Output) -> None:
+    def __init__(self, out: Output, *, events: bool) -> None:
         self._out = out
-        out.in_lines = True
+        if events:
+            out.as_json = out.in_lines = True
         self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
         self._told: queue.SimpleQueue[tuple[float, Told] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._speak, daemon=True)
@@ -99,7 +102,7 @@ class DriveVoice:
             self._line.show(describe_drive(told))
             return
         self._line.clear()
-        if self._out.as_json and (line := line_of(told, at_s)):
+        if self._out.in_lines and (line := line_of(told, at_s)):
             click.echo(json.dumps(line, ensure_ascii=False))
             sys.stdout.flush()
         self._out.tell(told)

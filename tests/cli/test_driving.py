@@ -55,9 +55,10 @@ def test_what_happens_is_a_line_of_the_schema():
     assert line_of(Progress(stage="replay", done=1, total=2), 0.0) is None
 
 
-def voice(*, as_json=True):
-    """Return a voice that writes lines, and no document at the end."""
-    return DriveVoice(Output("drive", as_json=as_json, verbose=0, quiet=False))
+def voice(*, events=True):
+    """Return a voice that writes lines of events, or paths."""
+    out = Output("drive", as_json=False, verbose=0, quiet=False)
+    return DriveVoice(out, events=events)
 
 
 def lines_of(capsys):
@@ -86,9 +87,9 @@ def test_an_end_by_a_signal_is_named(capsys, error, because):
     assert lines_of(capsys)[0]["because"] == because
 
 
-def test_without_json_talk_goes_to_standard_error_and_paths_to_the_other(capsys):
+def test_without_events_talk_goes_to_standard_error_and_paths_to_the_other(capsys):
     """As every command does it."""
-    with voice(as_json=False) as speaks:
+    with voice(events=False) as speaks:
         speaks.hear(FAULT)
         speaks.hear(Made(path=Path("trial/drive/000000.mcap"), reason="driven"))
         speaks.because = "the poses have ended"
@@ -131,3 +132,13 @@ def test_a_reader_that_has_gone_ends_the_drive(monkeypatch):
     with pytest.raises(BrokenPipeError):
         drive()
     assert len(told) < 100
+
+
+@pytest.mark.parametrize("other", ["--json", "--replay", "--publish=cats2://rig"])
+def test_events_are_for_driving_alone(zfcal, other):
+    """Where they cannot be told, or a document is asked for, that is said."""
+    outcome = zfcal(
+        "drive", "trial", "--events", other, *(["--port", "virtual"] if other == "--json" else [])
+    )
+    assert outcome.code == 2
+    assert "--events" in outcome.err

@@ -59,7 +59,7 @@ class Rig:
     def start(self, *words):
         """Start a driver as a process."""
         command = [sys.executable, "-m", "zfcal_cli.main", "drive", str(self.root)]
-        command += ["--port", str(self.robot.port), "--json", *words]
+        command += ["--port", str(self.robot.port), "--events", *words]
         with self._lines.open("a") as lines:
             driver = subprocess.Popen(command, stdout=lines, stderr=subprocess.PIPE, text=True)
         self.drivers.append(driver)
@@ -413,7 +413,7 @@ def test_a_second_driver_is_refused_and_a_port_that_is_not_there(rig, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_a_drive_is_told_as_lines_of_json(rig):
+def test_events_are_told_as_lines_of_json(rig):
     """From its beginning to its end: by whom and by what it drives, how quick it was."""
     driver = rig.start("--duration", "2s", "--pattern", "pid", "-q")
     assert driver.wait(30) == 0
@@ -429,3 +429,17 @@ def test_a_drive_is_told_as_lines_of_json(rig):
     assert [Path(told["path"]).name for told in rig.told("made")] == ["000000.mcap"]
     assert driver.stderr.read() == ""
     assert Path(rig.told("made")[0]["path"]).exists()
+
+
+def test_the_end_is_told_as_json(rig):
+    """One document: what was made, how quick it was; the driver ends after --duration."""
+    words = [sys.executable, "-m", "zfcal_cli.main", "drive", str(rig.root), "--json", "-q"]
+    words += ["--port", str(rig.robot.port), "--duration", "2s", "--pattern", "pid"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    document = json.loads(done.stdout)
+    (result,) = document["results"]
+    assert result["commands"] >= 15
+    assert result["latency"]["tick_to_byte_s"]["n"] >= 15
+    assert result["latency"]["pose_to_state_s"]["n"] >= 20
+    assert [Path(a["path"]).name for a in document["artifacts"]] == ["000000.mcap"]
+    assert Path(document["artifacts"][0]["path"]).exists()
