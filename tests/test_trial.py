@@ -85,6 +85,15 @@ def test_a_step_with_four_digits_in_the_file_is_whole_enough():
     assert Trial(**GOOD | {"fps": 3.0, "dt_s": 0.3333}).dt_s == 0.3333
 
 
+@pytest.mark.parametrize(
+    ("fps", "dt_s", "longest_s"), [(15.0, 0.2, 4 / 15), (3.0, 1 / 3, 2 / 3), (25.0, 1.0, 26 / 25)]
+)
+def test_two_samples_may_lie_a_frame_more_than_a_step_apart(fps, dt_s, longest_s):
+    """Each is the frame nearest to its time, half a frame before or after."""
+    trial = Trial(**GOOD | {"fps": fps, "dt_s": dt_s})
+    assert trial.longest_step_s == pytest.approx(longest_s, rel=1e-12)
+
+
 @pytest.mark.parametrize("dt_s", [0.21, 0.01, 0.0, -0.2, math.nan, math.inf, 0.0667 / 2])
 def test_a_step_that_is_no_whole_number_of_frames_is_refused(dt_s):
     """3.15 frames, a fraction, none, backwards, unknown, for ever; the hint gives a frame."""

@@ -82,6 +82,11 @@ class Trial:
         """Fish and robots."""
         return self.n_fish + self.n_robots
 
+    @property
+    def longest_step_s(self) -> float:
+        """Two neighbouring samples lie less apart, in seconds: each is half a frame off at most."""
+        return self.dt_s + 1 / self.fps
+
     def path(self, folder: str, second: int, ending: str) -> Path:
         """Return the place of an artifact, such as ``tracks/000060.parquet``.
 

@@ -19,6 +19,12 @@ class Blob:
     y_m: float
     heading_rad: float = 0.5
     confidence: float = 0.9
+    followed: int | None = None
+
+    @property
+    def track(self):
+        """What was followed: as many tracks as ids, where nothing else is said."""
+        return self.agent if self.followed is None else self.followed
 
 
 def robot(x_m=math.nan, y_m=math.nan, heading_rad=1.0, *, time_s=0.0):
@@ -154,16 +160,65 @@ def test_the_fish_s_name_goes_over_to_the_track_that_was_the_robot_s():
     assert {(a.agent, a.x_m) for a in after if a.kind == FISH} == {(fish, 0.50)}
 
 
-def test_a_name_that_goes_over_to_another_place_is_not_told_for_a_fifth_of_a_second():
-    """So no fish jumps across the tank from one step of the model to the next."""
-    fuser = Fuser(keeps=True)
+STEP_S = 3 / 15 + 1 / 15
+
+
+def told_x_m(fuser, frames, *, first=0):
+    """Return where each fish is told in each frame, by id."""
+    told = [
+        fuser.step(blobs, robot(*at, time_s=k / 15) if at else None, k / 15)
+        for k, (blobs, at) in enumerate(frames, first)
+    ]
+    return [{a.agent: a.x_m for a in agents if a.kind == FISH} for agents in told]
+
+
+def test_a_name_that_goes_over_to_another_place_is_not_told_for_a_step_of_the_model():
+    """Not a single step, three frames long, has it on both places: no fish jumps across."""
     two = FOUR[:2]
-    fuser.step(two, robot(0.1, 0.1), 0.0)
+    told = told_x_m(
+        Fuser(keeps=True, break_s=STEP_S), [(two, (0.1, 0.1))] + 5 * [(two, (0.5, 0.5))]
+    )
+    assert told == [{0: 0.5}, {}, {}, {}, {0: 0.1}, {0: 0.1}]
 
-    told = [fuser.step(two, robot(0.5, 0.5, time_s=k / 15), k / 15) for k in range(1, 5)]
 
-    assert [sum(a.kind == FISH for a in agents) for agents in told] == [0, 0, 1, 1]
-    assert [a.x_m for a in told[-1] if a.kind == FISH] == [0.1]
+def test_ids_that_the_tracker_exchanges_late_do_not_jump():
+    """Two far apart whose looks tell late who is who: nobody is told for a step."""
+    before = [Blob(0, 0.1, 0.1, followed=5), Blob(1, 0.9, 0.9, followed=6)]
+    after = [Blob(0, 0.9, 0.9, followed=6), Blob(1, 0.1, 0.1, followed=5)]
+    told = told_x_m(Fuser(keeps=True, break_s=STEP_S), 2 * [(before, None)] + 5 * [(after, None)])
+    assert told == [*2 * [{0: 0.1, 1: 0.9}], {}, {}, {}, *2 * [{0: 0.9, 1: 0.1}]]
+
+
+def test_ids_exchanged_beside_each_other_are_told_at_once():
+    """A fish may have swum so far."""
+    before = [Blob(0, 0.50, 0.5, followed=5), Blob(1, 0.53, 0.5, followed=6)]
+    after = [Blob(0, 0.53, 0.5, followed=6), Blob(1, 0.50, 0.5, followed=5)]
+    told = told_x_m(Fuser(keeps=True, break_s=STEP_S), [(before, None), (after, None)])
+    assert told == [{0: 0.50, 1: 0.53}, {0: 0.53, 1: 0.50}]
+
+
+@pytest.mark.parametrize(("lost", "silent"), [(0, 3), (2, 1), (3, 0), (9, 0)])
+def test_a_lost_id_that_is_found_elsewhere_waits_for_a_step_since_it_was_told(lost, silent):
+    """The frames for which it was lost count."""
+    fuser = Fuser(keeps=True, break_s=STEP_S)
+    here, there = Blob(0, 0.1, 0.1, followed=5), Blob(0, 0.9, 0.9, followed=6)
+    frames = [([here], None), *lost * [([], None)], *4 * [([there], None)]]
+    told = told_x_m(fuser, frames)[1 + lost :]
+    assert told == silent * [{}] + (4 - silent) * [{0: 0.9}]
+
+
+def test_a_fish_that_darts_is_told():
+    """Its track was followed all the while."""
+    frames = [([Blob(0, x_m, 0.1, followed=5)], None) for x_m in (0.1, 0.2, 0.3)]
+    told = told_x_m(Fuser(keeps=True, break_s=STEP_S), frames)
+    assert told == [{0: 0.1}, {0: 0.2}, {0: 0.3}]
+
+
+def test_a_track_that_comes_back_before_its_step_is_over_is_told():
+    """An exchange that is taken back two frames later has told nobody elsewhere."""
+    here, there = Blob(0, 0.1, 0.1, followed=5), Blob(0, 0.9, 0.9, followed=6)
+    frames = [([here], None), ([there], None), ([there], None), ([here], None)]
+    assert told_x_m(Fuser(keeps=True, break_s=STEP_S), frames) == [{0: 0.1}, {}, {}, {0: 0.1}]
 
 
 def test_a_fish_s_name_is_free_where_the_robot_is_seen_late():

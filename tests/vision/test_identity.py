@@ -147,30 +147,6 @@ def test_a_crowd_teaches_nothing():
     assert math.isnan(trail.darkness)
 
 
-@pytest.mark.parametrize(("apart", "silent"), [(1, 0), (4, 3)], ids=["beside", "apart"])
-def test_ids_exchanged_late_do_not_jump(apart, silent):
-    """Nobody is told for a fifth of a second where names go to another place; else at once."""
-    film = Film()
-    film.show({0: LARGE, apart: SMALL}, 150)
-    swapped = {0: SMALL, apart: LARGE}
-    told = [film.show(swapped, 1, mixed={(0, apart): 0.5})]
-    told += [film.show(swapped, 1) for _ in range(150)]
-
-    before, after = {0: 0, apart: 1}, {0: 1, apart: 0}
-    assert told.count({}) == silent
-    assert told == sorted(told, key=[before, {}, after].index)
-    assert told[0] == before
-    assert told[-1] == after
-
-
-def test_a_lost_id_that_is_found_elsewhere_at_once_is_not_told_yet():
-    """Three frames after it was last seen it may be anywhere."""
-    film = Film()
-    film.show({0: LARGE, 1: SMALL}, 30)
-    told = [film.show({0: LARGE, 6: SMALL}, 1) for _ in range(4)]
-    assert told == [{0: 0}, {0: 0}, {0: 0, 6: 1}, {0: 0, 6: 1}]
-
-
 def test_two_that_share_a_blob_from_the_start_are_learnt_when_they_part():
     """Nothing is known of either, so there is no doubt: their looks become theirs."""
     film = Film()

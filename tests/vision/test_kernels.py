@@ -17,7 +17,7 @@ CASES = {
         (*(RNG.integers(0, high, (9, 7)).astype(np.uint8) for high in (2, 200, 200)), 3, 5),
     ),
     "moments": (k.moments, (PIXELS, WEIGHTS)),
-    "least_squares": (k.least_squares, (PIXELS, PIXELS[:7] + 0.3)),
+    "nearest_squared": (k.nearest_squared, (PIXELS, PIXELS[:7] + 0.3)),
     "clusters": (k.clusters, (PIXELS, WEIGHTS, PIXELS[:3].copy(), 12)),
     "step_costs": (k.step_costs, (RNG.normal(size=(4, 3)), RNG.normal(size=(5, 4)), 0.8, 0.1)),
     "read_grid": (k.read_grid, (RNG.normal(size=(4, 5, 2)), RNG.uniform(-1, 5, (30, 2)))),
@@ -85,7 +85,7 @@ def test_distances_are_those_of_scipy():
     """To the nearest point, squared."""
     points = RNG.uniform(0, 40, (9, 2))
 
-    found = k.least_squares(PIXELS, points)
+    found = k.nearest_squared(PIXELS, points)
 
     np.testing.assert_allclose(found, cdist(PIXELS, points).min(axis=1) ** 2)
 

@@ -72,7 +72,9 @@ class Following:
         self._fps = plan.opened.trial.fps
         self._numbers = FrameClock(self._fps, after=self._resumed.last)
         self._fuser = Fuser(
-            self._resumed.next_agent, keeps=plan.options.tracker.n_agents is not None
+            self._resumed.next_agent,
+            keeps=plan.options.tracker.n_agents is not None,
+            break_s=plan.opened.trial.longest_step_s,
         )
         self._outcome = Outcome(plan, self._numbers.tally, tell)
         if origins.is_live:

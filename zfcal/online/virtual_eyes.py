@@ -93,7 +93,7 @@ class VirtualEyes:
         )
         mask = (region_of(arena, under) * np.uint8(255)).astype(np.uint8)
         self._finder = RobotFinder(LedOptions(), under, mask=mask)
-        self._fuser = Fuser()
+        self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
 
     @property
     def next_agent(self) -> int:

@@ -20,7 +20,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F, **options: Any) -> F:
-    """Compile a function, and keep it for the next start where there is a place to."""
+    """Compile a function, and keep it for the next start where there is a place to.
+
+    It calls none of another file: whether a kept version still holds is told by its own file.
+    """
     try:
         compiled: Any = njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:
@@ -100,7 +103,7 @@ def moments(pixels: Floats, weights: Floats) -> tuple[float, float, float, float
 
 
 @kernel
-def least_squares(pixels: Floats, points: Floats) -> Floats:
+def nearest_squared(pixels: Floats, points: Floats) -> Floats:
     """Return how far each pixel is from the nearest of some points, squared, shape (pixel,)."""
     found = np.empty(len(pixels))
     for p in range(len(pixels)):
@@ -221,7 +224,7 @@ def prepare() -> None:
     mask, level, dark = (np.full((2, 2), value, np.uint8) for value in (1, 9, 3))
     pixels, weights = shades(mask, dark, level, 0, 0)
     moments(pixels, weights)
-    least_squares(pixels, pixels)
+    nearest_squared(pixels, pixels)
     clusters(pixels, weights, pixels.copy(), 1)
     some = np.ones((2, 4))
     step_costs(some, some, 1.0, 1.0)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.vision._kernels import least_squares, step_costs
+from zfcal.vision._kernels import nearest_squared, step_costs
 from zfcal.vision.assign import Match, assign
 from zfcal.vision.detect import Blob
 from zfcal.vision.identity import Identities
@@ -222,7 +222,6 @@ class Trails:
         if self._identities is not None:
             names = self._identities.step(seen, self._mixed, time_s)
             self._mixed = {}
-            seen = [trail for trail in seen if trail.key in names]
             for trail in seen:
                 trail.agent = names[trail.key]
                 look = self._identities.look(trail.agent)
@@ -237,4 +236,4 @@ def _distance(blob: Blob, at: Floats, near: float) -> float:
     left, top = float(at[0]) - x, float(at[1]) - y
     if not (-near <= left <= width + near and -near <= top <= height + near):
         return math.inf
-    return math.sqrt(least_squares(at[None], blob.pixels)[0])
+    return math.sqrt(nearest_squared(at[None], blob.pixels)[0])

@@ -24,8 +24,8 @@ GUESSED = 0.4
 _STAYS_M = 0.01
 """How much nearer to the LEDs than the robot's track another must be, to be the robot."""
 
-_BREAK_S = 0.2
-"""For so long a fish whose name goes over to a track elsewhere is not told: a step of the model."""
+_SLACK_S = 1e-6
+"""What a difference of two times may be off by rounding."""
 
 _FORGET_S = 60.0
 """Far longer than any tracker keeps the id of an animal that it does not see."""
@@ -37,6 +37,11 @@ class Blob(Protocol):
     @property
     def agent(self) -> int:
         """The tracker's id."""
+        ...
+
+    @property
+    def track(self) -> int:
+        """What the tracker followed from frame to frame."""
         ...
 
     @property
@@ -72,6 +77,9 @@ class Fuser:
         Whether the tracker's ids are those of animals, for good. Then names are kept as well: where
         a track that was a fish's turns out to be the robot's, its name goes over to the one
         that was taken for the robot.
+    break_s
+        How long a fish is not told, in seconds, once its name has gone over to a track elsewhere:
+        the longest step of the model (`Trial.longest_step_s`), so that none spans the jump.
 
     Attributes
     ----------
@@ -79,11 +87,12 @@ class Fuser:
         The next id that is free.
     """
 
-    def __init__(self, first_agent: int = 0, *, keeps: bool = False) -> None:
+    def __init__(self, first_agent: int = 0, *, keeps: bool = False, break_s: float = 0.0) -> None:
         self.next_agent = first_agent
         self._keeps = keeps
         self._free: list[int] = []
-        self._last: dict[int, tuple[int, float, float, float]] = {}
+        self._break_s = break_s - _SLACK_S
+        self._told: dict[int, tuple[int, float, float, float]] = {}
         self._fish: dict[int, tuple[int, float]] = {}
         self._tidied_s = 0.0
         self._robot: int | None = None
@@ -159,10 +168,10 @@ class Fuser:
         known = self._fish.get(blob.agent)
         agent = self._name() if known is None else known[0]
         self._fish[blob.agent] = (agent, time_s)
-        if self._keeps and self._is_jump(agent, blob, time_s):
-            return None
         if self._keeps:
-            self._last[agent] = (blob.agent, time_s, blob.x_m, blob.y_m)
+            if self._is_jump(agent, blob, time_s):
+                return None
+            self._told[agent] = (blob.track, time_s, blob.x_m, blob.y_m)
         return AgentPose(
             agent=agent,
             kind=FISH,
@@ -176,12 +185,12 @@ class Fuser:
         return self._free.pop(0) if self._free else self._new()
 
     def _is_jump(self, agent: int, blob: Blob, time_s: float) -> bool:
-        """Tell whether a name was a moment ago that of another track, elsewhere."""
-        if agent not in self._last:
+        """Tell whether a name was told a moment ago of another track, elsewhere."""
+        if agent not in self._told:
             return False
-        before, last_s, x_m, y_m = self._last[agent]
+        track, last_s, x_m, y_m = self._told[agent]
         moved_m = math.hypot(blob.x_m - x_m, blob.y_m - y_m)
-        return before != blob.agent and time_s - last_s < _BREAK_S and moved_m > NEAR_M
+        return track != blob.track and time_s - last_s < self._break_s and moved_m > NEAR_M
 
     def _robot_pose(self, blob: Blob | None, robot: RobotSeen) -> list[AgentPose]:
         """Return the robot where it was seen: above if it can be, in the fish's own measure."""

@@ -54,12 +54,6 @@ _SURE = 0.85
 _MEND = 4.5
 """Log odds from which ids are exchanged."""
 
-_APART = 2.0
-"""Body lengths from which on an id that goes over to another place would be a jump."""
-
-_BREAK_S = 0.2
-"""For so long nobody is told by such an id: a whole step of the model, so that none spans it."""
-
 _LEAST = 1e-6
 _ROUNDS = 4
 
@@ -88,12 +82,11 @@ class Identities:
         self._within = np.array(WITHIN) ** 2 * _FAITH
         self._looks = float(_FAITH)
         self._time_s = -math.inf
-        self._silent_until_s = np.full(n_agents, -math.inf)
 
     def step(
         self, trails: Sequence[Trail], mixed: dict[tuple[int, int], float], time_s: float
     ) -> dict[int, int]:
-        """Return the id of each track, but for those whose id has just come from elsewhere.
+        """Return the id of each track.
 
         Parameters
         ----------
@@ -114,9 +107,8 @@ class Identities:
         seen = [(rows[t.key], t) for t in trails if t.is_clear]
         if seen:
             self._look(np.array([row for row, _ in seen]), [t for _, t in seen], dt_s / _ALIKE_S)
-        self._rename(time_s)
-        told = {t.key: rows[t.key] for t in trails if self._silent_until_s[rows[t.key]] <= time_s}
-        return {key: int(self._name[row]) for key, row in told.items()}
+        self._rename()
+        return {trail.key: int(self._name[rows[trail.key]]) for trail in trails}
 
     def _rows(self, trails: Sequence[Trail], time_s: float) -> dict[int, int]:
         """Return the row of each track; new ones take those of tracks that are not told."""
@@ -133,9 +125,6 @@ class Identities:
                     if other != row and self._last[row] and self._last[other]:
                         self._mix(row, other, 1 / (1 + math.exp(min(far - cost[k, column], 50.0))))
                 self._keys[row] = new[k].key
-                last = self._last[row]
-                if last is not None and self._is_jump(last[0], new[k].xy, row):
-                    self._silent_until_s[row] = last[1] + _BREAK_S
                 rows[new[k].key] = row
         for trail in trails:
             self._last[rows[trail.key]] = (trail.xy.copy(), time_s)
@@ -212,21 +201,10 @@ class Identities:
             darkness=float(darkness),
         )
 
-    def _is_jump(self, one: Floats, other: Floats, row: int) -> bool:
-        """Tell whether an id that goes from one place to another has come from elsewhere."""
-        length_px = math.exp(self._length[self._name[row]])
-        return math.dist(one, other) > _APART * length_px
-
-    def _rename(self, time_s: float) -> None:
+    def _rename(self) -> None:
         """Exchange ids where others are clearly likelier."""
         likely = np.log(np.maximum(self._chance, _LEAST))
         rows, names = linear_sum_assignment(-likely)
         gain = likely[rows, names].sum() - likely[rows, self._name].sum()
-        if gain <= _MEND:
-            return
-        before = {int(name): row for row, name in enumerate(self._name)}
-        self._name = names
-        for row, name in enumerate(names):
-            here, there = self._last[row], self._last[before[int(name)]]
-            if here and there and self._is_jump(here[0], there[0], row):
-                self._silent_until_s[row] = time_s + _BREAK_S
+        if gain > _MEND:
+            self._name = names

@@ -77,6 +77,8 @@ class Seen:
     ----------
     agent
         The animal's id where their number is known; else the track's, a new one when in doubt.
+    track
+        What was followed from frame to frame; an animal's id may go over to another.
     x_m, y_m
         Centroid of the silhouette, in metres.
     heading_rad
@@ -94,6 +96,7 @@ class Seen:
     """
 
     agent: int
+    track: int
     x_m: float
     y_m: float
     heading_rad: float

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.vision._kernels import clusters, least_squares
+from zfcal.vision._kernels import clusters, nearest_squared
 from zfcal.vision.detect import Blob
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ def by_darkness(blob: Blob, n: int, *, area_px: float) -> list[NDArray[np.bool_]
         sizes = np.bincount(label, minlength=n_pieces)[1:]
         large = np.flatnonzero(sizes >= _PIECE * area_px) + 1
         if len(large) == n:
-            away = np.stack([least_squares(blob.pixels, blob.pixels[label == k]) for k in large])
+            away = np.stack([nearest_squared(blob.pixels, blob.pixels[label == k]) for k in large])
             whose = away.argmin(axis=0)
             return [whose == k for k in range(n)]
     return []

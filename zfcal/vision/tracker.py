@@ -186,6 +186,7 @@ class FishTracker:
         return [
             Seen(
                 agent=trail.agent,
+                track=trail.key,
                 x_m=float(xy_m[k, 0]),
                 y_m=float(xy_m[k, 1]),
                 heading_rad=math.atan2(ahead_m[k, 1], ahead_m[k, 0]),
