@@ -15,7 +15,7 @@ from zfcal.arena import make_arena
 from zfcal.model.compiled import kernel
 from zfcal.model.geometry import zone_of
 from zfcal.model.kernels import crowd as crowds
-from zfcal.model.kernels.crowd import make_crowd
+from zfcal.model.kernels.crowd_cells import look_near, make_crowd, sort, weigh_rings
 from zfcal.model.kernels.crowd_runs import record_crowd_run
 from zfcal.model.kernels.perception import LENGTH_M, make_sight, most_sr, see
 from zfcal.model.kernels.random import seeded
@@ -113,19 +113,18 @@ def _settle_all(state, tank):
         settle(i, state, tank)
 
 
-_sort, _weigh_rings = crowds._sort, crowds._weigh_rings
-_look_near, _draw_heading = crowds._look_near, crowds._draw_heading
+_draw_heading = crowds._draw_heading
 
 
 @kernel
 def _drawn(n, speed, seed, state, packed, tank, work, crowd):
     random = seeded(seed)
-    _sort(state, crowd)
+    sort(state, crowd)
     columns = crowd.before.shape[1] - 1
     at = (crowd.cell[0] // columns, crowd.cell[0] % columns)
     theta = np.empty(n)
-    found, near_sr = _look_near(0, at[0], at[1], state, packed.cos_fov[0], crowd)
-    sums_sr = (near_sr, _weigh_rings(at[0], at[1], crowd))
+    found, near_sr = look_near(0, at[0], at[1], state, packed.cos_fov[0], crowd)
+    sums_sr = (near_sr, weigh_rings(at[0], at[1], crowd))
     for k in range(n):
         _draw_heading(
             0, speed, at, state, 0, packed, tank, random, work, crowd, found, sums_sr

@@ -37,7 +37,8 @@ from zfcal.diagnose.kernels import (
 from zfcal.diagnose.standing import Standing
 from zfcal.diagnose.surroundings import Surroundings, signed_angle
 from zfcal.model.fitted import Fitted
-from zfcal.model.kernels.scene import ask_speeds, perceive
+from zfcal.model.kernels.asking import ask_speeds
+from zfcal.model.kernels.scene import perceive
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
 from zfcal.model.views import sees_late

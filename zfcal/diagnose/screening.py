@@ -38,7 +38,8 @@ from zfcal.diagnose.scores import (
 )
 from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
-from zfcal.model.kernels.scene import ask_speeds, perceive
+from zfcal.model.kernels.asking import ask_speeds
+from zfcal.model.kernels.scene import perceive
 from zfcal.model.kernels.scores import (
     component_score,
     factor_score,

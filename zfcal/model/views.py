@@ -12,18 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.model.effects import find_effect
-from zfcal.model.kernels.extended import harmonic_tilt
-from zfcal.model.kernels.perception import REPULSION_M
-from zfcal.model.kernels.scene import (
+from zfcal.model.kernels.asking import (
     PART,
     ask_components,
     ask_factors,
     ask_harmonics,
     ask_rotations,
     attend,
-    head_late,
-    perceive,
 )
+from zfcal.model.kernels.extended import harmonic_tilt
+from zfcal.model.kernels.perception import REPULSION_M
+from zfcal.model.kernels.scene import head_late, perceive
 from zfcal.model.kernels.world import Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
@@ -208,7 +207,7 @@ def harmonics(
     Returns
     -------
     waves, zones, log_taken
-        As `zfcal.model.kernels.scene.ask_harmonics` has them.
+        As `zfcal.model.kernels.asking.ask_harmonics` has them.
     """
     turns, n = scene.turns, len(scene.turns)
     waves, log_taken = np.empty((n, 1 + 2 * degree)), np.empty(n)

@@ -17,11 +17,12 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.online.camera_making import CameraTask, Found, Place, Recipe, make_camera
 from zfcal.online.events import LeftOut, Made, Note, Progress, Tell
 from zfcal.vision.boards import Board, draw_board, find_board
-from zfcal.vision.bundle import View
-from zfcal.vision.calibration import Calibration, Pairs
+from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_boards import LensCalibration, calibrate_lens
 from zfcal.vision.calibration_points import calibrate_pose
 from zfcal.vision.lens import Floats, shown_size
+from zfcal.vision.pairs import Pairs
+from zfcal.vision.poses import View
 from zfcal.vision.video import encoded
 
 PX_PER_M = 10_000.0

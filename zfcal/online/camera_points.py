@@ -12,9 +12,10 @@ from zfcal.online.camera_corners import size_of_images
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_lens
 from zfcal.online.events import Tell
-from zfcal.vision.calibration import Calibration, Pairs
+from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_points import calibrate_points, calibrate_pose
 from zfcal.vision.lens import PINHOLE, Lens
+from zfcal.vision.pairs import Pairs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import View
 from zfcal.vision.frames import Image
 from zfcal.vision.lens import Floats
+from zfcal.vision.poses import View
 
 LEAST_CORNERS = 8
 """Corners of a ChArUco board below which an image does not count."""

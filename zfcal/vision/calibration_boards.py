@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import Fitted, Freedom, Start, View, find_start, fit_pose, fit_views
+from zfcal.vision.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.vision.calibration import summary
 from zfcal.vision.lens import FISHEYE, PINHOLE, Floats, Lens
+from zfcal.vision.poses import View, fit_pose
 
 LEAST_VIEWS = 3
 GOOD_VIEWS = 8

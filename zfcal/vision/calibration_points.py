@@ -15,10 +15,9 @@ import cv2
 import numpy as np
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import Fitted, Freedom, Start, View, find_start, fit_pose, fit_views
+from zfcal.vision.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.vision.calibration import (
     Calibration,
-    Pairs,
     calibrate_homography,
     fit_homography,
     left_out,
@@ -26,6 +25,8 @@ from zfcal.vision.calibration import (
 )
 from zfcal.vision.camera import Camera, Homography
 from zfcal.vision.lens import FISHEYE, PINHOLE, Floats, Lens, shown_size
+from zfcal.vision.pairs import Pairs
+from zfcal.vision.poses import View, fit_pose
 
 LADDERS = {
     PINHOLE: (

@@ -14,10 +14,10 @@ import numpy as np
 
 from zfcal.errors import InputError
 from zfcal.vision.alignment import Alignment, time_blocks
-from zfcal.vision.bundle import View, fit_pose
-from zfcal.vision.calibration import Pairs
 from zfcal.vision.camera import Camera, Homography
 from zfcal.vision.lens import Floats
+from zfcal.vision.pairs import Pairs
+from zfcal.vision.poses import View, fit_pose
 
 MOST_PAIRS = 600
 _GAIN = 0.95

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from zfcal.vision.boards import draw_board
-from zfcal.vision.calibration import Pairs
 from zfcal.vision.camera import FISHEYE, PINHOLE, Camera
+from zfcal.vision.pairs import Pairs
 
 OVERHEAD = Camera(
     size_px=(500, 500),

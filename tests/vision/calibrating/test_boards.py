@@ -8,8 +8,8 @@ import pytest
 
 from zfcal.errors import InputError
 from zfcal.vision.boards import Board, _right_way_round, draw_board, find_board
-from zfcal.vision.bundle import View
 from zfcal.vision.calibration_boards import calibrate_lens, coverage
+from zfcal.vision.poses import View
 
 CHESS = Board(columns=9, rows=6, square_m=0.02)
 CHARUCO = Board(columns=9, rows=6, square_m=0.02, charuco=True)

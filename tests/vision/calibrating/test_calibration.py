@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from zfcal.errors import InputError
 from zfcal.vision.calibration import (
-    Pairs,
     calibrate_corners,
     calibrate_homography,
     homography_from_corners,
     seen_from,
     summary,
 )
+from zfcal.vision.pairs import Pairs
 
 SIZE = (500, 500)
 BOUNDS = (0.0, 0.0, 1.0, 1.0)

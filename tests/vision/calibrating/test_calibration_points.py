@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zfcal.errors import InputError
-from zfcal.vision.bundle import Freedom, View, _Problem, fit_pose, fit_views
-from zfcal.vision.calibration import Pairs
+from zfcal.vision.bundle import Freedom, _Problem, fit_views
 from zfcal.vision.calibration_points import LADDERS, calibrate_points, calibrate_pose
 from zfcal.vision.camera import Camera
+from zfcal.vision.pairs import Pairs
+from zfcal.vision.poses import View, fit_pose
 
 BOTH = pytest.mark.parametrize("name", ["overhead", "below"])
 

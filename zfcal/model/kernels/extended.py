@@ -281,7 +281,7 @@ def harmonic_tilt(waves: Floats, zones: Floats, share: NDArray[np.uint8], tilt: 
     Parameters
     ----------
     waves, zones
-        From `zfcal.model.kernels.scene.ask_harmonics`.
+        From `zfcal.model.kernels.asking.ask_harmonics`.
     share : ndarray of uint8, shape (step, cell, zone)
         A cell that several zones share counts as in the one with most of it.
     tilt : ndarray, shape (step, cell)

@@ -1,0 +1,274 @@
+"""What effects say of measured states: components, rotations, factors, speeds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.model.compiled import inlined, kernel
+from zfcal.model.kernels.hooks import (
+    call_component,
+    call_factor,
+    call_rotation,
+    call_sight,
+    call_speed,
+)
+from zfcal.model.kernels.world import Packed
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_HARDLY = 1e-6
+
+PART = 4
+"""Columns of a component: weight, unit vector x and y, kappa."""
+
+
+@kernel
+def attend(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, changed: Floats
+) -> None:
+    """Write solid angles as effects on sight change them.
+
+    Parameters
+    ----------
+    packed
+        Of the first model.
+    angle_sr, changed : ndarray, shape (step, agent)
+        Given, and received.
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.sights.shape[0]):
+            own = packed.effects[0, packed.sights[h, 1]].ctypes.data
+            for j in range(n):
+                if row[i * n + j] > 0.0:
+                    row[i * n + j] *= call_sight(
+                        packed.sights[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                        own, j,
+                    )  # fmt: skip
+        for j in range(n):
+            changed[s, j] = row[i * n + j]
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_components(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, parts: Floats
+) -> None:
+    """Write the heading components of effects.
+
+    Parameters
+    ----------
+    parts : ndarray, shape (step, component, PART)
+        Receives weight, unit vector and kappa; weight 0 where there is none.
+    """
+    n = states.shape[2]
+    row, out = np.zeros(n * n), np.zeros(3)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.components.shape[0]):
+            out[:] = 0.0
+            weight: float = call_component(
+                packed.components[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.components[h, 1]].ctypes.data, out.ctypes.data,
+            )  # fmt: skip
+            parts[s, h, 0] = max(weight, 0.0)
+            parts[s, h, 1], parts[s, h, 2], parts[s, h, 3] = out[0], out[1], out[2]
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_rotations(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, spin: Floats
+) -> None:
+    """Write the cosine and sine of the angle by which effects turn the base's directions.
+
+    Parameters
+    ----------
+    spin : ndarray, shape (step, 2)
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i, angle = who[s], 0.0
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        for h in range(packed.rotations.shape[0]):
+            angle += call_rotation(
+                packed.rotations[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.rotations[h, 1]].ctypes.data,
+            )  # fmt: skip
+        spin[s, 0], spin[s, 1] = math.cos(angle), math.sin(angle)
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@inlined
+def _cell_zone(share: NDArray[np.uint8], probability: Floats, s: int, g: int) -> int:
+    """Return the zone with most of a cell; 0 for none, or where hardly any heading is taken."""
+    zone, most = 0, 0
+    for z in range(share.shape[2]):
+        if share[s, g, z] > most:
+            most, zone = share[s, g, z], z + 1
+    if probability.shape[0] > 0 and probability[s, g] < _HARDLY:
+        zone = 0
+    return zone
+
+
+@kernel
+def ask_factors(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
+    speed_m_s: Floats, landing: Ints, share: NDArray[np.uint8], probability: Floats,
+    tilt: Floats, tilt_taken: Floats,
+) -> None:  # fmt: skip
+    """Write the product of the effects' factors on each cell of headings.
+
+    Parameters
+    ----------
+    taken : ndarray, shape (step, 2)
+    speed_m_s, landing : ndarray, shape (step,)
+    share : ndarray of uint8, shape (step, cell, zone)
+        A cell that several zones share counts as in the one with most of it.
+    probability : ndarray, shape (step, cell), or (0, cell)
+        A cell that hardly any heading takes is passed over, where this is known.
+    tilt : ndarray, shape (step, cell)
+    tilt_taken : ndarray, shape (step,)
+        At the heading taken.
+    """
+    n, cells = states.shape[2], share.shape[1]
+    row = np.zeros(n * n)
+    gx, gy = np.empty(cells), np.empty(cells)
+    for g in range(cells):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        state = states[at[s]].ctypes.data
+        for g in range(-1, cells):
+            ux, uy, zone = taken[s, 0], taken[s, 1], landing[s]
+            if g >= 0:
+                ux, uy, zone = gx[g], gy[g], _cell_zone(share, probability, s, g)
+            product = 1.0
+            if zone > 0:
+                for h in range(packed.factors.shape[0]):
+                    product *= call_factor(
+                        packed.factors[h, 0], state, row.ctypes.data, n, i,
+                        packed.effects[0, packed.factors[h, 1]].ctypes.data,
+                        ux, uy, speed_m_s[s], zone,
+                    )  # fmt: skip
+            if g >= 0:
+                tilt[s, g] = product
+            else:
+                tilt_taken[s] = product
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@inlined
+def _log_factor(
+    packed: Packed, state: int, row: int, at: tuple[int, int], heading: tuple[float, float],
+    speed_m_s: float, landing: int,
+) -> float:  # fmt: skip
+    """Return the log of the product of the effects' factors at one heading.
+
+    Parameters
+    ----------
+    state, row
+        Addresses of the agents' state and of what is seen.
+    at
+        Number of agents, and the agent.
+    """
+    product = 1.0
+    for h in range(packed.factors.shape[0]):
+        product *= call_factor(
+            packed.factors[h, 0], state, row, at[0], at[1],
+            packed.effects[0, packed.factors[h, 1]].ctypes.data,
+            heading[0], heading[1], speed_m_s, landing,
+        )  # fmt: skip
+    return math.log(max(product, 1e-300))
+
+
+@kernel
+def ask_harmonics(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
+    speed_m_s: Floats, landing: Ints, waves: Floats, zones: Floats, log_taken: Floats,
+) -> None:  # fmt: skip
+    """Write the log of the effects' factors, as a trigonometric polynomial of the heading.
+
+    Parameters
+    ----------
+    taken : ndarray, shape (step, 2)
+    speed_m_s, landing : ndarray, shape (step,)
+    waves : ndarray, shape (step, 1 + 2 * degree)
+        Receives the mean, then the cosine's and the sine's share of each degree, for
+        headings that land in the first zone.
+    zones : ndarray, shape (step, zone)
+        Receives by how much more it is for each landing zone.
+    log_taken : ndarray, shape (step,)
+        At the heading taken.
+    """
+    n, points = states.shape[2], waves.shape[1]
+    row = np.zeros(n * n)
+    gx, gy = np.empty(points), np.empty(points)
+    for p in range(points):
+        gx[p], gy[p] = math.cos(2 * math.pi * p / points), math.sin(2 * math.pi * p / points)
+    value = np.empty(points)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        state, seen, me = states[at[s]].ctypes.data, row.ctypes.data, (n, i)
+        for p in range(points):
+            value[p] = _log_factor(packed, state, seen, me, (gx[p], gy[p]), speed_m_s[s], 1)
+        waves[s] = 0.0
+        for p in range(points):
+            waves[s, 0] += value[p] / points
+            for d in range(1, points // 2 + 1):
+                waves[s, 2 * d - 1] += 2.0 * value[p] * gx[p * d % points] / points
+                waves[s, 2 * d] += 2.0 * value[p] * gy[p * d % points] / points
+        zones[s, 0] = 0.0
+        for z in range(1, zones.shape[1]):
+            there = _log_factor(packed, state, seen, me, (gx[0], gy[0]), speed_m_s[s], z + 1)
+            zones[s, z] = there - value[0]
+        own = (taken[s, 0], taken[s, 1])
+        log_taken[s] = _log_factor(packed, state, seen, me, own, speed_m_s[s], landing[s])
+        for j in range(n):
+            row[i * n + j] = 0.0
+
+
+@kernel
+def ask_speeds(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, factor: Floats
+) -> None:
+    """Write the product of the effects' factors on the speed of each step.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (step,)
+        As for a chance of just less than one: nobody is stopped.
+    """
+    n = states.shape[2]
+    row = np.zeros(n * n)
+    for s in range(at.size):
+        i = who[s]
+        for j in range(n):
+            row[i * n + j] = angle_sr[s, j]
+        factor[s] = 1.0
+        for h in range(packed.speeds.shape[0]):
+            factor[s] *= call_speed(
+                packed.speeds[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, packed.speeds[h, 1]].ctypes.data, 1.0 - 1e-12,
+            )  # fmt: skip
+        for j in range(n):
+            row[i * n + j] = 0.0
