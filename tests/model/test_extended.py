@@ -9,7 +9,16 @@ from scipy.special import i0e
 
 from zfcal.model.extended import bounds_of, maximise, start_of, with_effect, without_effects
 from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_log_p, zone_scores, zone_turns
-from zfcal.model.kernels.extended import BASE, COLUMNS, EXTRA, densities, extended_sums, make_cells
+from zfcal.model.kernels.extended import (
+    BASE,
+    BASE_SLOPE,
+    COLUMNS,
+    EXTRA,
+    SOCIAL,
+    densities,
+    extended_sums,
+    make_cells,
+)
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.likelihood import fit
 from zfcal.model.onestep import heading_density
@@ -240,6 +249,29 @@ def test_the_density_alone_is_that_with_derivatives(scene, model, effects):
         assert zone_log_p(x, turns, view) == pytest.approx(nats_of(x, turns, view), abs=1e-9)
 
 
+def test_a_density_is_the_sum_of_its_parts():
+    """On all cells and at the heading taken; the columns beside it are left as they are."""
+    rng = np.random.default_rng(4)
+    headings = rng.normal(size=(6, 2))
+    headings /= np.linalg.norm(headings, axis=1)[:, None]
+    parts = np.column_stack([[0.4, 0.0], headings[4:], [3.0, 9.0], [0.7, 0.7]])
+    made = []
+    for apart in (True, False):
+        cells = make_cells(ANGLES)
+        cells.columns[:] = 7.0
+        densities(
+            headings[0], headings[1:2], headings[2:4], np.array([0.5, 0.0]), parts,
+            (5.0, 8.0), (0.3, 0.6), cells, apart,
+        )  # fmt: skip
+        made.append(cells.columns)
+    apart, whole = made
+    cosine = cells.gx * headings[1, 0] + cells.gy * headings[1, 1]
+    assert apart[BASE] == pytest.approx(0.3 * np.exp(5.0 * (cosine - 1)), rel=1e-5)
+    assert apart[BASE_SLOPE] == pytest.approx(apart[BASE] * cosine)
+    assert whole[BASE] == pytest.approx(apart[[BASE, SOCIAL, EXTRA]].sum(axis=0))
+    assert (whole[1:] == 7.0).all()
+
+
 def test_a_lapse_is_a_share_of_uniform_headings(scene, model):
     """By hand, p = 0.9 f + 0.1 / 2 pi, and the probability of no lapse is 0.9 f / p."""
     view, turns = view_of(scene, model), zone_turns(scene)[2]
@@ -261,7 +293,7 @@ def bell(kappa, cosine):
         taken = np.array([value, math.sqrt(max(0.0, 1 - value * value))])
         densities(
             taken, np.array([[1.0, 0.0]]), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 5)),
-            (kappa, 1.0), (1.0, 1.0), cells,
+            (kappa, 1.0), (1.0, 1.0), cells, False,
         )  # fmt: skip
         made.append(cells.columns[BASE, -1])
     return np.array(made)

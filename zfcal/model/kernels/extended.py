@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import kernel
+from zfcal.model.compiled import inlined, kernel
 from zfcal.model.kernels.bells import exponential, one_over_integral
 from zfcal.model.kernels.likelihood import PER_CELL
 
@@ -45,7 +45,7 @@ def make_cells(cells: int) -> Cells:
     return Cells(gx, gy, np.empty(cells + 1), np.empty(cells + 1), np.empty((COLUMNS, cells + 1)))
 
 
-@kernel
+@inlined
 def bell(
     x: float, y: float, kappa: float, weight: float, gx: Floats, gy: Floats, cosine: Floats,
     value: Floats, total: Floats,
@@ -60,18 +60,18 @@ def bell(
         total[g] += value[g]
 
 
-@kernel
+@inlined
 def _weigh(cosine: Floats, value: Floats, total: Floats) -> None:
     for g in range(cosine.size):
         total[g] += value[g] * cosine[g]
 
 
-@kernel
+@inlined
 def densities(
     taken: Floats, base: Floats, toward: Floats, angle_sr: Floats, parts: Floats,
-    kappas: tuple[float, float], scales: tuple[float, float], cells: Cells,
+    kappas: tuple[float, float], scales: tuple[float, float], cells: Cells, apart: bool,
 ) -> None:  # fmt: skip
-    """Write the unscaled heading density of one step on all cells, in its parts.
+    """Write the unscaled heading density of one step on all cells.
 
     Parameters
     ----------
@@ -82,33 +82,39 @@ def densities(
         Weight, unit vector, kappa, and its constant.
     cells
         Its columns receive the densities; the last cell is the heading taken.
+    apart
+        Whether the density's parts and their slopes go to columns of their own; else all of
+        it goes to the first one, and the others are left as they are.
     """
     gx, gy, cosine, value, columns = cells
     gx[-1], gy[-1] = taken[0], taken[1]
-    columns[:] = 0.0
+    columns[: COLUMNS if apart else 1] = 0.0
+    social, extra = (SOCIAL, EXTRA) if apart else (BASE, BASE)
     modes = base.shape[0]
     for m in range(modes):
         weight = scales[0] / modes
         bell(base[m, 0], base[m, 1], kappas[0], weight, gx, gy, cosine, value, columns[BASE])
-        _weigh(cosine, value, columns[BASE_SLOPE])
+        if apart:
+            _weigh(cosine, value, columns[BASE_SLOPE])
     for j in range(toward.shape[0]):
         if angle_sr[j] > 0.0:
             weight = angle_sr[j] * scales[1]
             bell(
                 toward[j, 0], toward[j, 1], kappas[1], weight, gx, gy, cosine, value,
-                columns[SOCIAL],
+                columns[social],
             )  # fmt: skip
-            _weigh(cosine, value, columns[SOCIAL_SLOPE])
+            if apart:
+                _weigh(cosine, value, columns[SOCIAL_SLOPE])
     for c in range(parts.shape[0]):
         if parts[c, 0] > 0.0:
             weight = parts[c, 0] * parts[c, 4]
             bell(
                 parts[c, 1], parts[c, 2], parts[c, 3], weight, gx, gy, cosine, value,
-                columns[EXTRA],
+                columns[extra],
             )  # fmt: skip
 
 
-@kernel
+@inlined
 def _own_parts(parts: Floats, own: Floats) -> None:
     """Write the components of one step with their constants."""
     for c in range(parts.shape[0]):
@@ -144,7 +150,7 @@ def extended_sums(
     own = np.zeros((parts.shape[1], 5))
     for s in range(base.shape[0]):
         _own_parts(parts[s], own)
-        densities(taken[s], base[s], toward[s], angle_sr[s], own, kappas, scales, cells)
+        densities(taken[s], base[s], toward[s], angle_sr[s], own, kappas, scales, cells, True)
         for column in range(COLUMNS):
             at_taken[s, column] = columns[column, n_cells]
         for zone in range(n_zones):
@@ -188,24 +194,12 @@ def extended_density(
     """
     n_cells, n_zones = share.shape[1], share.shape[2]
     per = 2.0 * math.pi / n_cells / PER_CELL
-    gx, gy, cosine, value, columns = make_cells(n_cells)
-    mixture, weight = columns[0], np.empty(n_cells)
-    modes = base.shape[1]
+    cells = make_cells(n_cells)
+    mixture, weight = cells.columns[BASE], np.empty(n_cells)
+    own = np.zeros((parts.shape[1], 5))
     for s in range(base.shape[0]):
-        gx[-1], gy[-1] = taken[s, 0], taken[s, 1]
-        mixture[:] = 0.0
-        for m in range(modes):
-            x, y, own = base[s, m, 0], base[s, m, 1], scales[0] / modes
-            bell(x, y, kappas[0], own, gx, gy, cosine, value, mixture)
-        for j in range(toward.shape[1]):
-            if angle_sr[s, j] > 0.0:
-                x, y, own = toward[s, j, 0], toward[s, j, 1], angle_sr[s, j] * scales[1]
-                bell(x, y, kappas[1], own, gx, gy, cosine, value, mixture)
-        for c in range(parts.shape[1]):
-            if parts[s, c, 0] > 0.0:
-                x, y, kappa = parts[s, c, 1], parts[s, c, 2], parts[s, c, 3]
-                own = parts[s, c, 0] * one_over_integral(kappa)
-                bell(x, y, kappa, own, gx, gy, cosine, value, mixture)
+        _own_parts(parts[s], own)
+        densities(taken[s], base[s], toward[s], angle_sr[s], own, kappas, scales, cells, False)
         weight[:] = 0.0
         for zone in range(n_zones):
             for g in range(n_cells):
@@ -242,7 +236,7 @@ def cell_table(
     own = np.zeros((parts.shape[1], 5))
     for s in range(base.shape[0]):
         _own_parts(parts[s], own)
-        densities(taken[s], base[s], toward[s], angle_sr[s], own, kappas, scales, cells)
+        densities(taken[s], base[s], toward[s], angle_sr[s], own, kappas, scales, cells, True)
         mixture_taken[s] = (
             columns[BASE, n_cells] + alpha * columns[SOCIAL, n_cells] + columns[EXTRA, n_cells]
         )
