@@ -17,7 +17,7 @@ from zfcal.diagnose.kernels import (
     landing_chances,
     surroundings_of,
 )
-from zfcal.diagnose.located import Residuals, centre_and_spread, locate, located, residuals
+from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
 from zfcal.diagnose.standing import standing_of
 from zfcal.diagnose.surroundings import probabilities
 from zfcal.model.kernels.world import HX, HY, SPEED, STATES, ZONE, X, Y
@@ -103,6 +103,11 @@ def test_every_statistic_of_the_base_model_is_a_standard_normal_number(base):
     blocks = table.block >= 0
     assert blocks.sum() > 400
     assert table.z[blocks].std() == pytest.approx(1.0, abs=0.1)
+
+
+def locate(scene, fitted):
+    """Return where a scene differs from a model, by the model's own spread."""
+    return located(residuals(standing_of(scene, fitted)))
 
 
 def test_nothing_is_located_where_the_model_is_right(base):

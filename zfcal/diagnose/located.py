@@ -20,8 +20,7 @@ from scipy.stats import false_discovery_control
 
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
-from zfcal.diagnose.standing import Standing, standing_of
-from zfcal.model.fitted import Fitted
+from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
 
 Floats = NDArray[np.float64]
@@ -315,18 +314,3 @@ def _merge(table: Residuals, rows: Ints, z: Floats, q: Floats) -> tuple[Located,
         q=float(q[rows].min()),
     )
     return found, _Place(zone, block if timed else None, agent)
-
-
-def locate(scene: Scene, fitted: Fitted, *, most: int = MOST) -> tuple[Located, ...]:
-    """Return where model and data disagree, by the spread that the model itself has.
-
-    Parameters
-    ----------
-    scene
-        Where everybody was.
-    fitted
-        The model that is doubted, at its maximum likelihood on the scene.
-    most
-        At most so many places.
-    """
-    return located(residuals(standing_of(scene, fitted)), most=most)

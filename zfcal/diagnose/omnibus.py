@@ -35,8 +35,7 @@ from zfcal.diagnose.kernels import product_sums
 from zfcal.diagnose.null import UNLIKE
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
-from zfcal.diagnose.standing import Standing, standing_of
-from zfcal.model.fitted import Fitted
+from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
 
 Floats = NDArray[np.float64]
@@ -258,18 +257,3 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
     worst = min(tails, key=lambda name: tails[name])
     p = min(1.0, tails[worst] * len(tails))
     return Omnibus(p=p, worst=worst, z=made[worst], statistics=made)
-
-
-def omnibus(scene: Scene, fitted: Fitted, *, rng: np.random.Generator) -> Omnibus:
-    """Return whether model and data disagree at all, by the model's own law.
-
-    Parameters
-    ----------
-    scene
-        Where everybody was.
-    fitted
-        The model that is doubted, at its maximum likelihood on the scene.
-    rng
-        For the ranks within a cell of headings.
-    """
-    return judge(statistics(standing_of(scene, fitted), rng))
