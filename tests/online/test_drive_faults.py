@@ -239,28 +239,27 @@ def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
     assert "No space left on device" in said
     assert "the robot is driven on" in said
     times = [c["time_s"] for c in rig.items("command")]
-    # A driver that waits leaves out all ticks of a second or more; a busy computer a few.
-    assert np.diff(times).max() < 1.0
+    assert np.diff(times).max() < 0.35
     assert all(overview(path).whole for path in drive_files(rig.root).values())
     assert replay(rig.root, say_nothing).is_same
 
 
 @pytest.mark.apt
 def test_a_clock_that_is_set_by_an_hour_changes_nothing(rig, set_clock):
-    """Forwards and back while it drives: no STOP, no wait, no latency of an hour."""
+    """Forwards and back while it drives: no STOP, no tick left out, no latency of an hour."""
     driver = rig.start()
     for offset in ("+3600", "-3600"):
         moves = rig.moves()
-        rig.until(lambda moves=moves: rig.moves() > moves + 12)
+        # The driver has the new time after a second.
+        rig.until(lambda moves=moves: rig.moves() > moves + 15)
         set_clock(offset)
     moves = rig.moves()
-    rig.until(lambda: rig.moves() > moves + 12)
+    rig.until(lambda: rig.moves() > moves + 15)
     # The library that sets the clock breaks the wait for a process that ends.
     driver.kill()
     assert "stopped" not in driver.stderr.read()
     assert rig.items("fault") == []
-    # An hour would stand out; a busy computer leaves out a tick or two.
-    assert np.diff([c["time_s"] for c in rig.items("command")]).max() < 2.0
+    assert np.diff([c["time_s"] for c in rig.items("command")]).max() < 0.35
 
 
 def test_unplugged_and_back(rig):
@@ -373,8 +372,7 @@ def test_a_disk_that_is_slow_holds_up_the_log_alone(rig):
     rig.until(lambda: rig.moves() > 100, 60.0)
     rig.end()
     times = [c["time_s"] for c in rig.items("command")]
-    # A driver that waits leaves out all ticks of a second or more; a busy computer a few.
-    assert np.diff(times).max() < 1.0
+    assert np.diff(times).max() < 0.35
     assert rig.items("fault") == []
     assert "held up" not in rig.drivers[-1].stderr.read()
     assert replay(rig.root, say_nothing).is_same

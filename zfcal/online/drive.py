@@ -161,9 +161,11 @@ def _drive(
         watchdog=watchdog,
     )
     driver = Driver(opened, options.manner, crew)
-    driver.warm_up()
-    _hurry(options, tell, stack)
     if is_live:
+        _hurry(options, tell, stack)
+    driver.warm_up()
+    if is_live:
+        _keep_garbage(stack)
         log.write_behind()
     follower = PoseFollower(opened.trial.root, newest=is_live)
     # The robot's own end comes first on the way out: whatever fails later, it stands.
@@ -214,22 +216,32 @@ def _robot(
 
 
 def _hurry(options: DriveOptions, tell: Tell, stack: contextlib.ExitStack) -> None:
-    """Ask for a high priority, and keep the collector of garbage away from what is there."""
-    if options.clock != "wall":
-        return
-    gc.collect()
-    gc.freeze()
-    stack.callback(gc.unfreeze)
+    """Ask for a high priority, for every thread: who holds the interpreter holds up the others."""
     # Other threads write and talk: when a tick is due they let go of the interpreter soon.
     stack.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(_SWITCH_S)
     try:
-        before = os.getpriority(os.PRIO_PROCESS, 0)
-        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
-        stack.callback(os.setpriority, os.PRIO_PROCESS, 0, before)
+        for thread in threading.enumerate():
+            number = thread.native_id or 0
+            before = os.getpriority(os.PRIO_PROCESS, number)
+            os.setpriority(os.PRIO_PROCESS, number, NICENESS)
+            stack.callback(_lower, number, before)
     except OSError as error:
         if options.verbose:
             tell(Note(text=f"No higher priority: {error.strerror}; other work may delay ticks."))
+
+
+def _lower(thread: int, niceness: int) -> None:
+    """Take back the priority of a thread, if it is still there."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, thread, niceness)
+
+
+def _keep_garbage(stack: contextlib.ExitStack) -> None:
+    """Keep the collector of garbage away from what is there."""
+    gc.collect()
+    gc.freeze()
+    stack.callback(gc.unfreeze)
 
 
 def _conclude(driver: Driver, log: DriveLog, tell: Tell) -> None:

@@ -23,7 +23,7 @@ from zfcal.robot.body import RADIUS_M, Pose, Wheels, wheels_for
 from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import Gains, Goal, bearing, pattern_of
-from zfcal.tracks import ROBOT, AgentPose, FramePoses
+from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -129,6 +129,7 @@ class Pilot:
 
     def __init__(self, opened: OpenTrial, manner: Manner, robot: FishBot) -> None:
         trial = opened.trial
+        self._opened = opened
         self._seed = trial.seed
         self._arena = opened.arena
         self._dt_s = trial.dt_s
@@ -161,12 +162,18 @@ class Pilot:
         return frame // self._stride > self._step
 
     def warm_up(self, model: InForce) -> None:
-        """Draw a step that nobody follows: the first one compiles, or loads what is compiled."""
-        spare = Among(self._arena, self._seats.kinds, dt_s=self._dt_s)
+        """Let a pilot that nobody follows decide: the first step compiles, or loads what is."""
+        spare = Pilot(self._opened, self._manner, FishBot(self._manner.letter, self._robot.line))
         x, y = self._confines.inner.representative_point().coords[0]
-        spare.measure(0.0, np.full((len(self._seats.kinds), 3), np.nan))
-        spare.place(x, y, 0.0)
-        spare.step(model.packed, 0)
+        agents = tuple(
+            AgentPose(agent=i, kind=kind, x_m=x, y_m=y, heading_rad=0.0, confidence=1.0)
+            for i, kind in enumerate((FISH, ROBOT))
+        )
+        for step in range(2):
+            time_s = step * self._dt_s
+            spare.see(FramePoses(time_s=time_s, frame=step * self._stride, agents=agents), model)
+            for held in ("", TURNING, "stale-pose"):
+                spare.tick(time_s, held)
 
     def see(self, poses: FramePoses, model: InForce) -> Target | None:
         """Take the next frame; return the new target where a step is due and one is found."""
