@@ -97,6 +97,12 @@ def recording():
 
 
 @pytest.fixture(scope="session")
+def debian():
+    """Return the module whose `need` finds what a Debian package brings, or skips."""
+    return _module("debian")
+
+
+@pytest.fixture(scope="session")
 def forking():
     """Return the module whose `Forks` runs commands that a test kills at work."""
     return _module("forks")
@@ -212,14 +218,12 @@ def make_diagnosis():
 
 
 @pytest.fixture
-def set_clock(tmp_path, monkeypatch):
+def set_clock(tmp_path, monkeypatch, debian):
     """Return a function that sets the clock of processes started from now on, such as +3600 s.
 
     Their steady clock stays as it is, as it does where somebody sets a computer's time.
     """
-    library = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
-    if not library.exists():
-        pytest.skip("needs the Debian package faketime")
+    library = debian.need("faketime")
     step = tmp_path / "step"
     step.write_text("+0")
     monkeypatch.setenv("LD_PRELOAD", str(library))

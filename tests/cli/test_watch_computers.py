@@ -109,10 +109,10 @@ class Computers:
 
 
 @pytest.fixture
-def computers(trial, tmp_path):
+def computers(trial, tmp_path, debian):
     """Return three computers with the trial's settings, its segments waiting in a folder."""
-    if shutil.which("rsync") is None or shutil.which("ip") is None:
-        pytest.skip("needs the Debian packages rsync and iproute2")
+    debian.need("rsync")
+    debian.need("iproute2")
     shutil.move(trial / "tracks", tmp_path / "waiting")
     made = Computers(tmp_path, trial)
     try:

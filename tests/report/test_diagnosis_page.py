@@ -4,7 +4,6 @@ import html
 import json
 import math
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 
@@ -20,7 +19,6 @@ from zfcal.report.diagnosis_overview import gap_picture, screened_picture
 from zfcal.report.diagnosis_words import statements, tables, verdict_sentence
 from zfcal.report.panels import compose
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = (
     "--headless",
     "--no-sandbox",
@@ -275,10 +273,9 @@ def drawn_page(tmp_path_factory, make_sheet):
 
 
 @pytest.mark.apt
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed (apt-get install it)")
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
-def test_the_page_fits_and_can_be_read(drawn_page, tmp_path, width, scheme):
+def test_the_page_fits_and_can_be_read(debian, drawn_page, tmp_path, width, scheme):
     """Nothing sticks out or is cut, letters are 8 pixels or more, colours follow the scheme."""
     wrapper = tmp_path / "wrapper.html"
     # A document in a frame can be narrower than a window may be.
@@ -290,7 +287,7 @@ def test_the_page_fits_and_can_be_read(drawn_page, tmp_path, width, scheme):
         encoding="utf-8",
     )
     words = [
-        CHROMIUM,
+        debian.need("chromium"),
         *OPTIONS,
         f"--user-data-dir={tmp_path / 'profile'}",
         f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}",

@@ -3,14 +3,12 @@
 import html
 import json
 import re
-import shutil
 import subprocess
 
 import pytest
 
 from zfcal.report import theme
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = (
     "--headless",
     "--no-sandbox",
@@ -25,10 +23,7 @@ OPTIONS = (
 # Chromium's words for the two colour schemes.
 SCHEMES = {"dark": 0, "light": 1}
 
-pytestmark = [
-    pytest.mark.apt,
-    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed (apt-get install it)"),
-]
+pytestmark = pytest.mark.apt
 
 MEASURE = """
 const frame = document.querySelector('iframe');
@@ -60,8 +55,9 @@ def rgb(colour):
 
 
 @pytest.fixture
-def look(drawn_trial, tmp_path):
+def look(debian, drawn_trial, tmp_path):
     """Return what shows the page at a width in a colour scheme and measures what is seen."""
+    chromium = debian.need("chromium")
     page = (drawn_trial / "report" / "index.html").read_text(encoding="utf-8")
 
     def show(width, scheme):
@@ -75,7 +71,7 @@ def look(drawn_trial, tmp_path):
         )
         done = subprocess.run(
             [
-                CHROMIUM,
+                chromium,
                 *OPTIONS,
                 f"--user-data-dir={tmp_path / 'profile'}",
                 f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}",
