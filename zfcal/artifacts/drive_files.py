@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
@@ -68,6 +69,7 @@ class DriveWriter:
     def __init__(self, path: Path, lineage: Lineage) -> None:
         self.path = path
         self._last_ns = 0
+        self._whole = 0
         earlier = _earlier(path)
         # Whoever looks finds a file with a head, and with all that it held before.
         part = path.with_name(f".{path.name}.taken-up")
@@ -83,6 +85,7 @@ class DriveWriter:
                 self._put(topic, time_ns, data)
             self._writer.flush()  # type: ignore[no-untyped-call]
             part.replace(path)
+            self._whole = self._file.tell()
         except OSError as error:
             self.abandon()
             part.unlink(missing_ok=True)
@@ -107,13 +110,21 @@ class DriveWriter:
         """Hand all that was added to the operating system, as one chunk."""
         try:
             self._writer.flush()  # type: ignore[no-untyped-call]
+            self._whole = self._file.tell()
         except OSError as error:
             raise storage_error(self.path, error) from error
 
     def abandon(self) -> None:
-        """Leave the file as it is, after an error: what was flushed before can be read."""
+        """Leave the file, after an error, with what was flushed before.
+
+        Of a flush that failed the chunk itself may be there: whoever writes it again would
+        find it twice.
+        """
         with contextlib.suppress(OSError, AttributeError):
             self._file.close()
+        with contextlib.suppress(OSError):
+            if self._whole:
+                os.truncate(self.path, self._whole)
 
     def close(self, measured: Mapping[str, str] | None = None) -> None:
         """Write the footer and close the file.
