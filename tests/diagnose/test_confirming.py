@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from zfcal.diagnose.confirming import confirm, half_of, halves, halves_note, is_steady
+from zfcal.diagnose.confirming import confirm, half_of, halves, is_steady
 from zfcal.diagnose.naming import choose, refit
 from zfcal.diagnose.scores import summed
 from zfcal.diagnose.screening import Screen
@@ -20,6 +20,19 @@ def added(screen, candidate):
     score = screen.ask(candidate)
     choice = choose([refit(screen, score)], lambda _candidate, _beside: True)
     return Step(choice=choice, best=Best(score=score, z=score.z, p=1.0), before=screen)
+
+
+def alone(step):
+    """Return what held-out steps say of one effect."""
+    ((told,), _) = confirm(step.before, (step,), n_workers=1)
+    return told
+
+
+def halves_note(screen):
+    """Return how far the halves of a recording differ by a model without effects."""
+    confirmed, note = confirm(screen, (), n_workers=1)
+    assert confirmed == ()
+    return note
 
 
 def test_halves_are_alternating_minutes(screen):
@@ -46,7 +59,7 @@ def test_a_short_recording_has_four_blocks(screen):
 def test_an_effect_that_is_not_there_is_not_confirmed(screen, candidate, name):
     """Two kinds of strength, and one on speed: what chance gave is not given again."""
     for seed in (11, 12):
-        told = confirm(added(screen(seed), candidate(name)))
+        told = alone(added(screen(seed), candidate(name)))
         assert not told.holds
         assert told.gain_nats_per_step < 3 * told.gain_se
 
@@ -58,7 +71,7 @@ def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(record, tank, fish,
     for seed in range(100, 110):
         scene = make_scene(record(seed, minutes=3.0), tank)
         own = Screen(scene=scene, fitted=maximise(scene, fish, rounds=0))
-        held.append(confirm(added(own, candidate(name))).holds)
+        held.append(alone(added(own, candidate(name))).holds)
     assert sum(held) <= 1
 
 
@@ -73,12 +86,26 @@ def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(record, tank, fish,
 def test_an_effect_that_is_there_is_confirmed(screen, candidate, name, values):
     """With about what it gained where it was fitted."""
     step = added(screen(23, {name: values}), candidate(name))
-    told = confirm(step)
+    told = alone(step)
     assert told.holds
     assert told.gain_nats_per_step > 4 * told.gain_se
     gained = step.choice.best.gain.sum()
     n = len(step.before.scene.turns)
     assert told.gain_nats_per_step == pytest.approx(gained / n, rel=0.25)
+
+
+def test_effects_are_confirmed_each_beside_those_before_it(screen, candidate):
+    """As one by one, whatever the number of threads: a turn, a speed, and a turn again."""
+    own = screen(23, {"turning-bias": {"strength": 0.4}}, minutes=4.0)
+    steps = []
+    for name in ("turning-bias", "burst-and-coast", "alignment"):
+        before = steps[-1].choice.best.screen if steps else own
+        steps.append(added(before, candidate(name)))
+    confirmed, note = confirm(own, steps, n_workers=3)
+    assert confirmed == tuple(alone(step) for step in steps)
+    assert confirmed[0].holds
+    assert (confirmed, note) == confirm(own, steps, n_workers=1)
+    assert note == halves_note(own)
 
 
 def test_the_halves_of_a_right_model_agree(screen):
@@ -153,5 +180,5 @@ def test_what_comes_and_goes_is_not_named(screen, candidate):
     wavering = dataclasses.replace(
         step.best, score=dataclasses.replace(step.best.score, steps=steps)
     )
-    assert confirm(step).steady
-    assert not confirm(dataclasses.replace(step, best=wavering)).steady
+    assert alone(step).steady
+    assert not alone(dataclasses.replace(step, best=wavering)).steady

@@ -7,6 +7,8 @@ whose strength differs between minutes, or seconds, by more than its mean is ano
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,25 +73,46 @@ def halves(scene: Scene) -> tuple[Scene, Scene]:
     return first, second
 
 
-def confirm(step: Step) -> Confirmed:
-    """Return what an effect gains on held-out steps.
+def confirm(
+    screen: Screen, steps: Sequence[Step], *, n_workers: int
+) -> tuple[tuple[Confirmed, ...], Note]:
+    """Return what each effect gains on held-out steps, and how far the halves differ.
 
     Parameters
     ----------
-    step
-        The effect, and the model without it.
+    screen
+        The model without any of the effects.
+    steps
+        The effects, and the model without each of them.
+    n_workers
+        Fits at the same time; the numbers do not depend on it.
+
+    Returns
+    -------
+    confirmed : tuple of Confirmed
+    note
+        Largest difference between the fits of the two halves, in standard errors.
     """
-    told = _gained(step)
-    return replace(told, steady=is_steady(step.best.score, step.before.scene))
+    models = {id(screen): screen}
+    for step in steps:
+        if not step.choice.best.candidate.effect.on_speed:
+            models |= {id(each): each for each in (step.before, step.choice.best.screen)}
+    asked = [(key, which) for key in models for which in (0, 1)]
+    with ThreadPoolExecutor(max(1, n_workers)) as pool:
+        made = list(pool.map(lambda each: _half(models[each[0]], each[1]), asked))
+        halves_of = {key: (made[2 * n], made[2 * n + 1]) for n, key in enumerate(models)}
+        confirmed = pool.map(lambda step: _confirmed(step, halves_of), steps)
+        return tuple(confirmed), _note(screen, halves_of[id(screen)])
 
 
-def _gained(step: Step) -> Confirmed:
+def _confirmed(step: Step, halves_of: Mapping[int, tuple[_Half, _Half]]) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
-        return _of_speeds(step)
-    before = _held_out(step.before.scene, step.before.fitted)
-    after = _held_out(best.screen.scene, best.screen.fitted)
-    return _summary(after - before)
+        told = _of_speeds(step)
+    else:
+        before, after = halves_of[id(step.before)], halves_of[id(best.screen)]
+        told = _summary(_held_out(step.before.scene, after) - _held_out(step.before.scene, before))
+    return replace(told, steady=is_steady(step.best.score, step.before.scene))
 
 
 def _of_speeds(step: Step) -> Confirmed:
@@ -136,16 +159,28 @@ def _one_strength(steps: Floats, block: Floats) -> bool:
     return bool(spread2 <= mean**2 or stats.chi2.sf(q, df) > _WAVERS)
 
 
-def _held_out(scene: Scene, fitted: Fitted) -> Floats:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Half:
+    """A model that was learnt on one half, and the log densities of the other half's turns."""
+
+    learnt: Fitted
+    log_p: Floats
+
+
+def _half(screen: Screen, which: int) -> _Half:
+    fitted, parts = screen.fitted, halves(screen.scene)
+    learnt = maximise(
+        parts[which], fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS
+    )
+    judged = maximise(parts[1 - which], learnt.parameters, start=learnt.x, rounds=0)
+    return _Half(learnt=learnt, log_p=judged.log_p)
+
+
+def _held_out(scene: Scene, learnt: tuple[_Half, _Half]) -> Floats:
     """Return log densities of all turns, each under the fit to the other half."""
-    parts = halves(scene)
     log_p = np.full(len(scene.turns), np.nan)
-    for which, (own, other) in enumerate((parts, parts[::-1])):
-        learnt = maximise(
-            other, fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS
-        )
-        judged = maximise(own, learnt.parameters, start=learnt.x, rounds=0)
-        log_p[half_of(scene, scene.turns, which)] = judged.log_p
+    for which in (0, 1):
+        log_p[half_of(scene, scene.turns, 1 - which)] = learnt[which].log_p
     return log_p
 
 
@@ -156,15 +191,11 @@ def _summary(gain: Floats) -> Confirmed:
     return Confirmed(gain_nats_per_step=mean, gain_se=error, holds=mean > _SURE * error)
 
 
-def halves_note(screen: Screen) -> Note:
+def _note(screen: Screen, learnt: tuple[_Half, _Half]) -> Note:
     """Return how far the fits of the two halves differ, in standard errors."""
-    fitted = screen.fitted
     differences = []
-    fits = [
-        maximise(part, fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS)
-        for part in halves(screen.scene)
-    ]
-    for zone, turns in enumerate(fitted.turns):
+    fits = [half.learnt for half in learnt]
+    for zone, turns in enumerate(screen.fitted.turns):
         if len(turns.rows) < 4 * MIN_STEPS:
             continue
         by = fits[0].x[zone][:3] - fits[1].x[zone][:3]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from zfcal.diagnose.case import (
     is_suspicious,
     open_case,
 )
-from zfcal.diagnose.confirming import Confirmed, confirm, halves_note
+from zfcal.diagnose.confirming import Confirmed, confirm
 from zfcal.diagnose.controls import NAMES, ask_controls
 from zfcal.diagnose.findings import (
     Diagnosis,
@@ -53,10 +53,10 @@ from zfcal.diagnose.selection import (
     best_of,
 )
 from zfcal.diagnose.telling import says
+from zfcal.diagnose.together import together
 from zfcal.diagnose.tracing import trace
 
 Floats = NDArray[np.float64]
-Asks = Callable[[Step], Omnibus]
 
 
 _GENERIC_REPLICATES = 8
@@ -86,11 +86,13 @@ class _Row:
 class _Judged:
     """Effects that stand, of those that were selected; the omnibus test with them in the model.
 
-    ``confirmed`` holds what held-out steps say of all that were selected.
+    ``confirmed`` holds what held-out steps say of all that were selected, ``halves`` how far the
+    fits of the two halves differ.
     """
 
     kept: tuple[Step, ...]
     confirmed: tuple[Confirmed, ...]
+    halves: Note
     omnibus: Omnibus
     suspicious: bool
 
@@ -113,10 +115,13 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     tell("fitting", 0, 1)
     case = open_case(question)
     tell("fitting", 1, 1)
-    scores = ask_all(case.screen, case.listed, question.n_workers)
+    scores, own = together(
+        lambda: ask_all(case.screen, case.listed, question.n_workers),
+        lambda: case.at_large(0, case.screen),
+        n_workers=question.n_workers,
+    )
     asked = _asked(question, scores)
     rows = _null_rows(case, asked, tell)
-    own = case.at_large(0, case.screen)
     omnibus = judge(own[1], [row.at_large[1] for row in rows if row.at_large])
     selector = Selector(
         listed=Asked(
@@ -136,21 +141,26 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 
 def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omnibus) -> _Judged:
     """Return which of the effects that were selected stand, and what is left then."""
-    confirmed = tuple(confirm(step) for step in selection.steps)
-    nulls = [row.at_large[1] for row in rows if row.at_large]
+    steps, nulls = selection.steps, [row.at_large[1] for row in rows if row.at_large]
 
     def after(step: Step) -> Omnibus:
         return judge(case.at_large(0, step.choice.best.screen)[1], nulls)
 
-    explained = _explains(case.question, selection.steps, confirmed, after)
-    kept = _kept(selection.steps, confirmed, explained=explained)
+    (confirmed, halves), last = together(
+        lambda: confirm(case.screen, steps, n_workers=case.question.n_workers),
+        lambda: after(steps[-1]) if steps else omnibus,
+        n_workers=case.question.n_workers,
+    )
+    explained = _explains(case.question, confirmed, last)
+    kept = _kept(steps, confirmed, explained=explained)
     if kept:
-        omnibus = after(kept[-1])
+        omnibus = last if len(kept) == len(steps) else after(kept[-1])
     # What is there at times is something, though nothing that is listed.
     wavers = not explained and any(told.holds and not told.steady for told in confirmed)
     return _Judged(
         kept=kept,
         confirmed=confirmed,
+        halves=halves,
         omnibus=omnibus,
         suspicious=wavers or is_suspicious(case.question, omnibus),
     )
@@ -226,18 +236,25 @@ def _rivals(case: Case, screen: Screen) -> list[Best]:
     return best_of(family, [best.score for best in found])
 
 
-def _explains(
-    question: Question, steps: Sequence[Step], confirmed: Sequence[Confirmed], after: Asks
-) -> bool:
+def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus) -> bool:
     """Return whether what seems to be there at times is all that there is.
 
     Where an effect is strong and its true form another one than ours, what is left over goes by the
     fish's distances, say, which change within a minute: it looks like an effect that comes
     and goes. With our form in the model nothing is left then that the omnibus test would notice.
+
+    Parameters
+    ----------
+    question
+        Says whether the omnibus test has a null.
+    confirmed
+        What held-out steps say of all that were selected.
+    last
+        The omnibus test with all of them in the model.
     """
     if all(told.steady for told in confirmed) or not can_suspect(question):
         return False
-    return not is_suspicious(question, after(steps[-1]))
+    return not is_suspicious(question, last)
 
 
 def _kept(
@@ -271,7 +288,7 @@ def _diagnosis(
         where=where,
         effects=effects,
         screened=screened,
-        notes=_notes(case, rows, final, judged.omnibus),
+        notes=_notes(case, rows, final, judged),
         base=case.screen.fitted.parameters,
         extended=final.fitted.parameters,
         minutes=case.scene.duration_s / 60,
@@ -335,10 +352,11 @@ def _where(own: Residuals, rows: Sequence[_Row]) -> tuple[Located, ...]:
     return located(own, *centre_and_spread(own, nulls)) if nulls else located(own)
 
 
-def _notes(case: Case, rows: Sequence[_Row], final: Screen, omnibus: Omnibus) -> tuple[Note, ...]:
+def _notes(case: Case, rows: Sequence[_Row], final: Screen, judged: _Judged) -> tuple[Note, ...]:
+    omnibus = judged.omnibus
     return (
         _noise_note(case.question),
-        halves_note(case.screen),
+        judged.halves,
         _controls_note(case, rows, final),
         Note(
             name="omnibus",

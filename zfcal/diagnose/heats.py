@@ -11,19 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from zfcal.diagnose.heldout import evaluate
-from zfcal.diagnose.naming import Refit, refit
+from zfcal.diagnose.naming import HEAT_TURNS, Refit, refit, some_of
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
 from zfcal.model.scene import Moves, Scene, thin
 
-HEAT_TURNS = 8000
-"""Steps of a heat: twenty minutes of a fish."""
-
-_BLOCK_S = 10.0
 _FEWEST = 3
 _BEATEN = 5.0
 """Standard errors behind the best: that far no further steps bring it back."""
@@ -49,7 +42,7 @@ def unbeaten(screen: Screen, scores: Sequence[Score], n_workers: int) -> list[bo
     share = len(screen.scene.turns) // HEAT_TURNS
     if len(scores) < _FEWEST or share < 2:
         return [True] * len(scores)
-    turns, moves = (_some(screen.scene, steps, share) for steps in _both(screen.scene))
+    turns, moves = (some_of(screen.scene, steps, share) for steps in _both(screen.scene))
     small = evaluate(screen, thin(screen.scene, turns, moves))
 
     def fitted(score: Score) -> Refit:
@@ -64,9 +57,3 @@ def unbeaten(screen: Screen, scores: Sequence[Score], n_workers: int) -> list[bo
 
 def _both(scene: Scene) -> tuple[Moves, Moves]:
     return scene.turns, scene.moves
-
-
-def _some(scene: Scene, steps: Moves, share: int) -> NDArray[np.bool_]:
-    """Return which steps lie in every so-many-th block of seconds."""
-    block = (scene.time_s(steps) // _BLOCK_S).astype(np.int64)
-    return np.asarray(block % share == 0)

@@ -23,13 +23,18 @@ from zfcal.diagnose.speeds import fit_speed
 from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free
 from zfcal.model.kernels.world import TRAIT
-from zfcal.model.scene import Scene
+from zfcal.model.scene import Moves, Scene, thin
 
 Floats = NDArray[np.float64]
 
 _ROUNDS = 10
 _SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Of a strength worth noticing: where the search for the maximum begins."""
+
+HEAT_TURNS = 8000
+"""Steps that a first answer is taken from: twenty minutes of a fish."""
+
+_BLOCK_S = 10.0
 
 _SURE = 2.0
 """Standard errors by which one suspect must beat another."""
@@ -139,14 +144,18 @@ def _start(scene: Scene, fitted: Fitted, score: Score) -> dict[str, float]:
     """
     candidate = score.candidate
     low, high = bounds_of(candidate.name, candidate.effect.strength)
-    best, most = candidate.values(0.0), -np.inf
-    for share in _SHARES:
-        strength = float(np.clip(np.copysign(share * candidate.notable, score.z), low, high))
-        values = candidate.values(strength)
-        nats = nats_at(scene, with_effect(fitted.parameters, candidate.name, values), fitted.x)
-        if nats > most:
-            best, most = values, nats
-    return best
+    strengths = np.copysign(np.multiply(_SHARES, candidate.notable), score.z)
+    tried = [candidate.values(float(value)) for value in np.clip(strengths, low, high)]
+    models = [with_effect(fitted.parameters, candidate.name, values) for values in tried]
+    share = max(1, len(scene.turns) // HEAT_TURNS)
+    few = thin(scene, some_of(scene, scene.turns, share), some_of(scene, scene.moves, share))
+    return tried[int(np.argmax(nats_at(few, models, fitted.x)))]
+
+
+def some_of(scene: Scene, steps: Moves, share: int) -> NDArray[np.bool_]:
+    """Return which steps lie in every so-many-th block of ten seconds."""
+    block = (scene.time_s(steps) // _BLOCK_S).astype(np.int64)
+    return np.asarray(block % share == 0)
 
 
 def _intervals(

@@ -133,11 +133,12 @@ def excess_deviate(count: float, expected: float) -> float:
 
 def summed(candidate: Candidate, steps: Floats) -> Score:
     """Return the score of a candidate from its efficient scores."""
-    total, information = float(steps.sum()), float((steps**2).sum())
+    squares = steps * steps
+    total, information = float(steps.sum()), float(squares.sum())
     if not information > 0:
         return Score(candidate=candidate, z=0.0, strength=0.0, information=0.0, steps=steps)
     # Where a few steps make up all of the sum it is not normal: they count for less.
-    several = information**2 / float((steps**4).sum())
+    several = information**2 / float((squares * squares).sum())
     return Score(
         candidate=candidate,
         z=total / np.sqrt(information) * min(1.0, np.sqrt(several / _SEVERAL)),
@@ -155,12 +156,9 @@ def tame(scores: Floats) -> Floats:
 
 def centred(values: Floats, zone: NDArray[np.int64], kept: NDArray[np.bool_]) -> Floats:
     """Return values less their mean in each zone; zero for what is not kept."""
-    rest = np.zeros_like(values)
-    for number in np.unique(zone):
-        rows = (zone == number) & kept
-        if rows.any():
-            rest[rows] = values[rows] - values[rows].mean()
-    return rest
+    sums = np.bincount(zone, np.where(kept, values, 0.0))
+    means = sums / np.maximum(np.bincount(zone, kept), 1.0)
+    return np.where(kept, values - means[zone], 0.0)
 
 
 def basis_of(columns: Floats) -> Floats:

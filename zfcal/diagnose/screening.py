@@ -104,6 +104,11 @@ class Screen:
             psi[turns.rows] -= basis @ (basis.T @ psi[turns.rows])
         return zones, basis_of(psi)
 
+    @cached_property
+    def _mixtures(self) -> list[tuple[Floats, Floats, Floats, Floats]]:
+        """What the scores of mixtures need of each zone's turns."""
+        return [self._tables.mixtures(turns.rows) for turns in self.fitted.turns]
+
     @property
     def probability(self) -> Floats:
         """Probability of each cell of headings, shape (turn, cell)."""
@@ -204,16 +209,14 @@ class Screen:
 
     def _sight_scores(self, scene: Scene, packed: Packed) -> Floats:
         fitted, turns = self.fitted, scene.turns
-        tables = self._tables
         changed = attended(scene, packed, fitted.view.angle_sr)
         total = np.zeros(len(turns))
-        for x, zone in zip(fitted.x, fitted.turns, strict=True):
+        for x, zone, mixtures in zip(fitted.x, fitted.turns, self._mixtures, strict=True):
             rows, own = zone.rows, x[:3] * SCALES
             some = np.empty(len(rows))
             social_score(
                 fitted.view.toward[rows], changed[rows], fitted.view.angle_sr[rows], zone.taken,
-                own[1], constants(own[:2])[1], own[2],
-                *tables.mixtures(rows), some,
+                own[1], constants(own[:2])[1], own[2], *mixtures, some,
             )  # fmt: skip
             total[rows] = some
         return total
@@ -244,15 +247,14 @@ class Screen:
         values = candidate.values(_LATE_SHARE)
         packed = pack([with_effect(fitted.parameters, candidate.name, values)], self.scene.arena)
         toward, angle = late_sight(self.scene, packed, fitted.view.late)
-        tables, total = self._tables, np.zeros(len(self.scene.turns))
-        for x, zone in zip(fitted.x, fitted.turns, strict=True):
+        total = np.zeros(len(self.scene.turns))
+        for x, zone, mixtures in zip(fitted.x, fitted.turns, self._mixtures, strict=True):
             rows, own = zone.rows, x[:3] * SCALES
             some = np.empty(len(rows))
             late_score(
                 (fitted.view.toward[rows], fitted.view.angle_sr[rows]),
                 (toward[rows], angle[rows]), zone.taken,
-                own[1], constants(own[:2])[1], _LATE_SHARE * own[2],
-                *tables.mixtures(rows), some,
+                own[1], constants(own[:2])[1], _LATE_SHARE * own[2], *mixtures, some,
             )  # fmt: skip
             total[rows] = some
         return total / _LATE_SHARE
@@ -323,7 +325,6 @@ class Screen:
 
     def _ask_speed(self, candidate: Candidate) -> Score:
         effect, moves = candidate.effect, self.scene.moves
-        stopping = any(name == "freezing" for name in self.fitted.parameters.effects)
         if effect.stops:
             return self._ask_rests(candidate)
         probe = replace(
@@ -332,17 +333,23 @@ class Screen:
         )
         factor = self.speed_factor(pack([probe], self.scene.arena))
         cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
-        response = self.own_speeds
-        response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
-        kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
-        cue, response = centred(cue, moves.zone, kept), centred(response, moves.zone, kept)
-        cue = tame(cue)
+        kept, response = self._response
+        cue = tame(centred(cue, moves.zone, kept))
         score, squares = summed(candidate, cue * response), float((cue**2).sum())
         # A factor exp(s cue) changes the speed by s cue times its mean.
         unit = float(self.own_speeds[kept].mean()) if kept.any() else 1.0
         return replace(
             score, strength=score.strength * score.information / max(squares * unit, 1e-300)
         )
+
+    @cached_property
+    def _response(self) -> tuple[NDArray[np.bool_], Floats]:
+        """Which moves count for effects on speed, and their speeds less the zone's mean."""
+        moves, response = self.scene.moves, self.own_speeds
+        stopping = "freezing" in self.fitted.parameters.effects
+        kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
+        response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
+        return kept, centred(response, moves.zone, kept)
 
     def _ask_rests(self, candidate: Candidate) -> Score:
         """Return how many more steps at rest follow on steps at rest than short draws make."""

@@ -23,6 +23,7 @@ from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.together import together
 
 Floats = NDArray[np.float64]
 Told = Callable[[str, int, int], None]
@@ -226,9 +227,12 @@ class Selector:
         open_ = [best for best in ranked if best.score.candidate.name not in taken]
         suspects = _in_reach([best for best in open_ if best.p < LEVEL])[:_SUSPECTS]
         worth = bool(suspects) or (self.suspicious and not done)
-        rivals = self._rivals(screen, taken) if worth else []
         least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
-        listed = self._refits(screen, suspects, least)
+        listed, rivals = together(
+            lambda: self._refits(screen, suspects, least),
+            lambda: self._rivals(screen, taken) if worth else [],
+            n_workers=self.n_workers,
+        )
         generic = self._refits(screen, rivals, least)
         if not listed and not generic:
             return None

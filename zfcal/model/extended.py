@@ -95,18 +95,20 @@ def maximise(
     return climb.finish(here)
 
 
-def nats_at(scene: Scene, parameters: Parameters, start: Sequence[Floats]) -> float:
-    """Return the log likelihood of all turns at a point.
+def nats_at(
+    scene: Scene, models: Sequence[Parameters], start: Sequence[Floats]
+) -> tuple[float, ...]:
+    """Return the log likelihood of all turns under models that differ in their effects.
 
     Parameters
     ----------
-    parameters
-        The model, with its effects.
+    models
+        With their effects; one at least.
     start
         Per zone, as `zone_scores` takes it.
     """
-    climb = _Climb(scene=scene, free=(), seen=view_of(scene, without_effects(parameters)))
-    return float(np.nansum(climb.log_p(parameters, start)))
+    climb = _Climb(scene=scene, free=(), seen=view_of(scene, without_effects(models[0])))
+    return tuple(float(np.nansum(climb.log_p(model, start))) for model in models)
 
 
 def without_effects(parameters: Parameters) -> Parameters:
