@@ -1,10 +1,13 @@
 """The driver and its line, over real pseudo-terminals with a robot that is a process."""
 
+import contextlib
 import itertools
 import os
+import pty
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -99,6 +102,60 @@ def test_a_robot_that_was_unplugged_is_found_again(start_virtual, until):
     bot.listen()
     bot.close()
     assert until(lambda: events.list_nodes().encode().hex() in heard(robot))
+
+
+WRITER = """
+import sys, time
+from zfcal.robot.port import SerialLine
+line = SerialLine(sys.argv[1])
+assert line.wait(5.0)
+print("open", flush=True)
+end_s, went = time.monotonic() + 3.0, []
+while time.monotonic() < end_s:
+    went.append(line.write(bytes(10)))
+print(went.count(False), line.n_opened, len(went), flush=True)
+"""
+
+
+def test_a_driver_that_is_held_up_does_not_lose_its_line():
+    """Stopped for longer than a write may take, in the middle of writes, again and again."""
+    master, slave = pty.openpty()
+    threading.Thread(target=drained, args=(master,), daemon=True).start()
+    command = [sys.executable, "-c", WRITER, os.ttyname(slave)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
+        assert writer.stdout.readline() == "open\n"
+        while writer.poll() is None:
+            writer.send_signal(signal.SIGSTOP)
+            time.sleep(0.08)
+            writer.send_signal(signal.SIGCONT)
+            time.sleep(0.02)
+        failed, opened, written = map(int, writer.stdout.readline().split())
+    os.close(slave)
+    assert written > 100
+    assert (failed, opened) == (0, 1)
+
+
+def drained(master):
+    """Read what comes, for ever."""
+    with contextlib.suppress(OSError):
+        while os.read(master, 65536):
+            pass
+
+
+def test_a_line_that_takes_nothing_is_lost_soon():
+    """Nobody reads at the other end: once it is full, a write fails in a fraction of a second."""
+    master, slave = pty.openpty()
+    line = SerialLine(os.ttyname(slave))
+    assert line.wait(5.0)
+    for _ in range(100_000):
+        began_s = time.monotonic()
+        if not line.write(bytes(10)):
+            break
+    assert time.monotonic() - began_s < 1.0
+    assert "timeout" in line.problem
+    line.close()
+    for end in (master, slave):
+        os.close(end)
 
 
 def test_silence_stops_the_robot(line):

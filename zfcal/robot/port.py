@@ -7,6 +7,7 @@ its own; who writes meanwhile is told at once that there is no line.
 from __future__ import annotations
 
 import contextlib
+import select
 import subprocess
 import sys
 import threading
@@ -23,7 +24,7 @@ T = TypeVar("T")
 BAUD = 115200
 RETRY_S = 0.25
 _WRITE_S = 0.05
-"""A write that takes longer has nobody at the other end."""
+"""A line that takes no byte for longer has nobody at the other end."""
 
 
 class Line(Protocol):
@@ -90,7 +91,7 @@ class SerialLine:
     def write(self, data: bytes) -> bool:
         """Send bytes; return whether they went."""
         with self._lock:
-            return self._attempt(lambda port: port.write(data)) == len(data)
+            return self._attempt(lambda port: _write(port, data)) == len(data)
 
     def read(self) -> bytes:
         """Return what has come, maybe nothing."""
@@ -141,9 +142,7 @@ class SerialLine:
 
     def _open(self) -> bool:
         try:
-            opened = serial.Serial(
-                self.port, BAUD, timeout=0, write_timeout=_WRITE_S, exclusive=True
-            )
+            opened = serial.Serial(self.port, BAUD, timeout=0, write_timeout=0, exclusive=True)
         except (OSError, ValueError, serial.SerialException) as error:
             self.problem = str(error)
             return False
@@ -155,6 +154,26 @@ class SerialLine:
             self._serial = opened
             self.n_opened += 1
         return True
+
+
+def _write(port: serial.Serial, data: bytes) -> int:
+    """Write all of it and return its length, or raise once the line has taken nothing for a while.
+
+    The write timeout of pyserial is by the clock: it would lose the line of a driver that was
+    itself held up, though every byte had gone.
+    """
+    written = 0
+    while written < len(data):
+        # The second look is for a driver that was held up while it waited.
+        if not (_takes(port, _WRITE_S) or _takes(port, 0.0)):
+            raise serial.SerialTimeoutException("Write timeout")
+        written += port.write(data[written:]) or 0
+    return written
+
+
+def _takes(port: serial.Serial, patience_s: float) -> bool:
+    """Wait until the line takes bytes, or patience ends; return whether it does."""
+    return bool(select.select([], [port.fileno()], [], patience_s)[1])
 
 
 def _guardian_of(descriptor: int) -> subprocess.Popen[bytes]:
