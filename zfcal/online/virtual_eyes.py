@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from typing import final
 
 import cv2
@@ -57,10 +58,22 @@ class Drawn:
 
     def images(self, truth: FramePoses) -> tuple[bytes, bytes]:
         """Return the images of a frame from above and from below, as JPEG files."""
+        moment = self.moment(truth)
+        return self.above(moment), self.below(moment)
+
+    def moment(self, truth: FramePoses) -> Moment:
+        """Return how everybody lies in a frame; frames come in their order."""
         self._past.append(truth)
         swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
-        moment = swum.at(len(swum) - 1)
-        return self._encoded(self._above, moment), self._encoded(self._under, moment)
+        return swum.at(len(swum) - 1)
+
+    def above(self, moment: Moment) -> bytes:
+        """Return the image from above, as a JPEG file."""
+        return self._encoded(self._above, moment)
+
+    def below(self, moment: Moment) -> bytes:
+        """Return the image from below, as a JPEG file."""
+        return self._encoded(self._under, moment)
 
     def _encoded(self, painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
         return encoded(painter.paint(moment), self._look.jpeg_quality)
@@ -93,6 +106,8 @@ class VirtualEyes:
         )
         mask = (region_of(arena, under) * np.uint8(255)).astype(np.uint8)
         self._finder = RobotFinder(LedOptions(), under, mask=mask)
+        # Both cameras have nothing to do with each other, and OpenCV lets others run.
+        self._beside = ThreadPoolExecutor(1, "camera-below")
         self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
 
     @property
@@ -102,17 +117,21 @@ class VirtualEyes:
 
     def see(self, truth: FramePoses) -> FramePoses:
         """Return what the tracker makes of the images of a frame."""
-        above, under = (
-            Frame(number=truth.frame, time_s=truth.time_s, image=decoded(data))
-            for data in self._drawn.images(truth)
+        moment = self._drawn.moment(truth)
+        robot = self._beside.submit(
+            lambda: self._finder.step(_frame(truth, self._drawn.below(moment)))
         )
-        seen = self._tracker.step(above)
-        agents = self._fuser.step(seen, self._finder.step(under), truth.time_s)
+        seen = self._tracker.step(_frame(truth, self._drawn.above(moment)))
+        agents = self._fuser.step(seen, robot.result(), truth.time_s)
         return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)
 
     def take_bad(self) -> tuple[str, ...]:
         """Return what was wrong with the last frame."""
         return tuple(bad.reason for bad in self._tracker.take_bad_frames())
+
+
+def _frame(truth: FramePoses, data: bytes) -> Frame:
+    return Frame(number=truth.frame, time_s=truth.time_s, image=decoded(data))
 
 
 def _nobody() -> Moment:
