@@ -70,13 +70,14 @@ class Forks:
 def load():
     """Import what commands import only when they run, and load the kernels."""
     from brief import LESS
-    from warming import count
+    from warming import count, estimate
 
     for name in STAGES:
         import_module(f"zfcal.online.{name}")
     settings = import_module("zfcal.calibrate.task").Settings
     settings.__init__.__kwdefaults__.update(LESS)
     count(3)
+    estimate()
 
 
 def carry_out(words, cwd):

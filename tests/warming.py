@@ -44,6 +44,17 @@ def count(n_agents):
     )
 
 
+def estimate():
+    """Estimate the most likely parameters of a few fish, as a round does before its search."""
+    from zfcal.model.likelihood import fit
+    from zfcal.model.simulate import simulate_tracks
+    from zfcal.model.steps import steps_of
+
+    tank, fish = tank_and_fish()
+    xy_m, _ = simulate_tracks(fish, tank, n_agents=3, n_steps=200, seed=1)
+    fit(steps_of(_samples(xy_m), tank, fov_rad=fish.fov_rad), tank, fish)
+
+
 def observer():
     """Make a trial of the second simulator; draw one step; ask a short recording."""
     sys.path.insert(0, str(TESTS))
@@ -77,10 +88,20 @@ def _one_recording(xy_m):
     from zfcal.diagnose.screening import Screen, ask_all
     from zfcal.model.extended import maximise
     from zfcal.model.scene import make_scene
-    from zfcal.tracks import FISH, Samples
 
     tank, fish = tank_and_fish()
-    samples = Samples(
+    scene = make_scene(_samples(xy_m), tank)
+    screen = Screen(scene=scene, fitted=maximise(scene, fish))
+    family = candidates_of(askable(scene, fish)[0], tank)
+    kinds = {each.name: each for each in family}
+    ask_all(screen, list(kinds.values()), 1)
+
+
+def _samples(xy_m):
+    """Return where fish are at each step, shape (step, fish, 2), as samples of a recording."""
+    from zfcal.tracks import FISH, Samples
+
+    return Samples(
         dt_s=DT_S,
         k=np.arange(len(xy_m), dtype=np.int64),
         agent=np.arange(xy_m.shape[1], dtype=np.int32),
@@ -88,11 +109,6 @@ def _one_recording(xy_m):
         xy_m=xy_m,
         confidence=np.ones(xy_m.shape[:2], dtype=np.float32),
     )
-    scene = make_scene(samples, tank)
-    screen = Screen(scene=scene, fitted=maximise(scene, fish))
-    family = candidates_of(askable(scene, fish)[0], tank)
-    kinds = {each.name: each for each in family}
-    ask_all(screen, list(kinds.values()), 1)
 
 
 PARTS = {"simulator": simulator, "observer": observer}

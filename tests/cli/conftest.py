@@ -8,6 +8,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -113,6 +114,23 @@ def write_tracks():
                 x, y = xy_m[frame, agent]
                 lines.append(f"{frame / 5:.1f},{agent},{kind},{x:.4f},{y:.4f}")
         path.write_text("\n".join(lines) + "\n")
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def write_film(drawn_tank):
+    """Return what writes a video at 5 Hz: three bodies on a circle, 24 s a round."""
+
+    def write(path, *, seconds):
+        paths = drawn_tank.circling(120, turn=2 * np.pi / 120)
+        images = [frame.image for frame in drawn_tank.frames(paths)]
+        code = cv2.VideoWriter.fourcc(*"FFV1")
+        writer = cv2.VideoWriter(str(path), code, 5.0, (200, 200), isColor=False)
+        for k in range(5 * seconds):
+            writer.write(images[k % 120])
+        writer.release()
         return path
 
     return write

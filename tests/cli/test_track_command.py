@@ -8,8 +8,6 @@ import signal
 import subprocess
 import time
 
-import cv2
-import numpy as np
 import pytest
 
 from zfcal.artifacts.mcap_files import overview
@@ -22,17 +20,9 @@ CORNERS = "-0.5,199.5 199.5,199.5 199.5,-0.5 -0.5,-0.5"
 
 
 @pytest.fixture(scope="module")
-def film(tmp_path_factory, drawn_tank):
-    """Return a video of 125 s at 5 Hz: three bodies on a circle, 24 s a round."""
-    path = tmp_path_factory.mktemp("film") / "day3.avi"
-    paths = drawn_tank.circling(120, turn=2 * np.pi / 120)
-    images = [frame.image for frame in drawn_tank.frames(paths)]
-    code = cv2.VideoWriter.fourcc(*"FFV1")
-    writer = cv2.VideoWriter(str(path), code, 5.0, (200, 200), isColor=False)
-    for k in range(625):
-        writer.write(images[k % 120])
-    writer.release()
-    return path
+def film(tmp_path_factory, write_film):
+    """Return a video of 125 s, whose bodies keep apart."""
+    return write_film(tmp_path_factory.mktemp("film") / "day3.avi", seconds=125)
 
 
 @pytest.fixture
