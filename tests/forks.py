@@ -70,7 +70,7 @@ class Forks:
 def load():
     """Import what commands import only when they run, and load the kernels."""
     from brief import LESS
-    from warming import count, estimate
+    from warming import count, estimate, tracker
 
     for name in STAGES:
         import_module(f"zfcal.online.{name}")
@@ -78,6 +78,7 @@ def load():
     settings.__init__.__kwdefaults__.update(LESS)
     count(3)
     estimate()
+    tracker()
 
 
 def carry_out(words, cwd):

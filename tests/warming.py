@@ -47,12 +47,20 @@ def count(n_agents):
 def estimate():
     """Estimate the most likely parameters of a few fish, as a round does before its search."""
     from zfcal.model.likelihood import fit
-    from zfcal.model.simulate import simulate_tracks
     from zfcal.model.steps import steps_of
 
     tank, fish = tank_and_fish()
-    xy_m, _ = simulate_tracks(fish, tank, n_agents=3, n_steps=200, seed=1)
+    # Not simulated: that is another part.
+    steps_m = np.random.default_rng(1).normal(0.0, 0.004, (200, 3, 2))
+    xy_m = np.array([0.24, 0.77]) + np.clip(np.cumsum(steps_m, axis=0), -0.05, 0.05)
     fit(steps_of(_samples(xy_m), tank, fov_rad=fish.fov_rad), tank, fish)
+
+
+def tracker():
+    """Do what a tracker does before its first frame."""
+    from zfcal.vision.fitting import prepare
+
+    prepare()
 
 
 def observer():
@@ -111,7 +119,7 @@ def _samples(xy_m):
     )
 
 
-PARTS = {"simulator": simulator, "observer": observer}
+PARTS = {"simulator": simulator, "observer": observer, "estimate": estimate, "tracker": tracker}
 
 if __name__ == "__main__":
     PARTS[sys.argv[1]]()

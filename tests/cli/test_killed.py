@@ -6,6 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
+from zfcal.artifacts.mcap_files import overview
+
 KILLS = 20
 
 # A round of a second, so that kills fall into estimates, searches, conclusions and writes.
@@ -25,6 +27,16 @@ def contents(root):
         path.relative_to(root).as_posix(): path.read_bytes()
         for path in root.rglob("*")
         if path.is_file() and not path.name.startswith(".")
+    }
+
+
+def whole_minutes(root):
+    """Return when each minute's tracks and poses were written, where both are whole."""
+    pairs = ((path, root / "poses" / f"{path.stem}.mcap") for path in root.glob("tracks/*.parquet"))
+    return {
+        tracks.stem: (tracks.stat().st_mtime_ns, poses.stat().st_mtime_ns)
+        for tracks, poses in pairs
+        if poses.exists() and overview(poses).whole
     }
 
 
@@ -74,21 +86,26 @@ def test_a_command_killed_twenty_times_ends_in_the_same_bytes(forks, tmp_path, b
     undisturbed = contents(root)
 
     rng = np.random.default_rng(seed)
-    searching, has_ended, takes_s = [], True, math.inf
+    searching, n_growing, has_ended, takes_s = [], 0, True, math.inf
     while len(searching) < KILLS:
         if has_ended:
             # The first run may have compiled something.
             takes_s = min(takes_s, forks.took_s)
             shutil.rmtree(root)
             shutil.copytree(start, root)
+        minutes = whole_minutes(root)
         has_ended = forks.run(tmp_path, words, kill_after_s=rng.uniform(0.0, 0.9) * takes_s)
         if not has_ended:
             searching.append(any(root.glob("models/.*.checkpoint")))
+            n_growing += any(not overview(path).whole for path in root.glob("poses/*.mcap"))
+        # It goes on where it was: what is whole is not made again.
+        assert minutes.items() <= whole_minutes(root).items()
         found = {k: v for k, v in contents(root).items() if has_ended or not k.startswith("poses")}
         assert all(undisturbed[name] == found[name] for name in found)
     assert forks.run(tmp_path, words)
     assert contents(root) == undisturbed
     assert not list(root.rglob(".*part-*"))
+    assert n_growing >= 4 * (words == TRACK)
     if words == CALIBRATE:
         # Before a round's first checkpoint it estimates what is most likely.
         assert all(b"[result.likelihood" in undisturbed[f"models/{s:06d}.toml"] for s in (120, 180))

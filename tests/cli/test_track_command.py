@@ -1,16 +1,11 @@
-"""`zfcal track` as a command: paths, exit codes, pipes, and being killed."""
+"""`zfcal track` as a command: paths, exit codes and pipes."""
 
 import contextlib
 import json
-import os
 import shutil
-import signal
-import subprocess
-import time
 
 import pytest
 
-from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.tables import read_tracks
 from zfcal.vision.seen import METHODS
 from zfcal_cli import tracking
@@ -47,12 +42,6 @@ def tracked(film, tmp_path_factory):
     return place
 
 
-def files(root):
-    """Return the bytes of poses and tracks by their name."""
-    found = [*root.glob("tracks/*.parquet"), *root.glob("poses/*.mcap")]
-    return {path.relative_to(root).as_posix(): path.read_bytes() for path in found}
-
-
 def test_paths_go_out_and_talk_goes_to_the_other_stream(zfcal, tank, film):
     """Tracks and poses of each minute; the second time they are up to date."""
     names = [
@@ -76,27 +65,6 @@ def test_numbers_go_out_as_json(zfcal, tank, film):
     assert numbers["gaps"] == 0
     assert numbers["latency_ms"]["p95"] > 0
     assert [a["state"] for a in document["artifacts"]] == ["made", "made"]
-
-
-def test_a_killed_run_goes_on_and_ends_in_the_same_bytes(
-    zfcal, tank, film, tracked, command, tmp_path
-):
-    """By kill -9, in the second minute."""
-    running = subprocess.Popen(
-        [*command, *words(film)], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    growing, until = tank / "poses" / "000060.mcap", time.monotonic() + 60
-    while not (growing.exists() and growing.stat().st_size > 9000) and time.monotonic() < until:
-        time.sleep(0.005)
-    os.kill(running.pid, signal.SIGKILL)
-    running.wait()
-    assert not overview(growing).whole
-    again = zfcal(*words(film))
-    assert again.code == 0
-    assert "2 up to date" in again.err
-    went_on = files(tank)
-    assert len(went_on) == 6
-    assert files(tracked / "trial") == went_on
 
 
 def test_paths_go_through_a_pipe(zfcal, film, tracked, process, tmp_path):
