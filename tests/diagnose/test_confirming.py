@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from zfcal.diagnose.confirming import confirm, half_of, halves, is_steady
+from zfcal.diagnose.confirming import confirm, half_of, halves, is_shared, is_steady
 from zfcal.diagnose.naming import choose, refit
 from zfcal.diagnose.scores import summed
 from zfcal.diagnose.screening import Screen
@@ -169,6 +169,63 @@ def test_what_differs_between_times_by_nature_may_do_so(screen, candidate, name)
     """Individuals are near a door at times, rests go on, and some effects have their times."""
     score, scene = scores_at(screen, candidate(name), lambda t: t % 300 < 60, strength=1.0)
     assert is_steady(score, scene)
+
+
+def of_fish(screen, candidate, strengths, seed=5):
+    """Return scores of unit spread on a recording's turns, of a strength for each fish."""
+    scene = screen(11).scene
+    draws = np.random.default_rng(seed).normal(size=len(scene.turns))
+    who = np.unique(scene.turns.track, return_inverse=True)[1]
+    return summed(candidate, draws + np.array(strengths)[who]), scene
+
+
+def test_an_effect_on_all_fish_is_shared(screen, candidate):
+    """Of either sign, though half as strong in some, in all of twenty."""
+    bias = candidate("turning-bias")
+    for seed in range(20):
+        for sign in (1, -1):
+            strengths = sign * np.linspace(0.05, 0.1, 5)
+            score, scene = of_fish(screen, bias, strengths, seed)
+            assert is_shared(score, scene)
+
+
+def test_an_effect_of_one_fish_is_not(screen, candidate):
+    """However clear, on either side; in at most 12 of 200, of which chance makes one in forty."""
+    bias, shared = candidate("turning-bias"), 0
+    for seed in range(200):
+        sign = 1 if seed % 2 else -1
+        score, scene = of_fish(screen, bias, [0, 0, sign * 0.3, 0, 0], seed)
+        assert sign * score.z > 4
+        shared += is_shared(score, scene)
+    assert shared <= 12
+
+
+def test_effects_of_all_fish_that_add_up_to_nothing_are_not_shared(screen, candidate):
+    """Fish that differ to both sides: without the one, the others say the opposite."""
+    score, scene = of_fish(screen, candidate("turning-bias"), [0.3, -0.1, 0.1, -0.1, 0.0])
+    assert not is_shared(score, scene)
+
+
+@pytest.mark.parametrize("name", ["boldness", "freezing"])
+def test_what_one_fish_may_have_alone_is_not_asked_of_others(screen, candidate, name):
+    """Individuals differ by the effect's own sentence, and one may rest."""
+    score, scene = of_fish(screen, candidate(name), [0, 0, 0.3, 0, 0])
+    assert is_shared(score, scene)
+
+
+def test_beside_individuals_that_differ_an_effect_must_be_shared(screen, candidate):
+    """A model with boldness asks the other fish as well; a model without it does not."""
+    bias = candidate("turning-bias")
+    plain = screen(23, {"turning-bias": {"strength": 0.4}}, minutes=4.0)
+    bold = added(plain, candidate("boldness")).choice.best.screen
+    track = plain.scene.turns.track
+    draws = np.random.default_rng(5).normal(size=len(track))
+    of_one = summed(bias, draws + 0.3 * (track == track[0]))
+    for before, holds in ((plain, True), (bold, False)):
+        step = added(before, bias)
+        assert alone(step).holds
+        step = dataclasses.replace(step, best=Best(score=of_one, z=of_one.z, p=0.0))
+        assert alone(step).holds == holds
 
 
 def test_what_comes_and_goes_is_not_named(screen, candidate):

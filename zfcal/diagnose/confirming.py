@@ -3,6 +3,7 @@
 Blocks of 60 s alternate between two halves. Both models are fitted to one half and
 judged on the other, and the other way round. A listed effect is there all the time: one
 whose strength differs between minutes, or seconds, by more than its mean is another one.
+Beside individuals that differ an effect is there in more than one of them.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.scores import Score
+from zfcal.diagnose.scores import Score, by_track
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
+from zfcal.model.effects import find_effect
 from zfcal.model.effects.generic import PREFIX
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import MIN_STEPS, Fitted
@@ -31,6 +33,9 @@ BLOCK_S = 60.0
 _ROUNDS = 6
 _SURE = 2.0
 _LEAST_VARIANCE = 1e-12
+
+_OF_OTHERS = 2.0
+"""Standard errors that are left of an effect without the fish that asks for it most."""
 
 _WAVERS_S = (60.0, 10.0)
 _WAVERS = 3e-3
@@ -47,7 +52,8 @@ class Confirmed:
         Mean over all steps of the log density with it less that without it, and the
         standard error of that mean.
     holds
-        Whether the gain is more than two standard errors.
+        Whether the gain is more than two standard errors, and, beside individuals that differ,
+        not that of one fish.
     steady
         Whether the effect is there all the time.
     """
@@ -112,7 +118,38 @@ def _confirmed(step: Step, halves_of: Mapping[int, tuple[_Half, _Half]]) -> Conf
     else:
         before, after = halves_of[id(step.before)], halves_of[id(best.screen)]
         told = _summary(_held_out(step.before.scene, after) - _held_out(step.before.scene, before))
-    return replace(told, steady=is_steady(step.best.score, step.before.scene))
+    score, scene = step.best.score, step.before.scene
+    holds = told.holds and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
+    return replace(told, holds=holds, steady=is_steady(score, scene))
+
+
+def _tells_apart(fitted: Fitted) -> bool:
+    """Return whether individuals differ in a model."""
+    return any(find_effect(name).individual for name in fitted.parameters.effects)
+
+
+def is_shared(score: Score, scene: Scene) -> bool:
+    """Return whether others than the fish that asks for an effect most ask for it as well.
+
+    Where individuals differ in another way than the model says, what is left over is that of
+    the fish that differs most. It looks like an effect on all, and is none.
+
+    Parameters
+    ----------
+    score
+        Of the effect in the model without it. Individuals and rests are as they are.
+    scene
+        Whose steps the score is of.
+    """
+    effect = score.candidate.effect
+    if effect.individual or effect.stops:
+        return True
+    track = (scene.moves if effect.on_speed else scene.turns).track
+    sums, information = by_track(track, score.steps)
+    total = float(sums.sum())
+    others = information.sum() - information
+    left = np.sign(total) * (total - sums) / np.sqrt(np.maximum(others, 1e-300))
+    return bool(left.min(initial=np.inf) > _OF_OTHERS)
 
 
 def _of_speeds(step: Step) -> Confirmed:
