@@ -1,5 +1,6 @@
 """Efficient scores: standard normal without an effect, large with it, blind to the base."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from zfcal.diagnose.scores import by_track, centred, excess_deviate, normal_devi
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
+from zfcal.model.kernels.world import X, Y
 
 
 def family(screen, arena):
@@ -232,3 +234,20 @@ def test_a_surplus_of_rests_is_no_more_frequent_than_it_says():
     counts = np.random.default_rng(5).poisson(3.0, 20_000)
     z = np.array([excess_deviate(float(n), 3.0) for n in range(counts.max() + 1)])[counts]
     assert (z > 2.0).mean() < 0.023
+
+
+def test_a_room_in_which_fish_swim_faster_is_one_place(worlds, tank):
+    """By a tenth in the upper left half: no narrow place stands out as a wide one does."""
+    scene, fitted = worlds.fitted_scene(worlds.base_walk(13, minutes=10))
+    moves = scene.moves
+    x, y = (scene.states[moves.at, row, moves.who] for row in (X, Y))
+    speed = moves.speed_m_s * np.where(y > x, 1.1, 1.0)
+    lit = dataclasses.replace(scene, moves=dataclasses.replace(moves, speed_m_s=speed))
+    own = Screen(scene=lit, fitted=fitted)
+    shapes = candidates_of((find_effect("generic:speed:place"),), tank)
+
+    z = np.array([abs(own.ask(each).z) for each in shapes])
+
+    wide = np.array([each.shape["reach_m"] > 0.3 for each in shapes])
+    assert z[wide].max() > 8.0
+    assert z[~wide].max() < 0.85 * z[wide].max()

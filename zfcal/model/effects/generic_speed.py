@@ -95,6 +95,11 @@ def own_speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untype
     return times_faster(parameters[0] * quick(state[SPEED * n + i]))
 
 
+_N_WIDE = 4
+_WIDE_M = 0.35
+"""A place as wide as a room: narrow ones in it would share between them what it explains."""
+
+
 def _anywhere(_company: Company) -> str | None:
     return None
 
@@ -108,6 +113,12 @@ def _times(_arena: Arena) -> Shapes:
         {"from_s": from_s, "for_s": 120.0, "every_s": 480.0}
         for from_s in (0.0, 120.0, 240.0, 360.0)
     )
+
+
+def _places(arena: Arena) -> Shapes:
+    narrow = [{"x_m": x, "y_m": y} for x, y in places(arena)]
+    wide = [{"x_m": x, "y_m": y, "reach_m": _WIDE_M} for x, y in places(arena, _N_WIDE)]
+    return (*narrow, *wide)
 
 
 def _effect(
@@ -133,7 +144,7 @@ def _effect(
 _ASKED: dict[str, Callable[[Arena], Shapes]] = {
     "neighbour-distance": _each("preferred_m", 0.05, 0.12, 0.25),
     "wall": _each("reach_m", 0.025, 0.05, 0.1),
-    "place": lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
+    "place": _places,
     "time": _times,
 }
 
