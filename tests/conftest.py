@@ -43,7 +43,7 @@ def pytest_configure(config):
     script = Path(__file__).with_name("warming.py")
     started = [
         subprocess.Popen([sys.executable, script, part], cwd=REPOSITORY)
-        for part in ("simulator", "observer")
+        for part in ("simulator", "observer", "tracker")
     ]
     for process in started:
         process.wait()

@@ -45,6 +45,17 @@ def report(tmp_path, **environment):
     return done.stdout.split()
 
 
+_PLACES = """
+import sys
+from importlib import import_module
+for name in sys.argv[1:]:
+    import_module(name)
+from zfcal.model.kernels.random import seeded
+from zfcal.vision._kernels import moments
+print(seeded._cache._cache_path, moments._cache._cache_path)
+"""
+
+
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
     """Return a copy of the model's sources, of which the module takes itself for a part."""
@@ -124,6 +135,25 @@ def test_kernels_are_kept_and_a_second_start_is_warm(tmp_path):
     assert (first[0], first[1], first[3]) == ("True", "False", "True")
     assert second[:2] == ["True", "True"]
     assert first[2] == second[2]
+
+
+def test_other_kernels_keep_their_place_whoever_comes_first(tmp_path):
+    """The tracker's stand beside their source, the model's in its folder, in either order."""
+    names = ["zfcal.model.compiled", "zfcal.vision._kernels"]
+    kept = {k: v for k, v in os.environ.items() if k not in {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"}}
+    places = [
+        subprocess.run(
+            [sys.executable, "-c", _PLACES, *order],
+            env={**kept, "XDG_CACHE_HOME": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for order in (names, names[::-1])
+    ]
+    assert places[0] == places[1]
+    assert places[0][0].startswith(str(tmp_path / "zfcal"))
+    assert "kernels-" not in places[0][1]
 
 
 def test_where_nothing_can_be_written_kernels_run_all_the_same(tmp_path):

@@ -16,7 +16,8 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, final
 
@@ -59,15 +60,27 @@ def keeps(folder: Path | None) -> bool:
 
 def is_warm() -> bool:
     """Tell whether kernels were compiled before, so that a start takes no half minute."""
-    return KEPT and any(Path(_config.CACHE_DIR).rglob("*.nbi"))
+    return _folder is not None and KEPT and any(_folder.rglob("*.nbi"))
 
 
 _folder = cache_folder()
 KEPT = keeps(_folder)
 """Whether compiled kernels outlast the process."""
 
-if KEPT:
-    _config.CACHE_DIR = str(_folder)
+
+@contextmanager
+def _kept_here() -> Iterator[None]:
+    """Let what is compiled meanwhile be kept in the model's folder, and nothing else.
+
+    Other kernels would be kept here or elsewhere, depending on what was imported first, and
+    be compiled twice.
+    """
+    before = _config.CACHE_DIR
+    _config.CACHE_DIR = str(_folder) if KEPT else before
+    try:
+        yield
+    finally:
+        _config.CACHE_DIR = before
 
 
 @final
@@ -102,7 +115,8 @@ _register("numba:compile", _announcer)
 
 def kernel(function: F) -> F:
     """Compile a function by itself."""
-    compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy")(function)
+    with _kept_here():
+        compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy")(function)
     return _for_all_values(compiled)
 
 
@@ -113,7 +127,8 @@ def lean(function: F) -> F:
     a step three times as slow. Products and sums may be fused.
     """
     options: dict[str, Any] = {"fastmath": {"contract"}, "_nrt": False}
-    compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy", **options)(function)
+    with _kept_here():
+        compiled: Any = njit(cache=KEPT, nogil=True, error_model="numpy", **options)(function)
     return _for_all_values(compiled)
 
 
@@ -154,8 +169,13 @@ def hook(signature: Any) -> Callable[[F], Any]:
     if _config.DISABLE_JIT:
         # Plain Python has no addresses; effects are tested compiled.
         return _Plain
-    made: Any = cfunc(signature, cache=KEPT, error_model="numpy")
-    return made
+    compiles: Any = cfunc(signature, cache=KEPT, error_model="numpy")
+
+    def make(function: F) -> Any:
+        with _kept_here():
+            return compiles(function)
+
+    return make
 
 
 class _Plain:
