@@ -8,6 +8,7 @@ import pytest
 from zfcal.tracks import FISH, ROBOT
 from zfcal.vision.fusing import ALONE, GUESSED, Fuser
 from zfcal.vision.robot import RobotSeen
+from zfcal.vision.seen import Exchange
 
 
 @dataclass(frozen=True)
@@ -231,3 +232,21 @@ def test_a_fish_s_name_is_free_where_the_robot_is_seen_late():
 
     assert after == {0: FISH, 2: FISH, 3: ROBOT}
     assert later == {0: FISH, 1: FISH, 2: FISH, 3: ROBOT}
+
+
+def test_exchanges_are_told_in_the_names_of_fish():
+    """Of the tracker's ids; one with the robot's is none: its LEDs have told who it is."""
+    fuser = Fuser(keeps=True)
+    fuser.step(FOUR, robot(0.5, 0.5), 0.0)
+    asked = [Exchange(one=one, other=other, since_s=0.5) for one, other in ((7, 9), (7, 8), (9, 8))]
+    assert fuser.named(asked) == [Exchange(one=0, other=1, since_s=0.5)]
+
+
+def test_everybody_is_known_with_those_who_are_not_told():
+    """By name and by track, and the robot; so that a minute's tracks may tell them later."""
+    fuser = Fuser(keeps=True, break_s=STEP_S)
+    fuser.step([Blob(0, 0.1, 0.1, followed=5), FOUR[1]], robot(0.5, 0.5), 0.0)
+    after = [Blob(0, 0.9, 0.9, followed=6), FOUR[1]]
+    told = fuser.step(after, robot(0.5, 0.5, time_s=1 / 15), 1 / 15)
+    assert [agent.kind for agent in told] == [ROBOT]
+    assert [(a.track, a.pose.kind) for a in fuser.agents] == [(6, FISH), (8, ROBOT)]

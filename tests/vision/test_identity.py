@@ -147,6 +147,78 @@ def test_a_crowd_teaches_nothing():
     assert math.isnan(trail.darkness)
 
 
+def exchanges(film):
+    """Return what was exchanged when, in frames, and forget it."""
+    return [
+        ({told.one, told.other}, round(told.since_s * FPS)) for told in film.names.take_exchanges()
+    ]
+
+
+def test_an_exchange_says_when_the_two_crossed():
+    """Looks tell in 20 frames or so; the crossing was before, and is told once."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+    film.show({0: SMALL, 1: LARGE}, 30)
+
+    assert exchanges(film) == [({0, 1}, 61)]
+    assert exchanges(film) == []
+
+
+def test_the_likely_moment_of_an_encounter_counts():
+    """Not the last one of it, nor a likely one of long before."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 5, mixed={(0, 1): 0.06})
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.4})
+    film.show({0: SMALL, 1: LARGE}, 3, mixed={(0, 1): 0.06})
+    film.show({0: SMALL, 1: LARGE}, 60)
+
+    assert exchanges(film) == [({0, 1}, 127)]
+
+    film.show({0: SMALL, 1: LARGE}, 60, mixed={(0, 1): 0.02})
+    film.show({0: SMALL, 1: LARGE}, 1, mixed={(0, 1): 0.06})
+    film.show({0: LARGE, 1: SMALL}, 90)
+
+    assert exchanges(film) == [({0, 1}, 251)]
+
+
+def test_three_that_changed_places_are_put_right_by_two_crossings():
+    """The first with the second, the one there with the third: replayed, all told ids are right."""
+    looks = {"a": LARGE, "b": SMALL, "c": (60.0, 0.5)}
+    film = Film(3)
+    told = {}
+
+    def show(order, frames, **known):
+        for _ in range(frames):
+            ids = film.show({key: looks[who] for key, who in enumerate(order)}, 1, **known)
+            told[film.frame] = (order, [ids[key] for key in range(3)])
+            for each in film.names.take_exchanges():
+                swap = {each.one: each.other, each.other: each.one}
+                for frame, (_, names) in told.items():
+                    if each.since_s * FPS - 0.5 < frame < film.frame:
+                        names[:] = [swap.get(name, name) for name in names]
+
+    show("abc", 60)
+    show("bac", 1, mixed={(0, 1): 0.5})
+    show("bac", 2)
+    show("bca", 1, mixed={(1, 2): 0.5})
+    show("bca", 90)
+
+    for order, names in told.values():
+        assert names == ["abc".index(who) for who in order]
+
+
+def test_an_exchange_of_which_nobody_knows_the_moment_is_not_told():
+    """Two that never were near each other look like each other from now on."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60, mixed={(0, 1): 0.04})
+    assert film.show({0: SMALL, 1: LARGE}, 200, mixed={(0, 1): 0.04}) == {0: 1, 1: 0}
+    assert exchanges(film) == []
+
+
 def test_two_that_share_a_blob_from_the_start_are_learnt_when_they_part():
     """Nothing is known of either, so there is no doubt: their looks become theirs."""
     film = Film()

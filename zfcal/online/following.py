@@ -26,6 +26,7 @@ from zfcal.tracks import FramePoses
 from zfcal.vision.background import Background, background_of
 from zfcal.vision.frames import Frame
 from zfcal.vision.fusing import Fuser
+from zfcal.vision.hindsight import Hindsight
 from zfcal.vision.live import ArrivalClock, LiveCamera
 from zfcal.vision.overlay import Scene
 from zfcal.vision.region import region_of
@@ -76,6 +77,7 @@ class Following:
             keeps=plan.options.tracker.n_agents is not None,
             break_s=plan.opened.trial.longest_step_s,
         )
+        self._hindsight = Hindsight(plan.opened.trial.longest_step_s)
         self._outcome = Outcome(plan, self._numbers.tally, tell)
         if origins.is_live:
             origins = dataclasses.replace(origins, clock=self._said_clock)
@@ -85,6 +87,7 @@ class Following:
             lambda tracks: measured(plan.opened.trial, tracks),
             tell,
             task=task,
+            revise=self._hindsight.revise,
         )
         self._origins = origins
         self._recorders: dict[str, Recorder] = {}
@@ -118,6 +121,7 @@ class Following:
         try:
             for frame, seen in follow(tracker, self._frames(overhead, below)):
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
+                self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()))
                 self._take(frame, seen, bad, drawing)
         except BaseException:
             self._minutes.interrupt(self._end_s)
@@ -143,6 +147,7 @@ class Following:
             frame=frame.number,
             agents=self._fuser.step(seen, robot, frame.time_s),
         )
+        self._hindsight.note(frame.number, frame.time_s, self._fuser.agents)
         words = self._outcome.judge(frame, poses, bad, robot)
         self._minutes.add(poses, next_agent=self._fuser.next_agent, bad=words)
         self._end_s = frame.time_s + 1 / self._fps

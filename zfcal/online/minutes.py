@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import final
+from typing import TypeAlias, final
 
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
@@ -27,6 +27,9 @@ NEXT_KEY = "next_agent"
 """Extra metadata of a segment: the first agent id that is free after it."""
 
 _SLACK_S = 1e-6
+
+Revise: TypeAlias = Callable[[list[FramePoses]], list[FramePoses]]
+"""Returns a minute's frames as they are known at its end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,13 +73,15 @@ class Minutes:
         Where they come from.
     measure
         Returns what is to be known of a segment's tracks, such as their noise.
+    revise
+        Returns a minute's frames as they are known at its end; asked of each minute, in order.
     tell
         Hears of every file, when it is closed.
     task
         Whether to make everything again.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - one keyword for each of its surroundings
         self,
         opened: OpenTrial,
         origins: Origins,
@@ -84,9 +89,11 @@ class Minutes:
         tell: Tell,
         *,
         task: Task,
+        revise: Revise = list,
     ) -> None:
         self._opened = opened
         self._origins = origins
+        self._revise = revise
         self._measure = measure
         self._tell = tell
         self._task = task
@@ -166,10 +173,11 @@ class Minutes:
         if minute.writer is not None:
             minute.writer.close()
         self._seen.add(minute.start_s)
+        frames = self._revise(minute.frames)
         path = segment_path(root, minute.start_s)
         reason = self._reason(path)
         if reason:
-            tracks = tracks_of(minute.frames)
+            tracks = tracks_of(frames)
             extra: dict[str, JSON] = {
                 **self._measure(tracks),
                 BAD_KEY: dict(minute.bad),

@@ -16,6 +16,7 @@ from zfcal.vision.background import background_of
 from zfcal.vision.bodies import Bodies
 from zfcal.vision.frames import Frame, Image
 from zfcal.vision.fusing import Fuser
+from zfcal.vision.hindsight import Hindsight
 from zfcal.vision.look import USUAL, look_of
 from zfcal.vision.region import region_of
 from zfcal.vision.render import OverheadPainter
@@ -109,6 +110,7 @@ class VirtualEyes:
         # Both cameras have nothing to do with each other, and OpenCV lets others run.
         self._beside = ThreadPoolExecutor(1, "camera-below")
         self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
+        self._hindsight = Hindsight(trial.longest_step_s)
 
     @property
     def next_agent(self) -> int:
@@ -122,8 +124,14 @@ class VirtualEyes:
             lambda: self._finder.step(_frame(truth, self._drawn.below(moment)))
         )
         seen = self._tracker.step(_frame(truth, self._drawn.above(moment)))
+        self._hindsight.exchange(self._fuser.named(self._tracker.take_exchanges()))
         agents = self._fuser.step(seen, robot.result(), truth.time_s)
+        self._hindsight.note(truth.frame, truth.time_s, self._fuser.agents)
         return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)
+
+    def revise(self, frames: list[FramePoses]) -> list[FramePoses]:
+        """Return frames as they are known by now."""
+        return self._hindsight.revise(frames)
 
     def take_bad(self) -> tuple[str, ...]:
         """Return what was wrong with the last frame."""

@@ -21,7 +21,7 @@ from zfcal.artifacts.pose_files import POSES
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
 from zfcal.online.events import Tell, say_nothing
-from zfcal.online.minutes import Minutes, Origins
+from zfcal.online.minutes import Minutes, Origins, Revise
 from zfcal.online.opening import OpenTrial, Task, open_trial
 from zfcal.online.outcome import measured
 from zfcal.online.recording import TRACKS
@@ -224,6 +224,10 @@ class Eyes(Protocol):
         """Return what is seen of a frame."""
         ...
 
+    def revise(self, frames: list[FramePoses]) -> list[FramePoses]:
+        """Return a minute's frames as they are known at its end."""
+        ...
+
     def take_bad(self) -> tuple[str, ...]:
         """Return what was wrong with it."""
         ...
@@ -248,6 +252,10 @@ class Noisy:
         """Return a frame with noise, and without those that are lost."""
         return self._fish.tracked(truth)
 
+    def revise(self, frames: list[FramePoses]) -> list[FramePoses]:
+        """Return them as they are: ids are those of the truth."""
+        return frames
+
     def take_bad(self) -> tuple[str, ...]:
         """Return nothing: no frame is bad."""
         return ()
@@ -270,9 +278,9 @@ class Files:
     def __init__(self, experiment: Experiment, fish: VirtualFish, eyes: Eyes | None) -> None:
         self._experiment, self._fish, self._eyes = experiment, fish, eyes
         self._exact = self._minutes(experiment.tank)
-        self._tracked = None if eyes is None else self._minutes(experiment.trial)
+        self._tracked = None if eyes is None else self._minutes(experiment.trial, eyes.revise)
 
-    def _minutes(self, opened: OpenTrial) -> Minutes:
+    def _minutes(self, opened: OpenTrial, revise: Revise = list) -> Minutes:
         tracks = lineage_of_loop(TRACKS, self._experiment.options)
         origins = Origins(
             tracks=tracks, poses=dataclasses.replace(tracks, schema=POSES), is_live=True
@@ -283,6 +291,7 @@ class Files:
             lambda seen: measured(opened.trial, seen),
             say_nothing,
             task=Task(force=True),
+            revise=revise,
         )
 
     def add(self, truth: FramePoses) -> FramePoses:

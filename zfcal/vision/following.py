@@ -12,6 +12,7 @@ from zfcal.vision._kernels import nearest_squared, step_costs
 from zfcal.vision.assign import Match, assign
 from zfcal.vision.detect import Blob
 from zfcal.vision.identity import Identities
+from zfcal.vision.seen import Exchange
 from zfcal.vision.trail import Detection, Trail
 from zfcal.vision.usual import Bodies
 
@@ -205,6 +206,10 @@ class Trails:
             if time_s - trail.time_s <= self._coast_s
             and not (trail.missed and trail.hits < _PROVEN)
         ]
+
+    def take_exchanges(self) -> list[Exchange]:
+        """Return the exchanges of ids since this was last asked, and forget them."""
+        return [] if self._identities is None else self._identities.take_exchanges()
 
     def told(self, time_s: float) -> list[Trail]:
         """Return the tracks seen just now, ascending by id; the likeliest if they are too many.

@@ -7,13 +7,16 @@ gets an id of its own: an id belongs to one agent, of one kind.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol, final
 
 import numpy as np
 
 from zfcal.tracks import FISH, ROBOT, AgentPose
-from zfcal.vision.robot import NEAR_M, RobotSeen, nearest_blob
+from zfcal.vision.breaks import Breaks
+from zfcal.vision.robot import RobotSeen, nearest_blob
+from zfcal.vision.seen import Exchange
 
 ALONE = 0.6
 """Confidence of a robot that the camera below alone sees."""
@@ -23,9 +26,6 @@ GUESSED = 0.4
 
 _STAYS_M = 0.01
 """How much nearer to the LEDs than the robot's track another must be, to be the robot."""
-
-_SLACK_S = 1e-6
-"""What a difference of two times may be off by rounding."""
 
 _FORGET_S = 60.0
 """Far longer than any tracker keeps the id of an animal that it does not see."""
@@ -65,6 +65,23 @@ class Blob(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Named:
+    """An agent in a frame, and what the tracker followed.
+
+    Parameters
+    ----------
+    track
+        The same from frame to frame, whatever the agent's id; None where the camera below
+        alone saw it.
+    pose
+        The agent.
+    """
+
+    track: int | None
+    pose: AgentPose
+
+
 @final
 class Fuser:
     """Names the agents of one frame after the other.
@@ -78,21 +95,22 @@ class Fuser:
         a track that was a fish's turns out to be the robot's, its name goes over to the one
         that was taken for the robot.
     break_s
-        How long a fish is not told, in seconds, once its name has gone over to a track elsewhere:
-        the longest step of the model (`Trial.longest_step_s`), so that none spans the jump.
+        As of `Breaks`; for names that are kept.
 
     Attributes
     ----------
     next_agent
         The next id that is free.
+    agents
+        Everybody in the last frame, with those who were not told.
     """
 
     def __init__(self, first_agent: int = 0, *, keeps: bool = False, break_s: float = 0.0) -> None:
         self.next_agent = first_agent
         self._keeps = keeps
         self._free: list[int] = []
-        self._break_s = break_s - _SLACK_S
-        self._told: dict[int, tuple[int, float, float, float]] = {}
+        self._breaks = Breaks(break_s)
+        self.agents: tuple[Named, ...] = ()
         self._fish: dict[int, tuple[int, float]] = {}
         self._tidied_s = 0.0
         self._robot: int | None = None
@@ -115,14 +133,24 @@ class Fuser:
         which = None if robot is None else self._which(blobs, robot, time_s)
         self._take_robot(None if which is None else blobs[which].agent)
         self._forget(time_s)
-        agents = [
-            pose
-            for k, blob in enumerate(blobs)
-            if k != which and (pose := self._fish_pose(blob, time_s)) is not None
-        ]
+        agents = [self._fish_pose(blob, time_s) for k, blob in enumerate(blobs) if k != which]
         if robot is not None:
             agents += self._robot_pose(None if which is None else blobs[which], robot)
-        return tuple(sorted(agents, key=lambda agent: agent.agent))
+        self.agents = tuple(sorted(agents, key=lambda agent: agent.pose.agent))
+        return tuple(agent.pose for agent in self.agents if self._may_tell(agent, time_s))
+
+    def named(self, exchanges: Iterable[Exchange]) -> list[Exchange]:
+        """Return exchanges of the tracker's ids as those of fish's names, as they were just now."""
+        return [
+            replace(told, one=self._fish[told.one][0], other=self._fish[told.other][0])
+            for told in exchanges
+            if told.one in self._fish and told.other in self._fish
+        ]
+
+    def _may_tell(self, agent: Named, time_s: float) -> bool:
+        if not self._keeps or agent.track is None or agent.pose.kind != FISH:
+            return True
+        return self._breaks.may_tell(agent.pose, agent.track, time_s)
 
     def _take_robot(self, blob: int | None) -> None:
         """Take a track for the robot's; the fish that it was taken for is another one."""
@@ -163,16 +191,11 @@ class Fuser:
             }
             self._tidied_s = time_s
 
-    def _fish_pose(self, blob: Blob, time_s: float) -> AgentPose | None:
-        """Return a fish; None while its name has just come from elsewhere."""
+    def _fish_pose(self, blob: Blob, time_s: float) -> Named:
         known = self._fish.get(blob.agent)
         agent = self._name() if known is None else known[0]
         self._fish[blob.agent] = (agent, time_s)
-        if self._keeps:
-            if self._is_jump(agent, blob, time_s):
-                return None
-            self._told[agent] = (blob.track, time_s, blob.x_m, blob.y_m)
-        return AgentPose(
+        pose = AgentPose(
             agent=agent,
             kind=FISH,
             x_m=blob.x_m,
@@ -180,19 +203,12 @@ class Fuser:
             heading_rad=blob.heading_rad,
             confidence=blob.confidence,
         )
+        return Named(track=blob.track, pose=pose)
 
     def _name(self) -> int:
         return self._free.pop(0) if self._free else self._new()
 
-    def _is_jump(self, agent: int, blob: Blob, time_s: float) -> bool:
-        """Tell whether a name was told a moment ago of another track, elsewhere."""
-        if agent not in self._told:
-            return False
-        track, last_s, x_m, y_m = self._told[agent]
-        moved_m = math.hypot(blob.x_m - x_m, blob.y_m - y_m)
-        return track != blob.track and time_s - last_s < self._break_s and moved_m > NEAR_M
-
-    def _robot_pose(self, blob: Blob | None, robot: RobotSeen) -> list[AgentPose]:
+    def _robot_pose(self, blob: Blob | None, robot: RobotSeen) -> list[Named]:
         """Return the robot where it was seen: above if it can be, in the fish's own measure."""
         if blob is None and robot.is_lost:
             return []
@@ -203,13 +219,12 @@ class Fuser:
         else:
             confidence = min(blob.confidence, GUESSED) if robot.is_lost else blob.confidence
             x_m, y_m = blob.x_m, blob.y_m
-        return [
-            AgentPose(
-                agent=self._robot,
-                kind=ROBOT,
-                x_m=x_m,
-                y_m=y_m,
-                heading_rad=math.nan if robot.is_lost else robot.heading_rad,
-                confidence=confidence,
-            )
-        ]
+        pose = AgentPose(
+            agent=self._robot,
+            kind=ROBOT,
+            x_m=x_m,
+            y_m=y_m,
+            heading_rad=math.nan if robot.is_lost else robot.heading_rad,
+            confidence=confidence,
+        )
+        return [Named(track=None if blob is None else blob.track, pose=pose)]

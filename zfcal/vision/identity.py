@@ -5,11 +5,13 @@ track by identity, whose rows and columns each sum to one. A crossing mixes the 
 who may have changed places; what a track looks like, for as long as it is alone in its blob,
 speaks for identities that look the same (identity mass flow: Shin, Guibas & Zhao 2003). So
 ids are kept: a track that begins takes the identity of one that ended. It is causal: a change
-of places that looks tell of later is mended from then on, not in what was told before.
+of places that looks tell of later is mended from then on. When it should have been is told as
+well, for those who have kept what was told before.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import final
@@ -19,10 +21,12 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from zfcal.vision._kernels import balance
+from zfcal.vision.seen import Exchange
 from zfcal.vision.trail import Trail
 from zfcal.vision.usual import Body
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 WITHIN = (0.06, 0.035)
 """Spread of one fish's log area and log darkness over time, at first; learnt with the film."""
@@ -54,6 +58,12 @@ _SURE = 0.85
 _MEND = 4.5
 """Log odds from which ids are exchanged."""
 
+_LIKELY, _POSSIBLE = 0.3, 0.05
+"""Chances from which two are taken to have changed places just then."""
+
+_ENCOUNTER_S = 1.5
+"""For so long two are near each other: the likely moment counts more than the last one."""
+
 _LEAST = 1e-6
 _ROUNDS = 4
 
@@ -82,6 +92,10 @@ class Identities:
         self._within = np.array(WITHIN) ** 2 * _FAITH
         self._looks = float(_FAITH)
         self._time_s = -math.inf
+        self._crossed_s = {
+            chance: np.full((n_agents, n_agents), -math.inf) for chance in (_LIKELY, _POSSIBLE)
+        }
+        self._exchanges: list[Exchange] = []
 
     def step(
         self, trails: Sequence[Trail], mixed: dict[tuple[int, int], float], time_s: float
@@ -100,7 +114,7 @@ class Identities:
         rows = self._rows(trails, time_s)
         for (one, other), chance in mixed.items():
             if one in rows and other in rows:
-                self._mix(rows[one], rows[other], chance)
+                self._mix(rows[one], rows[other], chance, time_s)
         self._settle()
         dt_s = min(max(time_s - self._time_s, 0.0), _ALIKE_S)
         self._time_s = time_s
@@ -123,7 +137,8 @@ class Identities:
                 # Others might have been taken as well.
                 for other, far in zip(free, cost[k], strict=True):
                     if other != row and self._last[row] and self._last[other]:
-                        self._mix(row, other, 1 / (1 + math.exp(min(far - cost[k, column], 50.0))))
+                        chance = 1 / (1 + math.exp(min(far - cost[k, column], 50.0)))
+                        self._mix(row, other, chance, time_s)
                 self._keys[row] = new[k].key
                 rows[new[k].key] = row
         for trail in trails:
@@ -139,7 +154,10 @@ class Identities:
         reach = 10.0 + _REACH_PX_PER_S * (time_s - at_s)
         return float(np.hypot(*(trail.xy - xy))) / reach
 
-    def _mix(self, one: int, other: int, chance: float) -> None:
+    def _mix(self, one: int, other: int, chance: float, time_s: float) -> None:
+        for least, crossed_s in self._crossed_s.items():
+            if chance >= least:
+                crossed_s[one, other] = crossed_s[other, one] = time_s
         a, b = self._chance[one].copy(), self._chance[other].copy()
         self._chance[one] = (1 - chance) * a + chance * b
         self._chance[other] = (1 - chance) * b + chance * a
@@ -207,4 +225,32 @@ class Identities:
         rows, names = linear_sum_assignment(-likely)
         gain = likely[rows, names].sum() - likely[rows, self._name].sum()
         if gain > _MEND:
+            self._exchanges += self._exchanged(self._name, names)
             self._name = names
+
+    def _exchanged(self, before: Ints, after: Ints) -> list[Exchange]:
+        """Return which rows changed places when, the first one first; none where nobody knows."""
+        likely_s, possible_s = self._crossed_s[_LIKELY], self._crossed_s[_POSSIBLE]
+        since_s = np.where(likely_s > possible_s - _ENCOUNTER_S, likely_s, possible_s)
+        now, found = after.copy(), []
+        while (wrong := np.flatnonzero(now != before)).size:
+            # Taken back from the last one on; each puts one row right at least.
+            pairs = [
+                (since_s[a, b], a, b)
+                for a, b in itertools.combinations(wrong, 2)
+                if now[a] == before[b] or now[b] == before[a]
+            ]
+            at_s, a, b = max(pairs)
+            if math.isinf(at_s):
+                return []
+            found.append(Exchange(one=int(now[a]), other=int(now[b]), since_s=float(at_s)))
+            now[a], now[b] = now[b], now[a]
+        return found[::-1]
+
+    def take_exchanges(self) -> list[Exchange]:
+        """Return the exchanges of ids since this was last asked, and forget them.
+
+        In this order they put right what was told before: each from its time to now.
+        """
+        found, self._exchanges = self._exchanges, []
+        return found

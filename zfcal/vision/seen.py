@@ -109,6 +109,23 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Exchange:
+    """Two ids that went over to each other's animals, and since when they should have.
+
+    Parameters
+    ----------
+    one, other
+        The ids.
+    since_s
+        Time of the frame in which the animals had just crossed.
+    """
+
+    one: int
+    other: int
+    since_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BadFrame:
     """A frame in which something was not as it should be.
 

@@ -28,7 +28,7 @@ from zfcal.vision.fitting import prepare
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
 from zfcal.vision.plane import Plane
-from zfcal.vision.seen import BadFrame, Reason, Seen, TrackerOptions
+from zfcal.vision.seen import BadFrame, Exchange, Reason, Seen, TrackerOptions
 from zfcal.vision.trail import Detection
 from zfcal.vision.usual import Bodies
 
@@ -123,6 +123,10 @@ class FishTracker:
         """Return the frames gone wrong since this was last asked, and forget them."""
         bad, self._bad = self._bad, []
         return bad
+
+    def take_exchanges(self) -> list[Exchange]:
+        """Return which ids were exchanged late since this was last asked, and forget it."""
+        return self._trails.take_exchanges()
 
     def step(self, frame: Frame) -> list[Seen]:
         """Return the animals of a frame, ascending by id; none while the background is learnt."""

@@ -1,0 +1,68 @@
+"""What was told of a minute, as it is known at its end.
+
+Poses are told at once, by what was believed then. Looks tell seconds after a crossing that
+two animals have changed places; until then each goes by the other's id. Tracks are written
+when their minute has passed: there the ids are exchanged where the animals crossed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from typing import final
+
+from zfcal.tracks import FISH, FramePoses
+from zfcal.vision.breaks import Breaks
+from zfcal.vision.fusing import Named
+from zfcal.vision.seen import Exchange
+
+
+@final
+class Hindsight:
+    """Keeps who was where until it is asked, and puts right what is learnt meanwhile.
+
+    Parameters
+    ----------
+    break_s
+        As of `Breaks`: ids that go elsewhere even so.
+    """
+
+    def __init__(self, break_s: float) -> None:
+        self._breaks = Breaks(break_s)
+        self._kept: dict[int, tuple[float, list[Named]]] = {}
+
+    def note(self, frame: int, time_s: float, agents: Sequence[Named]) -> None:
+        """Keep a frame, with those of whom nothing was told since their id came from elsewhere."""
+        self._kept[frame] = (time_s, list(agents))
+
+    def exchange(self, exchanges: Iterable[Exchange]) -> None:
+        """Put right the ids of fish in all frames since; the next one has them right."""
+        for told in exchanges:
+            for time_s, agents in self._kept.values():
+                if told.since_s <= time_s:
+                    agents[:] = [_exchanged(agent, told) for agent in agents]
+
+    def revise(self, frames: Sequence[FramePoses]) -> list[FramePoses]:
+        """Return frames as they are known now, and forget them; others stay as they were told."""
+        return [self._revised(poses) for poses in frames]
+
+    def _revised(self, poses: FramePoses) -> FramePoses:
+        if poses.frame not in self._kept:
+            return poses
+        time_s, agents = self._kept.pop(poses.frame)
+        told = [
+            agent.pose
+            for agent in agents
+            if agent.track is None
+            or agent.pose.kind != FISH
+            or self._breaks.may_tell(agent.pose, agent.track, time_s)
+        ]
+        told.sort(key=lambda pose: pose.agent)
+        return dataclasses.replace(poses, agents=tuple(told))
+
+
+def _exchanged(agent: Named, told: Exchange) -> Named:
+    other = {told.one: told.other, told.other: told.one}.get(agent.pose.agent)
+    if other is None or agent.pose.kind != FISH:
+        return agent
+    return dataclasses.replace(agent, pose=dataclasses.replace(agent.pose, agent=other))
