@@ -53,6 +53,9 @@ DRAWINGS = (("usual", 101), ("usual", 102), ("hard", 101))
 OTHERS = (111, 112, 113, 114, 115, 116)
 """Seeds of other runs of the model, for the noise of scores."""
 
+_LONGEST = 100_000
+"""Frames of a video of unknown length, at most."""
+
 DATA = Path(os.environ.get("ZFCAL_SHARED_DATA", ROOT.parent / "shared" / "data"))
 
 
@@ -169,6 +172,20 @@ def real() -> Iterator[Film]:
         yield _filmed("a mouse, first 2,000 frames", folder / "mouse_video.mp4", places, 30.0, 25.0)
 
 
+def counts() -> list[dict[str, Any]]:
+    """Return how many animals each method tells in the real video of which nobody made tracks."""
+    path = DATA / "zebrafish8-video" / "test_A.avi"
+    if not path.exists():
+        return []
+    film = _filmed("8 zebrafish (test_A)", path, np.full((_LONGEST, 8, 2), np.nan), 28.07, 25.0)
+    found = []
+    for method in METHODS:
+        _, rows, _ = tracked(film, method)
+        exact = np.mean([len(row) == film.truth.shape[1] for row in rows])
+        found.append({"film": film.name, "method": method, "frames": len(rows), "exact": exact})
+    return found
+
+
 def _filmed(name: str, path: Path, truth: np.ndarray, fps: float, gate: float) -> Film:
     capture, frames = cv2.VideoCapture(str(path)), []
     while len(frames) < len(truth):
@@ -190,8 +207,11 @@ def _filmed(name: str, path: Path, truth: np.ndarray, fps: float, gate: float) -
     )
 
 
-def measure(film: Film, method: str) -> dict[str, Any]:
-    """Return what a method makes of a film."""
+Places = list[list[Row]]
+
+
+def tracked(film: Film, method: str) -> tuple[Places, Places, float]:
+    """Return poses as they are told, tracks as they are written, and the seconds that it took."""
     options = TrackerOptions(method=method, n_agents=film.truth.shape[1])
     tracker = FishTracker(options, film.projection, region=film.region)
     # A break is longer than a step; metres that are pixels have none, so that ids stay as told.
@@ -206,12 +226,21 @@ def measure(film: Film, method: str) -> dict[str, Any]:
         told.append(FramePoses(time_s=frame.time_s, frame=frame.number, agents=agents))
     tracks = list(chain.from_iterable(map(hindsight.revise, _minutes(told))))
     took_s = time.process_time() - begin
+    return _places(told), _places(tracks), took_s
+
+
+def _places(frames: list[FramePoses]) -> Places:
+    return [[(a.agent, a.x_m, a.y_m) for a in poses.agents] for poses in frames]
+
+
+def measure(film: Film, method: str) -> dict[str, Any]:
+    """Return what a method makes of a film."""
+    told, places, took_s = tracked(film, method)
     scale = 1e3 if film.unit == "mm" else 1.0
-    places = [[(a.agent, a.x_m, a.y_m) for a in poses.agents] for poses in tracks]
-    rows: list[list[Row]] = [[(i, scale * x, scale * y) for i, x, y in row] for row in places]
-    live: list[list[Row]] = [
-        [(a.agent, scale * a.x_m, scale * a.y_m) for a in poses.agents] for poses in told
-    ]
+    live, rows = (
+        [[(agent, scale * x, scale * y) for agent, x, y in row] for row in frames]
+        for frames in (told, places)
+    )
     return {
         "film": film.name,
         "unit": film.unit,
@@ -242,6 +271,7 @@ def measure_all(*, tiny: bool) -> dict[str, Any]:
         for film in films if tiny else chain(films, real()):
             found["rows"] += [measure(film, method) for method in METHODS]
             print(found["rows"][-1], file=sys.stderr)
+    found["counts"] = [] if tiny else counts()
     found["load_after"] = load()
     return found
 
@@ -291,6 +321,12 @@ def markdown(found: dict[str, Any]) -> str:
     ]
     tells = textwrap.fill(" ".join(_SCORES.split()), 120)
     listed = "\n".join(["", tells, "", *lines, ""]) if lines else ""
+    counted = [
+        f"- {row['film']}, {row['method']}: {row['exact']:.1%} of {row['frames']} frames"
+        for row in found["counts"]
+    ]
+    alone = ["", "Frames with exactly eight animals, where nobody made tracks:", "", *counted, ""]
+    listed += "\n".join(alone) if counted else ""
     return f"# Tracking\n\n{text}\n\n{table(head, rows)}{listed}"
 
 
