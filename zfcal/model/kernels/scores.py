@@ -69,7 +69,8 @@ def late_score(
     Parameters
     ----------
     sight, late
-        Unit vectors, shape (step, other, 2), and solid angles, shape (step, other).
+        Unit vectors, shape (step, other, 2), and solid angles, shape (step, other). A model in
+        which some respond late already has seen more others than a model that is late.
     """
     cells = make_cells(mixture.shape[1])
     more = np.empty(mixture.shape[1] + 1)
@@ -77,9 +78,12 @@ def late_score(
         cells.gx[-1], cells.gy[-1] = taken[s, 0], taken[s, 1]
         more[:] = 0.0
         there = False
-        for j in range(sight[1].shape[1]):
-            now, then = sight[0][s, j], late[0][s, j]
-            by, less = late[1][s, j], sight[1][s, j]
+        n_then, n_now = late[1].shape[1], sight[1].shape[1]
+        for j in range(max(n_then, n_now)):
+            by = late[1][s, j] if j < n_then else 0.0
+            less = sight[1][s, j] if j < n_now else 0.0
+            # Whoever is not seen at one of the times has no direction then.
+            now, then = sight[0][s, min(j, n_now - 1)], late[0][s, min(j, n_then - 1)]
             if by == less and (by == 0.0 or (now[0] == then[0] and now[1] == then[1])):
                 continue
             there = True
