@@ -30,6 +30,16 @@ def contents(root):
     }
 
 
+def lacks_a_phase(searching):
+    """Tell whether fewer than four kills fell into searches, or into what is before them.
+
+    How long each takes depends on what else the computer does: there are more kills then, for a
+    while.
+    """
+    n_searching = sum(searching)
+    return min(n_searching, len(searching) - n_searching) < 4 and len(searching) < 4 * KILLS
+
+
 def whole_minutes(root):
     """Return when each minute's tracks and poses were written, where both are whole."""
     pairs = ((path, root / "poses" / f"{path.stem}.mcap") for path in root.glob("tracks/*.parquet"))
@@ -87,7 +97,7 @@ def test_a_command_killed_twenty_times_ends_in_the_same_bytes(forks, tmp_path, b
 
     rng = np.random.default_rng(seed)
     searching, n_growing, has_ended, takes_s = [], 0, True, math.inf
-    while len(searching) < KILLS:
+    while len(searching) < KILLS or (words == CALIBRATE and lacks_a_phase(searching)):
         if has_ended:
             # The first run may have compiled something.
             takes_s = min(takes_s, forks.took_s)
@@ -109,4 +119,4 @@ def test_a_command_killed_twenty_times_ends_in_the_same_bytes(forks, tmp_path, b
     if words == CALIBRATE:
         # Before a round's first checkpoint it estimates what is most likely.
         assert all(b"[result.likelihood" in undisturbed[f"models/{s:06d}.toml"] for s in (120, 180))
-        assert 4 <= sum(searching) <= KILLS - 4
+        assert 4 <= sum(searching) <= len(searching) - 4
