@@ -211,6 +211,31 @@ def test_three_that_changed_places_are_put_right_by_two_crossings():
         assert names == ["abc".index(who) for who in order]
 
 
+def test_an_encounter_of_long_ago_explains_nothing():
+    """Both were surely themselves in between: what was told then stays."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+    film.show({0: LARGE, 1: SMALL}, 150)
+    film.show({0: SMALL, 1: LARGE}, 200, mixed={(0, 1): 0.04})
+
+    assert exchanges(film) == []
+
+
+def test_an_exchange_uses_its_encounter_up():
+    """Before it the two had other names, so nothing is put right from there once more."""
+    film = Film()
+    film.show({0: LARGE, 1: SMALL}, 60)
+    film.show({0: LARGE, 1: SMALL}, 1, mixed={(0, 1): 0.5})
+    while not (found := exchanges(film)):
+        film.show({0: SMALL, 1: LARGE}, 1)
+    assert found == [({0, 1}, 61)]
+
+    film.show({0: LARGE, 1: SMALL}, 200, mixed={(0, 1): 0.04})
+
+    assert exchanges(film) == []
+
+
 def test_an_exchange_of_which_nobody_knows_the_moment_is_not_told():
     """Two that never were near each other look like each other from now on."""
     film = Film()

@@ -7,6 +7,7 @@ its own; who writes meanwhile is told at once that there is no line.
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import subprocess
 import sys
@@ -25,6 +26,9 @@ BAUD = 115200
 RETRY_S = 0.25
 _WRITE_S = 0.05
 """A line that takes no byte for longer has nobody at the other end."""
+
+_PIECES = 5
+"""In so many pieces a message goes at most; a line with room takes it in one."""
 
 
 class Line(Protocol):
@@ -162,13 +166,17 @@ def _write(port: serial.Serial, data: bytes) -> int:
     The write timeout of pyserial is by the clock: it would lose the line of a driver that was
     itself held up, though every byte had gone.
     """
-    written = 0
-    while written < len(data):
+    rest = data
+    for _ in range(_PIECES):
         # The second look is for a driver that was held up while it waited.
         if not (_takes(port, _WRITE_S) or _takes(port, 0.0)):
-            raise serial.SerialTimeoutException("Write timeout")
-        written += port.write(data[written:]) or 0
-    return written
+            break
+        # Not by `port.write`, which tries for ever where a line that takes bytes takes none.
+        with contextlib.suppress(BlockingIOError):
+            rest = rest[os.write(port.fileno(), rest) :]
+        if not rest:
+            return len(data)
+    raise serial.SerialTimeoutException("Write timeout")
 
 
 def _takes(port: serial.Serial, patience_s: float) -> bool:

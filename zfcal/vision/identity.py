@@ -61,6 +61,9 @@ _MEND = 4.5
 _LIKELY, _POSSIBLE = 0.3, 0.05
 """Chances from which two are taken to have changed places just then."""
 
+_ITSELF = 0.999
+"""Chance from which nobody has changed places in any encounter so far."""
+
 _ENCOUNTER_S = 1.5
 """For so long two are near each other: the likely moment counts more than the last one."""
 
@@ -192,6 +195,8 @@ class Identities:
         tells = np.maximum(tells - tells.max(axis=1, keepdims=True), -_OUTLIER)
         self._chance[rows] *= np.exp(weight * tells)
         balance(self._chance, _LEAST, _ROUNDS)
+        # Who is surely himself again has not changed places.
+        self._forget(self._chance[np.arange(len(self._name)), self._name] > _ITSELF)
         self._learn(rows, seen, np.log([t.shape.length_px for t in trails]))
 
     def _learn(self, rows: NDArray[np.intp], seen: Floats, lengths: Floats) -> None:
@@ -226,7 +231,15 @@ class Identities:
         gain = likely[rows, names].sum() - likely[rows, self._name].sum()
         if gain > _MEND:
             self._exchanges += self._exchanged(self._name, names)
+            # Before now these rows had other names.
+            self._forget(self._name != names)
             self._name = names
+
+    def _forget(self, rows: NDArray[np.bool_]) -> None:
+        """Let former encounters of some rows explain no exchange to come."""
+        for crossed_s in self._crossed_s.values():
+            crossed_s[rows] = -math.inf
+            crossed_s[:, rows] = -math.inf
 
     def _exchanged(self, before: Ints, after: Ints) -> list[Exchange]:
         """Return which rows changed places when, the first one first; none where nobody knows."""
