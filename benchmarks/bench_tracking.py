@@ -220,7 +220,7 @@ def tracked(film: Film, method: str) -> tuple[Places, Places, float]:
     begin = time.process_time()
     told = []
     for frame, seen in follow(tracker, film.frames):
-        hindsight.exchange(fuser.named(tracker.take_exchanges()))
+        hindsight.exchange(fuser.named(tracker.take_exchanges()), frame.time_s)
         agents = fuser.step(seen, None, frame.time_s)
         hindsight.note(frame.number, frame.time_s, fuser.agents)
         told.append(FramePoses(time_s=frame.time_s, frame=frame.number, agents=agents))

@@ -121,7 +121,7 @@ class Following:
         try:
             for frame, seen in follow(tracker, self._frames(overhead, below)):
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
-                self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()))
+                self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()), frame.time_s)
                 self._take(frame, seen, bad, drawing)
         except BaseException:
             self._minutes.interrupt(self._end_s)

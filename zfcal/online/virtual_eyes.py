@@ -124,7 +124,7 @@ class VirtualEyes:
             lambda: self._finder.step(_frame(truth, self._drawn.below(moment)))
         )
         seen = self._tracker.step(_frame(truth, self._drawn.above(moment)))
-        self._hindsight.exchange(self._fuser.named(self._tracker.take_exchanges()))
+        self._hindsight.exchange(self._fuser.named(self._tracker.take_exchanges()), truth.time_s)
         agents = self._fuser.step(seen, robot.result(), truth.time_s)
         self._hindsight.note(truth.frame, truth.time_s, self._fuser.agents)
         return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)

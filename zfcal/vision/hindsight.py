@@ -29,27 +29,38 @@ class Hindsight:
 
     def __init__(self, break_s: float) -> None:
         self._breaks = Breaks(break_s)
-        self._kept: dict[int, tuple[float, list[Named]]] = {}
+        self._kept: dict[int, tuple[float, tuple[Named, ...]]] = {}
+        self._learnt: list[tuple[Exchange, float]] = []
 
     def note(self, frame: int, time_s: float, agents: Sequence[Named]) -> None:
         """Keep a frame, with those of whom nothing was told since their id came from elsewhere."""
-        self._kept[frame] = (time_s, list(agents))
+        self._kept[frame] = (time_s, tuple(agents))
 
-    def exchange(self, exchanges: Iterable[Exchange]) -> None:
-        """Put right the ids of fish in all frames since; the next one has them right."""
-        for told in exchanges:
-            for time_s, agents in self._kept.values():
-                if told.since_s <= time_s:
-                    agents[:] = [_exchanged(agent, told) for agent in agents]
+    def exchange(self, exchanges: Iterable[Exchange], until_s: float) -> None:
+        """Take in what `revise` is to put right: ids of fish, from then to now.
+
+        Parameters
+        ----------
+        exchanges
+            The earlier ones of one frame first.
+        until_s
+            Time of the first frame that has them right, in seconds.
+        """
+        self._learnt += [(told, until_s) for told in exchanges]
 
     def revise(self, frames: Sequence[FramePoses]) -> list[FramePoses]:
         """Return frames as they are known now, and forget them; others stay as they were told."""
-        return [self._revised(poses) for poses in frames]
+        revised = [self._revised(poses) for poses in frames]
+        if frames:
+            self._learnt = [each for each in self._learnt if each[1] > frames[-1].time_s]
+        return revised
 
     def _revised(self, poses: FramePoses) -> FramePoses:
         if poses.frame not in self._kept:
             return poses
-        time_s, agents = self._kept.pop(poses.frame)
+        time_s, kept = self._kept.pop(poses.frame)
+        wrong = [told for told, until_s in self._learnt if told.since_s <= time_s < until_s]
+        agents = [_exchanged(agent, wrong) for agent in kept]
         told = [
             agent.pose
             for agent in agents
@@ -61,8 +72,13 @@ class Hindsight:
         return dataclasses.replace(poses, agents=tuple(told))
 
 
-def _exchanged(agent: Named, told: Exchange) -> Named:
-    other = {told.one: told.other, told.other: told.one}.get(agent.pose.agent)
-    if other is None or agent.pose.kind != FISH:
+def _exchanged(agent: Named, exchanges: Sequence[Exchange]) -> Named:
+    """Return somebody by the id that is right; the robot's is, whatever is exchanged."""
+    if agent.pose.kind != FISH:
         return agent
-    return dataclasses.replace(agent, pose=dataclasses.replace(agent.pose, agent=other))
+    right = agent.pose.agent
+    for told in exchanges:
+        right = {told.one: told.other, told.other: told.one}.get(right, right)
+    if right == agent.pose.agent:
+        return agent
+    return dataclasses.replace(agent, pose=dataclasses.replace(agent.pose, agent=right))
