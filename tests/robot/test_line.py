@@ -158,6 +158,27 @@ def test_a_line_that_takes_nothing_is_lost_soon():
         os.close(end)
 
 
+def test_a_line_that_says_it_takes_bytes_and_takes_none_is_lost(monkeypatch):
+    """As a driver may that lacks memory: nobody tries for ever."""
+    master, slave = pty.openpty()
+    line = SerialLine(os.ttyname(slave))
+    assert line.wait(5.0)
+    tried = []
+
+    def take_none(*asked):
+        tried.append(asked)
+        raise BlockingIOError
+
+    with monkeypatch.context() as patch:
+        patch.setattr("zfcal.robot.port.os.write", take_none)
+        assert not line.write(bytes(10))
+    assert 1 <= len(tried) <= 10
+    assert "timeout" in line.problem
+    line.close()
+    for end in (master, slave):
+        os.close(end)
+
+
 def test_silence_stops_the_robot(line):
     """From its own thread, within half a second and a tick; then nothing but STOP goes out."""
     bot = FishBot("F", line)
