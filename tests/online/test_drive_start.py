@@ -3,6 +3,8 @@
 import contextlib
 import importlib.util
 import os
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -118,6 +120,14 @@ def test_warming_up_leaves_no_trace(recorded):
         assert pilots[0].tick(poses.time_s) == pilots[1].tick(poses.time_s)
 
 
+def may_go_ahead():
+    """Tell whether this user may give a process a high priority: asked of another one."""
+    asks = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {NICENESS})"
+    done = subprocess.run([sys.executable, "-c", asks], capture_output=True, check=False)
+    return done.returncode == 0
+
+
+@pytest.mark.skipif(not may_go_ahead(), reason="a high priority is not allowed here (needs root)")
 def test_every_thread_goes_ahead_of_others():
     """One that was there before as well: who has the interpreter and no processor stops all."""
     ends = threading.Event()
@@ -129,8 +139,7 @@ def test_every_thread_goes_ahead_of_others():
         with contextlib.ExitStack() as stack:
             told = []
             _hurry(DriveOptions(port="none", verbose=True), told.append, stack)
-            if told:
-                pytest.skip(told[0].text)
+            assert told == []
             asked = [os.getpriority(os.PRIO_PROCESS, thread) for thread in threads]
             assert asked == [NICENESS, NICENESS]
         assert [os.getpriority(os.PRIO_PROCESS, thread) for thread in threads] == before
