@@ -92,6 +92,15 @@ def test_each_step_has_a_target_and_each_tenth_a_command(root):
     assert all(c["sent"] for c in commands)
 
 
+def test_a_duration_counts_from_the_first_frame(root):
+    """However many frames are read at once: 4 s are 60 frames, 20 steps and 40 ticks."""
+    options = DriveOptions(port="virtual", clock="poses", duration_s=4 - 1 / 15)
+    assert drive(root, options, say_nothing) == "the duration is over"
+    items = items_of(root)
+    assert [pose["frame"] for pose in only(items, "pose")] == list(range(60))
+    assert (len(only(items, "target")), len(only(items, "command"))) == (20, 40)
+
+
 def test_targets_keep_the_robots_radius_from_the_walls(root):
     """All of them, and some had to be moved: five centimetres are a step beside the walls."""
     targets = only(run(root, radius_m=0.05), "target")

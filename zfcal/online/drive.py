@@ -303,8 +303,8 @@ class _Loop:
                 self._driver.tick()
                 self._crew.log.flush()
                 self._step_virtual()
-            if batch and self._is_over(batch[-1].time_s):
-                return "the duration is over"
+                if frames and self._is_over(frames[-1].time_s):
+                    return "the duration is over"
             self._show()
         return "the poses have ended"
 
