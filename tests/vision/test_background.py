@@ -40,6 +40,36 @@ def test_what_is_read_off_the_frozen_mixture_is_what_it_calls_background(drawn):
         np.testing.assert_array_equal(read, asked)
 
 
+def test_in_a_region_each_pixel_is_learnt_as_without_one(drawn):
+    """And where the gain is read; elsewhere any grey is tank. Fish rest, which is mended."""
+    moving = drawn.circling(40, n=2)
+    images = [drawn.image(bodies) for bodies in moving[:28] + [moving[28]] * 12]
+    region = np.zeros(images[0].shape, bool)
+    region[40:160, 30:150] = True
+    everywhere, within = (BackgroundLearner(40, region=each) for each in (None, region))
+    for image in images:
+        everywhere.add(image)
+        within.add(image)
+
+    whole, part = everywhere.freeze(), within.freeze()
+
+    assert whole.level[region].min() > 165
+    region[8::16, 8::16] = True
+    for name in ("level", "low", "high"):
+        np.testing.assert_array_equal(getattr(part, name)[region], getattr(whole, name)[region])
+    assert part.gain(images[0]) == whole.gain(images[0])
+    assert (part.low[:20, :8].max(), part.high[:20, :8].min()) == (0, 255)
+
+
+def test_a_frame_that_is_not_of_the_regions_size_is_not_learnt_from(drawn):
+    """The first one as well."""
+    learner = BackgroundLearner(region=np.ones((80, 80), bool))
+
+    assert not learner.fits(drawn.image([], size=60))
+    with pytest.raises(InputError, match="80 x 80 px, got one of 60 x 60 px"):
+        learner.add(drawn.image([], size=60))
+
+
 def test_fish_that_swim_leave_no_trace(drawn):
     """Three fish on a circle: the tank within its noise everywhere."""
     images = [drawn.image(bodies) for bodies in drawn.circling(100)]
@@ -107,6 +137,18 @@ def test_the_gain_is_how_much_brighter_an_image_is(drawn, factor):
     image = drawn.image(drawn.circling(1)[0], noise=0.0)
 
     assert background.gain((image * factor).astype(np.uint8)) == pytest.approx(factor, rel=0.01)
+
+
+def test_the_gain_is_the_median_ratio_of_greys_on_a_grid():
+    """By NumPy, for images of any size: every sixteenth row and column, from the ninth on."""
+    rng = np.random.default_rng(2)
+    for size in ((9, 9), (16, 41), (50, 60), (25, 200)):
+        tank, image = (rng.integers(0, 256, size).astype(np.uint8) for _ in range(2))
+        some = np.s_[8::16, 8::16]
+
+        ratio = (image[some] + 1.0) / (tank[some] + 1.0)
+
+        assert background_of(tank).gain(image) == np.median(ratio)
 
 
 def test_colour_becomes_grey_and_grey_stays():

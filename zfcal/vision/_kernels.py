@@ -219,6 +219,26 @@ def balance(chance: Floats, least: float, rounds: int) -> None:
             chance[:, j] /= chance[:, j].sum()
 
 
+@kernel
+def median_ratio(one: Grey, other: Grey, first: int, step: int) -> float:
+    """Return the median ratio of two images on a grid, each grey counted from one.
+
+    Parameters
+    ----------
+    one, other : ndarray of uint8, shape (height, width)
+    first, step
+        Of the grid's rows and columns.
+    """
+    height, width = one.shape
+    rows, columns = (height - first - 1) // step + 1, (width - first - 1) // step + 1
+    ratio = np.empty(rows * columns)
+    for i in range(rows):
+        for j in range(columns):
+            y, x = first + i * step, first + j * step
+            ratio[i * columns + j] = (float(one[y, x]) + 1.0) / (float(other[y, x]) + 1.0)
+    return float(np.median(ratio))
+
+
 def prepare() -> None:
     """Compile all, so that no frame has to wait for it."""
     mask, level, dark = (np.full((2, 2), value, np.uint8) for value in (1, 9, 3))
@@ -230,3 +250,4 @@ def prepare() -> None:
     step_costs(some, some, 1.0, 1.0)
     read_grid(np.ones((2, 2, 2)), pixels)
     balance(np.ones((2, 2)), 0.1, 1)
+    median_ratio(mask, dark, 0, 1)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.errors import InputError
+from zfcal.vision._kernels import median_ratio
 from zfcal.vision.frames import Image
 
 Grey = NDArray[np.uint8]
@@ -40,6 +41,10 @@ _LEAST_SD = 2.0
 _PROBES = (32, 16, 8, 4, 2, 1)
 """Greys; the mixture's spread is limited, to nine greys."""
 _GRID_PX = 16
+_GRID = np.s_[_GRID_PX // 2 :: _GRID_PX, _GRID_PX // 2 :: _GRID_PX]
+
+_BEYOND_PX = 3
+"""The edge of a body at the border of a region: two pixels closed and dilated, and one over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,9 +81,8 @@ class Background:
 
         The median ratio over a coarse grid: fish cover less than half of a tank.
         """
-        grid = np.s_[_GRID_PX // 2 :: _GRID_PX, _GRID_PX // 2 :: _GRID_PX]
-        level = self.level[grid].astype(np.float32)
-        return float(np.median((grey[grid] + 1.0) / (level + 1.0)))
+        one, other = np.ascontiguousarray(grey), np.ascontiguousarray(self.level)
+        return median_ratio(one, other, _GRID_PX // 2, _GRID_PX)
 
 
 def grey_of(image: Image) -> Grey:
@@ -110,10 +114,20 @@ class BackgroundLearner:
         Frames to learn from.
     rate
         Weight of a new frame in the mixture.
+    region : ndarray of bool, shape (height, width), optional
+        Where the tank is asked for: there, and on the grid of `Background.gain`, each pixel is
+        learnt as it would be without a region; elsewhere all greys are background.
     """
 
-    def __init__(self, n_frames: int = LEARN_FRAMES, rate: float = LEARN_RATE) -> None:
+    def __init__(
+        self,
+        n_frames: int = LEARN_FRAMES,
+        rate: float = LEARN_RATE,
+        *,
+        region: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.n_frames = n_frames
+        self._where = None if region is None else _asked(region)
         self._rate = rate
         self._count = 0
         self._mixture = cv2.createBackgroundSubtractorMOG2(
@@ -143,12 +157,12 @@ class BackgroundLearner:
         """
         if shows_nothing(grey):
             return False
-        if self.samples and self.samples[0].shape != grey.shape:
+        if not self.fits(grey):
             raise InputError(
-                f"The background is learnt from frames of {_size(self.samples[0])} px, "
+                f"The background is learnt from frames of {_size(self._known)} px, "
                 f"got one of {_size(grey)} px."
             )
-        self._mixture.apply(grey, None, self._rate if self._count else 1.0)
+        self._mixture.apply(self._some(grey), None, self._rate if self._count else 1.0)
         if self._count % max(1, self.n_frames // _SAMPLES) == 0:
             self.samples.append(grey.copy())
         self._count += 1
@@ -172,8 +186,47 @@ class BackgroundLearner:
                 "No frame shows a tank to learn the background from.",
                 hint="All were black or of one grey; give an image with --background.",
             )
-        learnt = _probed(self._mixture, np.asarray(self._mixture.getBackgroundImage(), np.uint8))
-        return _without_sitters(learnt, self.samples, light=light)
+        level = np.asarray(self._mixture.getBackgroundImage(), np.uint8)
+        usual = _usual([self._some(sample) for sample in self.samples], light=light)
+        learnt = self._whole(_probed(self._mixture, level))
+        return _without_sitters(learnt, self._spread(usual, learnt.level), light=light)
+
+    def fits(self, grey: Grey) -> bool:
+        """Return whether a frame is as large as the region and the frames before."""
+        shapes = [known.shape for known in (self._where, *self.samples[:1]) if known is not None]
+        return all(shape == grey.shape for shape in shapes)
+
+    @property
+    def _known(self) -> NDArray[np.generic]:
+        return self.samples[0] if self._where is None else self._where
+
+    def _some(self, grey: Grey) -> Grey:
+        """Return the pixels that are learnt, in one row where they are not all."""
+        return grey if self._where is None else grey[self._where][None]
+
+    def _spread(self, some: Grey, others: Grey) -> Grey:
+        """Return an image of the pixels that are learnt, and of others elsewhere."""
+        if self._where is None:
+            return some
+        whole = others.copy()
+        whole[self._where] = some[0]
+        return whole
+
+    def _whole(self, some: Background) -> Background:
+        tank = self.samples[0]
+        return Background(
+            level=self._spread(some.level, tank),
+            low=self._spread(some.low, np.zeros_like(tank)),
+            high=self._spread(some.high, np.full_like(tank, 255)),
+        )
+
+
+def _asked(region: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the pixels of a region, a few beyond, and those that tell how bright an image is."""
+    square = np.ones((2 * _BEYOND_PX + 1,) * 2, np.uint8)
+    asked = cv2.dilate(region.astype(np.uint8), square) > 0
+    asked[_GRID] = True
+    return asked
 
 
 def background_of(image: Image, *, sd: float = _LEAST_SD) -> Background:
@@ -230,10 +283,16 @@ def _probed(mixture: cv2.BackgroundSubtractorMOG2, level: Grey) -> Background:
     return Background(level=level, low=limits[0], high=limits[1])
 
 
-def _without_sitters(learnt: Background, samples: list[Grey], *, light: bool) -> Background:
+def _usual(samples: list[Grey], *, light: bool) -> Grey:
+    """Return what a pixel is wherever fish sat for less than most of the time."""
+    share = 1 - _SAT if light else _SAT
+    usual = np.quantile(np.stack(samples), share, axis=0, method="nearest")
+    return np.asarray(usual, np.uint8)
+
+
+def _without_sitters(learnt: Background, tank: Grey, *, light: bool) -> Background:
     """Return the background with resting fish taken out, where they moved at some time."""
-    usual = np.quantile(np.stack(samples), 1 - _SAT if light else _SAT, axis=0, method="nearest")
-    usual = usual.astype(np.int16)
+    usual = tank.astype(np.int16)
     away = (learnt.level - usual) if light else (usual - learnt.level)
     width = learnt.high.astype(np.int16) - learnt.low
     # Opened, so that a flickering edge, a pixel wide, stays what it was learnt as.
@@ -253,5 +312,5 @@ def _without_sitters(learnt: Background, samples: list[Grey], *, light: bool) ->
     )
 
 
-def _size(grey: Grey) -> str:
+def _size(grey: NDArray[np.generic]) -> str:
     return f"{grey.shape[1]} x {grey.shape[0]}"

@@ -70,7 +70,7 @@ class FishTracker:
         self.options = options
         self._plane = Plane(projection, projection.size_px)
         self._region = region
-        self._learner = BackgroundLearner(options.learn_frames, options.learn_rate)
+        self._learner = self._new_learner()
         self._finder: Finder | None = None
         self._bodies = Bodies()
         self._trails = Trails(self._bodies, coast_s=options.coast_s, n_agents=options.n_agents)
@@ -94,7 +94,7 @@ class FishTracker:
         if self._finder is not None:
             return
         grey = grey_of(frame.image)
-        if self._learner.samples and self._learner.samples[0].shape != grey.shape:
+        if not self._learner.fits(grey):
             return
         self._learner.add(soften(grey, self.options.method))
         if self._learner.is_ready:
@@ -108,11 +108,15 @@ class FishTracker:
         finder = self._take(self._learner.freeze(light=light))
         samples = [~grey if light else grey for grey in self._learner.samples]
         # The learner's frames are no longer needed: a second of them is as much as the rest.
-        self._learner = BackgroundLearner(self.options.learn_frames, self.options.learn_rate)
+        self._learner = self._new_learner()
         for _ in range(2):
             # Once for how dark animals are, and again with thresholds that fit.
             found = [finder.find(grey, self._bodies.usual) for grey in samples]
             self._bodies.start(found, self.options.n_agents)
+
+    def _new_learner(self) -> BackgroundLearner:
+        options = self.options
+        return BackgroundLearner(options.learn_frames, options.learn_rate, region=self._region)
 
     def _take(self, background: Background) -> Finder:
         background = background.inverted() if self.options.light else background
