@@ -36,6 +36,25 @@ def test_nan_is_null_only_if_asked_for(values, nan_is_null):
     assert made.null_count == expected.null_count
 
 
+@pytest.mark.parametrize(
+    "values", [[], [[]], [[1.0, NAN], [], [2]], ((0.5,), [3.0, -0.0]), [[None, 1.0]]]
+)
+def test_lists_are_as_pyarrow_has_them(values):
+    """A list of numbers per row, of any length, empty ones among them."""
+    kind = pa.list_(pa.float64())
+    made = array_of(values, kind)
+    made.validate(full=True)
+    assert str(made) == str(pa.array(values, type=kind))
+    assert made.type == kind
+
+
+@pytest.mark.parametrize("values", [[None, [1.0]], [np.array([1.0, 2.0])], [[np.float64(1.5)]]])
+def test_lists_of_other_things_go_the_usual_way(values):
+    """A row that is null, rows that are arrays, numbers of NumPy."""
+    kind = pa.list_(pa.float64())
+    assert array_of(values, kind).equals(pa.array(values, type=kind))
+
+
 def test_values_that_need_converting_go_the_usual_way():
     """An int64 array into int32, every other row, numbers of NumPy in a list."""
     wide = np.arange(6)
@@ -53,6 +72,7 @@ def test_values_that_need_converting_go_the_usual_way():
         (np.array([2**40]), pa.int32()),
         ([1], pa.string()),
         ([True, "a"], pa.string()),
+        ([["x"]], pa.list_(pa.float64())),
     ],
 )
 def test_what_is_not_of_the_type_is_refused(values, kind):

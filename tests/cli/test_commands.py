@@ -1,6 +1,8 @@
 """Each command once on a small trial, and what it says when something is wrong."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -114,6 +116,27 @@ def test_simulate_a_model_into_a_new_trial(zfcal, trial):
     assert done.code == 0
     assert done.lines[-2:] == ["other/tracks/000000.parquet", "other/tracks/000060.parquet"]
     assert zfcal("analyse", "other").code == 0
+
+
+def test_a_trial_is_imported_analysed_and_calibrated_without_pandas(tracks_csv, tmp_path):
+    """It would take a third of the time of a short round; the second round reads the first."""
+    tracks_csv()
+    beside = ("init", "trial", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
+    commands = (
+        beside,
+        ("import", "tracks.csv", "trial", "--format", "csv"),
+        ("analyse", "trial"),
+        ("calibrate", "trial", *ROUND),
+    )
+    script = (
+        "import sys\n"
+        "from zfcal_cli.main import run\n"
+        f"for words in {commands!r}:\n"
+        "    assert run([*words, '-q']) == 0\n"
+        "sys.exit('pandas' in sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "trial" / "models" / "000180.toml").exists()
 
 
 def test_report_writes_a_page_once(zfcal, trial):

@@ -48,6 +48,8 @@ def array_of(values: Any, kind: pa.DataType, *, nan_is_null: bool = False) -> pa
         made = _strings(values)
     elif kind in _DTYPES:
         made = _numbers(values, kind, nan_is_null=nan_is_null)
+    elif pa.types.is_list(kind) and kind.value_type in _DTYPES:
+        made = _lists(values, kind)
     return pa.array(values, type=kind, from_pandas=nan_is_null) if made is None else made
 
 
@@ -125,6 +127,20 @@ def _strings(values: Any) -> pa.Array | None:
     null = np.fromiter((value is None for value in values), np.bool_, len(values))
     data = pa.py_buffer(b"".join(parts))
     return _from_parts(pa.string(), ends.astype(np.int32), [data], null)
+
+
+def _lists(values: Any, kind: pa.DataType) -> pa.Array | None:
+    """Return a list of numbers per row; None if there is anything else."""
+    if not isinstance(values, list | tuple) or not set(map(type, values)) <= {list, tuple}:
+        return None
+    flat = [number for row in values for number in row]
+    numbers = _numbers(flat, kind.value_type, nan_is_null=False)
+    if numbers is None or len(flat) > np.iinfo(np.int32).max:
+        return None
+    ends = np.fromiter(accumulate(map(len, values), initial=0), np.int32, len(values) + 1)
+    return pa.Array.from_buffers(
+        kind, len(values), [None, pa.py_buffer(ends)], null_count=0, children=[numbers]
+    )
 
 
 def _from_parts(

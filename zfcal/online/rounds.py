@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import write_model
@@ -120,10 +121,9 @@ def read_previous(path: Path) -> Previous:
             f"{path}: does not say which genome was the champion.",
             hint="Make it again: zfcal calibrate TRIAL --force",
         )
-    scores = table.column("S").to_numpy()
     return Previous(
         genes=np.array(table.column("genes").to_pylist(), dtype=np.float64),
-        scores=np.asarray(scores, dtype=np.float64),
+        scores=numbers_of(table.column("S")).copy(),
         champion=np.array(champion, dtype=np.float64),
         noise=float(noise) if isinstance(noise, int | float) else math.nan,
     )

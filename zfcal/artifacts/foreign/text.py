@@ -20,6 +20,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 from numpy.typing import NDArray
 
+from zfcal.artifacts.arrays import array_of, numbers_of
 from zfcal.artifacts.foreign.raw import Floats, Ints
 from zfcal.errors import InputError
 
@@ -146,8 +147,7 @@ def read_table(path: Path, layout: Layout) -> TextTable:
 
 def numbers(table: TextTable, name: str) -> Floats:
     """Return a column as float64; NaN where a cell is empty or says so."""
-    values = table.columns[name].combine_chunks()
-    return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return np.asarray(numbers_of(table.columns[name]), dtype=np.float64)
 
 
 def whole_numbers(table: TextTable, name: str) -> Ints:
@@ -165,12 +165,13 @@ def labels(table: TextTable, name: str) -> tuple[NDArray[np.int64], tuple[str, .
 
     An empty cell is the text ''.
     """
-    column = table.columns[name].cast(pa.string()).fill_null("")
+    nothing = array_of([""], pa.string())[0]
+    column = table.columns[name].cast(pa.string()).fill_null(nothing)
     coded = column.combine_chunks().dictionary_encode()
     if isinstance(coded, pa.ChunkedArray):
         coded = coded.combine_chunks()
     found = tuple(str(value).strip() for value in coded.dictionary.to_pylist())
-    return np.asarray(coded.indices.to_numpy(), dtype=np.int64), found
+    return np.asarray(numbers_of(coded.indices), dtype=np.int64), found
 
 
 def cell_error(table: TextTable, name: str, row: int, *, expected: str, got: str) -> InputError:
