@@ -3,13 +3,15 @@
 What is killed is then at work, not still importing. As a process (``python forks.py``) this reads
 a JSON object a line, ``{"words": [...], "cwd": FOLDER}``, and answers with the process that runs
 them and with how that ended: ``{"process": N}``, ``{"code": C}``, as `subprocess.Popen` has it, and
-``{"took_s": S}``.
+``{"took_s": S}``. Orders may name files for ``out`` and ``err``, to which output is added.
 `Forks` is who talks to it.
 """
 
 import contextlib
+import gc
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -24,28 +26,51 @@ class Forks:
 
     def __init__(self):
         self._process = subprocess.Popen(
-            [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [sys.executable, __file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            # What has come is then in the pipe, where `code` looks for it.
+            bufsize=0,
         )
         self._running = None
         self.took_s = 0.0
+        # Who is killed some time after its start must not find it loading still.
+        self._answer("loaded")
 
-    def start(self, folder, *words):
+    def start(self, folder, *words, out=os.devnull, err=os.devnull):
         """Start a command, standing in a folder."""
         order = {"words": [str(word) for word in words], "cwd": str(folder)}
-        print(json.dumps(order), file=self._process.stdin, flush=True)
+        order |= {"out": str(out), "err": str(err)}
+        self._process.stdin.write(f"{json.dumps(order)}\n".encode())
         self._running = self._answer("process")
+
+    def send_signal(self, number):
+        """Send it a signal, if it is still there."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._running, number)
 
     def kill(self):
         """Kill it, as kill -9 does; return whether it had ended by itself."""
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self._running, signal.SIGKILL)
+        self.send_signal(signal.SIGKILL)
         return self.wait()
 
     def wait(self):
         """Wait for it; return whether it ended by itself, and fail where that was not well."""
-        code, self.took_s = self._answer("code"), self._answer("took_s")
+        code = self.code()
         assert code in {0, -signal.SIGKILL}, code
         return code == 0
+
+    def code(self, patience_s=600.0):
+        """Wait for it; return how it ended."""
+        assert select.select([self._process.stdout], [], [], patience_s)[0], "it goes on and on"
+        code, self.took_s = self._answer("code"), self._answer("took_s")
+        self._running = None
+        return code
+
+    @property
+    def is_running(self):
+        """Whether a command was started that nobody has waited for."""
+        return self._running is not None
 
     def run(self, folder, words, *, kill_after_s=None):
         """Run a command; with a time, kill it then. Return whether it had ended by itself."""
@@ -62,13 +87,20 @@ class Forks:
         return self
 
     def __exit__(self, *_):
+        if self.is_running:
+            # A test that failed has left it.
+            self.send_signal(signal.SIGKILL)
         self._process.stdin.close()
         self._process.wait(60)
         self._process.stdout.close()
 
 
 def load():
-    """Import what commands import only when they run, and load the kernels."""
+    """Import what commands import only when they run, and load the kernels.
+
+    All that there is by then is kept from the collector of garbage: a fork that looked through it
+    would have each page of it copied.
+    """
     from brief import LESS
     from warming import count, estimate, tracker
 
@@ -79,17 +111,21 @@ def load():
     count(3)
     estimate()
     tracker()
+    gc.collect()
+    gc.freeze()
 
 
-def carry_out(words, cwd):
+def carry_out(words, cwd, out, err):
     """Run a command in this process, which is its own, and end it."""
     from zfcal_cli.main import run
 
-    null = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1, 2):
-        os.dup2(null, stream)
+    for stream, name in enumerate((os.devnull, out, err)):
+        os.dup2(os.open(name, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644), stream)
     os.chdir(cwd)
-    os._exit(run(words))
+    code = run(words)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)
 
 
 def answer(what):
@@ -101,12 +137,13 @@ def answer(what):
 def main():
     """Serve until standard input ends."""
     load()
+    answer({"loaded": True})
     for line in sys.stdin:
         order = json.loads(line)
         began_s = time.monotonic()
         process = os.fork()
         if process == 0:
-            carry_out(order["words"], order["cwd"])
+            carry_out(**order)
         answer({"process": process})
         _, status = os.waitpid(process, 0)
         answer({"code": os.waitstatus_to_exitcode(status)})

@@ -30,6 +30,7 @@ _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_nam
 driven = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(driven)
 
+BRIEF = Path(__file__).parents[1] / "brief.py"
 STOP = "000000000100"
 KILLS = 20
 SECONDS = 40
@@ -48,18 +49,29 @@ def template(tmp_path_factory):
 class Rig:
     """A live trial, a virtual robot and drivers of it."""
 
-    def __init__(self, root, frames):
+    def __init__(self, root, frames, forks):
         self.root = root
+        self.forks = forks
         self.robot = VirtualProcess()
         self.poses = driven.LivePoses(root, frames)
         self.drivers = []
         self._heard = []
         self._lines = root.parent / "told.jsonl"
+        self._said = root.parent / "said.txt"
 
     def start(self, *words):
-        """Start a driver as a process."""
+        """Start a driver that has loaded all it needs."""
+        command = ("drive", self.root, "--port", self.robot.port, "--events", *words)
+        self.forks.start(self.root.parent, *command, out=self._lines, err=self._said)
+
+    def said(self):
+        """Return what that driver has said by now."""
+        return self._said.read_text()
+
+    def start_anew(self):
+        """Start a driver as a process of its own, as people do."""
         command = [sys.executable, "-m", "zfcal_cli.main", "drive", str(self.root)]
-        command += ["--port", str(self.robot.port), "--events", *words]
+        command += ["--port", str(self.robot.port), "--events"]
         with self._lines.open("a") as lines:
             driver = subprocess.Popen(command, stdout=lines, stderr=subprocess.PIPE, text=True)
         self.drivers.append(driver)
@@ -99,11 +111,13 @@ class Rig:
 
     def end(self):
         """Let the driver end by itself."""
-        self.drivers[-1].send_signal(signal.SIGTERM)
-        assert self.drivers[-1].wait(10) == 143
+        self.forks.send_signal(signal.SIGTERM)
+        assert self.forks.code(10) == 143
 
     def close(self):
         """End everything."""
+        if self.forks.is_running:
+            self.forks.kill()
         for driver in self.drivers:
             with contextlib.suppress(ProcessLookupError):
                 driver.kill()
@@ -118,15 +132,15 @@ class Rig:
 
 @pytest.fixture(scope="module")
 def forks(forking):
-    """Return what runs drivers that are killed at work."""
+    """Return what runs drivers that have loaded what they need."""
     with forking.Forks() as made:
         yield made
 
 
 @pytest.fixture
-def rig(template, tmp_path):
+def rig(template, forks, tmp_path):
     """Return a rig whose poses have begun."""
-    made = Rig(Path(shutil.copytree(template[0], tmp_path / "trial")), template[1])
+    made = Rig(Path(shutil.copytree(template[0], tmp_path / "trial")), template[1], forks)
     with made.poses:
         yield made
     made.close()
@@ -161,7 +175,7 @@ def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     """And the log is whole, and a replay comes to the same."""
     if signal.getsignal(number) is signal.SIG_IGN:
         pytest.skip("whoever runs the tests ignores Ctrl-C, as a shell does in the background")
-    driver = rig.start()
+    driver = rig.start_anew()
     rig.until(lambda: rig.moves() > 10)
     driver.send_signal(number)
     assert driver.wait(10) == code
@@ -223,7 +237,7 @@ def small_disk(rig):
 
 def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
     """It is said; the robot is driven on; with room again the log lacks not a tick."""
-    driver = rig.start()
+    rig.start()
     rig.until(lambda: rig.moves() > 5)
     filler = small_disk / "filler"
     with filler.open("wb", buffering=0) as file, contextlib.suppress(OSError):
@@ -235,7 +249,7 @@ def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
     rig.until(lambda: [f["ended"] for f in rig.items("fault") if f["fault"] == "log"])
     rig.end()
     assert [f["ended"] for f in rig.items("fault") if f["fault"] == "log"] == [False, True]
-    said = driver.stderr.read()
+    said = rig.said()
     assert "No space left on device" in said
     assert "the robot is driven on" in said
     times = [c["time_s"] for c in rig.items("command")]
@@ -247,7 +261,7 @@ def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
 @pytest.mark.apt
 def test_a_clock_that_is_set_by_an_hour_changes_nothing(rig, set_clock):
     """Forwards and back while it drives: no STOP, no tick left out, no latency of an hour."""
-    driver = rig.start()
+    driver = rig.start_anew()
     for offset in ("+3600", "-3600"):
         moves = rig.moves()
         # The driver has the new time after a second.
@@ -303,9 +317,9 @@ def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     """By `zfcal calibrate` beside it, in real time; a broken model is told and ignored."""
     for folder in ("tracks", "stats"):
         shutil.copytree(analysed / folder, rig.root / folder)
-    driver = rig.start()
+    rig.start()
     rig.until(lambda: rig.moves() > 5)
-    words = [sys.executable, "-m", "zfcal_cli.main", "calibrate", str(rig.root), *ROUND]
+    words = [sys.executable, str(BRIEF), "calibrate", str(rig.root), *ROUND]
     calibrating = subprocess.Popen(words)
     made = rig.root / "models" / "000120.toml"
     rig.until(made.exists, 60)
@@ -321,9 +335,8 @@ def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 5)
     assert rig.items("target")[-1]["model"] == NEW
-    driver.send_signal(signal.SIGTERM)
-    assert driver.wait(10) == 143
-    said = driver.stderr.read()
+    rig.end()
+    said = rig.said()
     assert [t["model"] for t in rig.told("model")] == ["models/000000.toml", NEW]
     assert "models/000120.toml drives" in said
     assert "000180.toml" in said
@@ -347,8 +360,8 @@ def test_what_the_robot_complains_of_is_heard(rig):
     assert replay(rig.root, say_nothing).is_same
 
 
-def start_hanging(rig, method):
-    """Start a driver of which one method takes 1.5 s, once it has driven for a while."""
+def start_hanging(rig, method, *, call):
+    """Start a driver of which one method takes 1.5 s, once, and says so; return it."""
     module, owner, name = method.rsplit(".", 2)
     program = (
         "import sys, time\n"
@@ -357,30 +370,35 @@ def start_hanging(rig, method):
         f"was, calls = {owner}.{name}, []\n"
         "def hang(self):\n"
         "    calls.append(was(self))\n"
-        "    if len(calls) == 150:\n"
+        f"    if len(calls) == {call}:\n"
         "        time.sleep(1.5)\n"
+        "        print('It hung.', file=sys.stderr)\n"
         f"{owner}.{name} = hang\n"
         "sys.exit(run(['drive', *sys.argv[1:]]))\n"
     )
     command = [sys.executable, "-c", program, str(rig.root), "--port", str(rig.robot.port)]
     rig.drivers.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+    return rig.drivers[-1]
 
 
 def test_a_disk_that_is_slow_holds_up_the_log_alone(rig):
     """A write takes 1.5 s: not a tick is left out meanwhile, and all of it is written then."""
-    start_hanging(rig, "zfcal.online.drive_log.DriveLog._write")
-    rig.until(lambda: rig.moves() > 100, 60.0)
-    rig.end()
+    driver = start_hanging(rig, "zfcal.online.drive_log.DriveLog._write", call=40)
+    rig.until(lambda: rig.moves() > 45)
+    driver.send_signal(signal.SIGTERM)
+    assert driver.wait(10) == 143
     times = [c["time_s"] for c in rig.items("command")]
     assert np.diff(times).max() < 0.35
     assert rig.items("fault") == []
-    assert "held up" not in rig.drivers[-1].stderr.read()
+    said = driver.stderr.read()
+    assert "It hung." in said
+    assert "held up" not in said
     assert replay(rig.root, say_nothing).is_same
 
 
 def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
     """Its main thread waits for something for 1.5 s: STOP comes in time, from the other thread."""
-    start_hanging(rig, "zfcal.online.driving.Driver.tick")
+    driver = start_hanging(rig, "zfcal.online.driving.Driver.tick", call=150)
     rig.until(lambda: any(f["fault"] == "watchdog" for f in rig.items("fault")))
     moves = rig.moves()
     rig.until(lambda: rig.moves() > moves + 5)
@@ -389,32 +407,32 @@ def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
     stops = [t for t, frame in rig.heard() if frame == STOP and times[gap - 1] < t < times[gap]]
     assert stops
     assert stops[0] - times[gap - 1] < 0.65
-    rig.drivers[-1].kill()
-    assert (
-        "steps of the model were missed: the driver was held up." in rig.drivers[-1].stderr.read()
-    )
+    driver.kill()
+    assert "steps of the model were missed: the driver was held up." in driver.stderr.read()
 
 
-def test_a_second_driver_is_refused_and_a_port_that_is_not_there(rig, tmp_path):
+def test_a_second_driver_is_refused_and_a_port_that_is_not_there(
+    rig, tmp_path, capsys, monkeypatch
+):
     """Exit 75 and exit 1, each with a line that says why."""
     rig.start()
     rig.until(lambda: rig.moves() > 2)
-    second = rig.start()
+    second = rig.start_anew()
     assert second.wait(20) == 75
     with pytest.raises(LockedError):
         replay(rig.root, say_nothing)
     other = driven.make_trial(tmp_path / "other")
-    words = [sys.executable, "-m", "zfcal_cli.main", "drive", str(other), "--port", "/dev/nobody"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "/dev/nobody: the port cannot be opened" in done.stderr
-    assert "Traceback" not in done.stderr
+    monkeypatch.setattr("zfcal.online.drive._OPENING_S", 0.2)
+    assert zfcal(["drive", str(other), "--port", "/dev/nobody"]) == 1
+    said = capsys.readouterr().err
+    assert "/dev/nobody: the port cannot be opened" in said
+    assert "Traceback" not in said
 
 
 def test_events_are_told_as_lines_of_json(rig):
     """From its beginning to its end: by whom and by what it drives, how quick it was."""
-    driver = rig.start("--duration", "2s", "--pattern", "pid", "-q")
-    assert driver.wait(30) == 0
+    rig.start("--duration", "2s", "--pattern", "pid", "-q")
+    assert rig.forks.code(30) == 0
     (began,), (ended,) = rig.told("began"), rig.told("ended")
     assert (began["pattern"], began["port"]) == ("pid", str(rig.robot.port))
     assert ended["because"] == "the duration is over"
@@ -425,16 +443,17 @@ def test_events_are_told_as_lines_of_json(rig):
     assert result["latency"]["tick_to_byte_s"]["n"] >= 15
     assert result["latency"]["pose_to_state_s"]["n"] >= 20
     assert [Path(told["path"]).name for told in rig.told("made")] == ["000000.mcap"]
-    assert driver.stderr.read() == ""
+    assert rig.said() == ""
     assert Path(rig.told("made")[0]["path"]).exists()
 
 
-def test_the_end_is_told_as_json(rig):
+def test_the_end_is_told_as_json(rig, tmp_path):
     """One document: what was made, how quick it was; the driver ends after --duration."""
-    words = [sys.executable, "-m", "zfcal_cli.main", "drive", str(rig.root), "--json", "-q"]
-    words += ["--port", str(rig.robot.port), "--duration", "2s", "--pattern", "pid"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    document = json.loads(done.stdout)
+    words = ("--json", "-q", "--port", rig.robot.port, "--duration", "2s", "--pattern", "pid")
+    out = tmp_path / "end.json"
+    rig.forks.start(tmp_path, "drive", rig.root, *words, out=out)
+    assert rig.forks.code(30) == 0
+    document = json.loads(out.read_text())
     (result,) = document["results"]
     assert result["commands"] >= 15
     assert result["latency"]["tick_to_byte_s"]["n"] >= 15
