@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
-from zfcal.diagnose.candidates import askable, candidates_of, company_of
+from zfcal.diagnose.candidates import (
+    FORMS,
+    askable,
+    candidates_of,
+    company_of,
+    is_generic,
+    not_forms_of,
+)
 from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.effects.generic import generic_effects
 from zfcal.model.scene import make_scene
 
 
@@ -106,3 +114,24 @@ def test_boldness_needs_long_tracks(fish, scene_of):
 
     _, lacks = askable(scene_of(cut), fish)
     assert lacks["boldness"] == "tracks of 300 s under one id"
+
+
+def test_other_forms_of_what_is_known_are_not_asked_for(tank):
+    """Own speed is burst and coast by another form; places for the speed are another matter."""
+    generic = candidates_of(generic_effects(), tank)
+    left = {each.name for each in not_forms_of(generic, {"burst-and-coast", "place-preference"})}
+    gone = {each.name for each in generic} - left
+    assert gone == {"generic:speed:own-speed", "generic:heading:place"}
+    assert not_forms_of(generic, ()) == generic
+    assert "generic:speed:wall" not in {
+        each.name for each in not_forms_of(generic, {"generic:speed:wall"})
+    }
+
+
+def test_every_form_is_that_of_a_listed_effect():
+    """By names that there are, and with the same response: headings or speed."""
+    for own, listed in FORMS.items():
+        assert is_generic(own)
+        assert not is_generic(listed)
+        pair = {find_effect(own).on_speed, find_effect(listed).on_speed}
+        assert len(pair) == 1 or listed == "speed-turn-coupling"

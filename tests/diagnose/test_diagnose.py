@@ -235,3 +235,22 @@ def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
     kept = _kept(steps, (steady, told), explained=explained)
     assert kept == (steps if stands else steps[:1])
     assert _kept(steps, (dataclasses.replace(told, holds=False), told), explained=True) == ()
+
+
+LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}
+"""Fish that stay fast, by another form than that of the listed effect."""
+
+
+def test_another_form_of_a_listed_effect_is_called_by_its_name(ask, record):
+    """Speed follows the own speed in a straight line, not by a power: that is burst and coast."""
+    found = ask(record(61, LINEAR))
+    assert found.effects[0].name == "burst-and-coast"
+
+
+def test_what_is_small_beside_a_listed_effect_is_no_effect_beyond_the_list(ask, record):
+    """Strong handedness, and a little pull to walls: by itself that is said, beside it not."""
+    walls = {"generic:heading:wall": {"strength": -0.55}}
+    alone = ask(record(62, walls))
+    assert [each.name for each in alone.effects] == ["generic:heading:wall"]
+    both = ask(record(62, {"turning-bias": {"strength": 0.7}, **walls}))
+    assert [each.name for each in both.effects] == ["turning-bias"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose import heats
-from zfcal.diagnose.heats import unbeaten
+from zfcal.diagnose.heats import ahead, run_heats, unbeaten
 from zfcal.diagnose.naming import refit
 
 SUSPECTS = ("group-cohesion", "leader-following", "wall-persistence", "burst-and-coast")
@@ -23,31 +23,64 @@ def short(monkeypatch):
     monkeypatch.setattr(heats, "HEAT_TURNS", 4000)
 
 
-def test_only_what_cannot_be_the_best_is_left_out(asked, short):
+@pytest.fixture
+def ran(asked, short):
+    """The four suspects' heats."""
+    return run_heats(*asked, 2)
+
+
+def names(found):
+    """Return the effects of some heats."""
+    return [heat.score.candidate.name for heat in found]
+
+
+def test_only_what_cannot_be_the_best_is_left_out(asked, ran):
     """Whoever wins with all steps has won its heat, and the heat was of some use."""
     screen, scores = asked
-    worth = unbeaten(screen, scores, 2)
+    worth = names(unbeaten(ran))
     nats = [refit(screen, score).nats for score in scores]
 
-    assert worth[int(np.argmax(nats))]
-    assert worth[SUSPECTS.index("group-cohesion")]
-    assert not all(worth)
+    assert SUSPECTS[int(np.argmax(nats))] in worth
+    assert "group-cohesion" in worth
+    assert len(worth) < len(SUSPECTS)
 
 
 def test_a_recording_without_any_of_them_keeps_them_all(screen, candidate, short):
     """Nobody is five standard errors ahead where there is nothing."""
     nothing = screen(32, minutes=8.0)
-    assert all(unbeaten(nothing, [nothing.ask(candidate(name)) for name in SUSPECTS], 1))
+    scores = [nothing.ask(candidate(name)) for name in SUSPECTS]
+    assert names(unbeaten(run_heats(nothing, scores, 1))) == list(SUSPECTS)
 
 
-def test_two_suspects_or_few_steps_are_worth_no_heat(asked):
-    """They are all fitted to everything."""
+def test_what_must_be_ahead_in_the_end_is_out_sooner(ran):
+    """Those behind the others' best by a standard error are out, and it itself never is."""
+    cohesion, rest = ran[:1], ran[1:]
+    assert ahead(rest, cohesion) == []
+    assert ahead(cohesion, rest) == cohesion
+    assert ahead(cohesion, cohesion) == cohesion
+    assert ahead(rest, []) == rest
+
+
+def test_what_all_steps_may_gain_is_told_by_some(asked, ran):
+    """Cohesion may gain what it gains in the end, which an idle effect may not."""
     screen, scores = asked
-    assert unbeaten(screen, scores[:2], 1) == [True, True]
-    assert unbeaten(screen, scores, 1) == [True] * 4
+    whole = refit(screen, scores[0]).nats
+    assert ran[0].share >= 2
+    assert ran[0].gains(whole)
+    assert not ran[0].gains(3 * whole)
+    assert not any(heat.gains(whole) for heat in ran[1:])
 
 
-def test_a_heat_does_not_depend_on_the_threads(asked, short):
-    """The same answer by one and by three."""
-    screen, scores = asked
-    assert unbeaten(screen, scores, 1) == unbeaten(screen, scores, 3)
+def test_few_steps_are_worth_no_heat(asked):
+    """All are then fitted to everything, and may gain anything."""
+    ran = run_heats(*asked, 1)
+    assert [heat.first for heat in ran] == [None] * 4
+    assert unbeaten(ran) == ran == ahead(ran, ran)
+    assert all(heat.gains(1e9) for heat in ran)
+
+
+def test_a_heat_does_not_depend_on_the_threads(asked, ran):
+    """The same fits by one and by two."""
+    alone = run_heats(*asked, 1)
+    assert [heat.first.values for heat in alone] == [heat.first.values for heat in ran]
+    assert [heat.first.nats for heat in alone] == [heat.first.nats for heat in ran]

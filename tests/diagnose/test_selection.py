@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from zfcal.diagnose.candidates import candidates_of
 from zfcal.diagnose.null import from_replicates, theory
@@ -64,3 +65,13 @@ def test_each_effect_stands_at_its_best_shape(shapes):
     assert ranked[0].score.candidate is shapes[1]
     assert ranked[0].p < 1e-6
     assert ranked[1].p > 0.01
+
+
+def test_the_family_is_as_large_however_many_are_asked(shapes):
+    """What the model has already is not asked for again, and makes the others no more unlikely."""
+    family = Asked(candidates=shapes, held=(), null=theory(0))
+    scores = scores_of(shapes, {2: 3.5})
+    (alone,) = best_of(family, scores[2:3])
+    (among,) = (each for each in best_of(family, scores) if each.score is scores[2])
+    assert alone.p == among.p
+    assert alone.p == pytest.approx(1 - (1 - 2 * norm.sf(3.5)) ** len(shapes), rel=1e-6)

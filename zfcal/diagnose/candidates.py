@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects
 from zfcal.model.effects.base import Company
+from zfcal.model.effects.generic import PREFIX
 from zfcal.model.rooms import find_rooms
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
@@ -49,6 +51,38 @@ class Candidate:
         """A strength that one would want to notice."""
         (own,) = (p for p in self.effect.parameters if p.name == self.effect.strength)
         return own.default
+
+
+FORMS = {
+    "generic:heading:neighbour-heading": "alignment",
+    "generic:heading:own-turn": "turning-memory",
+    "generic:heading:place": "place-preference",
+    "generic:speed:neighbour-speed": "speed-matching",
+    "generic:speed:own-speed": "burst-and-coast",
+    "generic:speed:own-turn": "speed-turn-coupling",
+}
+"""Effects beyond the list that say what a listed one says, in another form: the same cue and
+the same response."""
+
+
+def is_generic(name: str) -> bool:
+    """Return whether an effect is beyond the list."""
+    return name.startswith(PREFIX)
+
+
+def not_forms_of(candidates: Iterable[Candidate], known: Collection[str]) -> tuple[Candidate, ...]:
+    """Return the candidates that are neither known nor another form of what is known.
+
+    Parameters
+    ----------
+    candidates
+        Beyond the list.
+    known
+        Names of effects, listed or not.
+    """
+    return tuple(
+        each for each in candidates if each.name not in known and FORMS.get(each.name) not in known
+    )
 
 
 def company_of(scene: Scene) -> Company:

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from zfcal.diagnose.candidates import is_generic
 from zfcal.diagnose.findings import Note
+from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.scores import Score, by_track
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
 from zfcal.model.effects import find_effect
-from zfcal.model.effects.generic import PREFIX
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import MIN_STEPS, Fitted
 from zfcal.model.scene import Moves, Scene, thin
@@ -52,8 +53,8 @@ class Confirmed:
         Mean over all steps of the log density with it less that without it, and the
         standard error of that mean.
     holds
-        Whether the gain is more than two standard errors, and, beside individuals that differ,
-        not that of one fish.
+        Whether the gain is more than two standard errors, beside individuals that differ not
+        that of one fish, and not what an effect before it leaves over.
     steady
         Whether the effect is there all the time.
     """
@@ -107,11 +108,16 @@ def confirm(
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         made = list(pool.map(lambda each: _half(models[each[0]], each[1]), asked))
         halves_of = {key: (made[2 * n], made[2 * n + 1]) for n, key in enumerate(models)}
-        confirmed = pool.map(lambda step: _confirmed(step, halves_of), steps)
+        earlier = [steps[:n] for n in range(len(steps))]
+        confirmed = pool.map(
+            lambda step, before: _confirmed(step, before, halves_of), steps, earlier
+        )
         return tuple(confirmed), _note(screen, halves_of[id(screen)])
 
 
-def _confirmed(step: Step, halves_of: Mapping[int, tuple[_Half, _Half]]) -> Confirmed:
+def _confirmed(
+    step: Step, earlier: Sequence[Step], halves_of: Mapping[int, tuple[_Half, _Half]]
+) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
         told = _of_speeds(step)
@@ -119,7 +125,11 @@ def _confirmed(step: Step, halves_of: Mapping[int, tuple[_Half, _Half]]) -> Conf
         before, after = halves_of[id(step.before)], halves_of[id(best.screen)]
         told = _summary(_held_out(step.before.scene, after) - _held_out(step.before.scene, before))
     score, scene = step.best.score, step.before.scene
-    holds = told.holds and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
+    holds = (
+        told.holds
+        and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
+        and outlasts(score, step.before, [each.choice.best.candidate for each in earlier])
+    )
     return replace(told, holds=holds, steady=is_steady(score, scene))
 
 
@@ -176,7 +186,7 @@ def is_steady(score: Score, scene: Scene) -> bool:
         Whose steps the score is of.
     """
     effect = score.candidate.effect
-    if effect.individual or effect.stops or effect.name.startswith(PREFIX):
+    if effect.individual or effect.stops or is_generic(effect.name):
         return True
     times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
     return all(_one_strength(score.steps, times_s // block_s) for block_s in _WAVERS_S)

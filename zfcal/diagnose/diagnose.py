@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.candidates import Candidate, not_forms_of
 from zfcal.diagnose.case import (
     QUICK_REPLICATES,
     Case,
@@ -129,7 +129,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
             held=asked,
             null=_null([row.listed for row in rows], len(asked)),
         ),
-        rivals=lambda screen: _rivals(case, screen),
+        rivals=lambda screen, known: _rivals(case, screen, known),
         suspicious=is_suspicious(question, omnibus),
         n_workers=question.n_workers,
         told=tell,
@@ -217,11 +217,11 @@ def _null(rows: Sequence[Floats], n_statistics: int) -> Null:
     return from_replicates(np.array(rows)) if len(rows) > 2 else theory(n_statistics)
 
 
-def _rivals(case: Case, screen: Screen) -> list[Best]:
+def _rivals(case: Case, screen: Screen, known: set[str]) -> list[Best]:
     """Return what beyond the list a model is asked for, held against a few replicates."""
-    question = case.question
-    alone = Asked(candidates=case.generic, held=(), null=theory(0))
-    found = best_of(alone, ask_all(screen, case.generic, question.n_workers))
+    question, generic = case.question, not_forms_of(case.generic, known)
+    alone = Asked(candidates=generic, held=(), null=theory(0))
+    found = best_of(alone, ask_all(screen, generic, question.n_workers))
     found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
     if not found or (question.quick and not has_noise(question)):
         return found
@@ -232,7 +232,7 @@ def _rivals(case: Case, screen: Screen) -> list[Best]:
 
     n = QUICK_REPLICATES if question.quick else _GENERIC_REPLICATES
     rows = run_null(case.chain, ask, n, n_workers=question.n_workers)
-    family = Asked(candidates=case.generic, held=asked, null=_null(rows, len(asked)))
+    family = Asked(candidates=generic, held=asked, null=_null(rows, len(asked)))
     return best_of(family, [best.score for best in found])
 
 

@@ -149,6 +149,12 @@ class Screen:
             return self._scatter(candidate, steps)
         return summed(candidate, steps)
 
+    def own_scores(self, candidate: Candidate) -> Floats:
+        """Return the scores of an effect that is in the model, not projected off itself."""
+        if candidate.effect.on_speed:
+            return self.ask(candidate).steps
+        return self.project(self.heading_scores(self.scene, candidate), off_effects=False)
+
     def heading_scores(self, scene: Scene, candidate: Candidate) -> Floats:
         """Return the scores of an effect on the heading, before projection, shape (turn,).
 

@@ -12,13 +12,12 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.diagnose.candidates import Candidate
-from zfcal.diagnose.heats import unbeaten
+from zfcal.diagnose.candidates import Candidate, is_generic
+from zfcal.diagnose.heats import Heat, ahead, run_heats, unbeaten
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
@@ -38,6 +37,10 @@ _LEAST_NATS = 6.0
 _LEAST_SHARE = 0.15
 """A further effect must gain this share of the first one's nats: an effect whose true form
 is a little different from its mechanism leaves something over that others answer to."""
+
+_GENERIC_SHARE = 0.5
+"""The same of a further effect beyond the list: it names no mechanism, and what a strong effect of
+another form leaves over is nearly always asked for by some of them."""
 
 _IN_REACH = 0.5
 """Share of the clearest one's standard errors below which a suspect is not put into the model:
@@ -81,9 +84,9 @@ class Asked:
         return np.where(one_sided & (z < 0), 0.0, z)
 
     def family_p(self, z: Floats) -> Floats:
-        """Return p-values over the whole family."""
-        own = self.null.p(z)
-        return np.asarray(-np.expm1(len(z) * np.log1p(-np.minimum(own, 1 - 1e-16))))
+        """Return p-values over the whole family, however many of it were asked for."""
+        own, n = self.null.p(z), len(self.candidates)
+        return np.asarray(-np.expm1(n * np.log1p(-np.minimum(own, 1 - 1e-16))))
 
     def centre_of(self, candidate: Candidate) -> tuple[float, float]:
         """Return centre and spread of a candidate's z, the effect's at another shape if need be.
@@ -179,8 +182,9 @@ class Selector:
     listed
         The family of candidates.
     rivals
-        Effects beyond the list that a model is asked for, the clearest first; they cost
-        time, and are asked where there is something to explain.
+        Effects beyond the list that a model is asked for, the clearest first, without other
+        forms of the effects named; they cost time, and are asked where there is something to
+        explain.
     suspicious
         Whether something is to be explained even if no listed effect answers.
     n_workers
@@ -190,7 +194,7 @@ class Selector:
     """
 
     listed: Asked
-    rivals: Callable[[Screen], list[Best]]
+    rivals: Callable[[Screen, set[str]], list[Best]]
     suspicious: bool
     n_workers: int
     told: Told = field(default=lambda _stage, _done, _all: None)
@@ -210,7 +214,7 @@ class Selector:
         first = tuple(ranked)
         for number in range(_MOST_EFFECTS):
             if number:
-                ranked = self._ranked(self.listed, screen)
+                ranked = self._ranked(screen, {each.choice.best.name for each in steps})
             step = self._step(screen, ranked, steps)
             if step is None:
                 break
@@ -219,37 +223,53 @@ class Selector:
             self.told("adding effects", number + 1, _MOST_EFFECTS)
         return Selection(steps=tuple(steps), screened=first, final=screen)
 
-    def _ranked(self, asked: Asked, screen: Screen) -> list[Best]:
-        return best_of(asked, ask_all(screen, asked.candidates, self.n_workers))
+    def _ranked(self, screen: Screen, taken: set[str]) -> list[Best]:
+        """Return the listed effects that a model lacks, the clearest first."""
+        open_ = [each for each in self.listed.candidates if each.name not in taken]
+        return best_of(self.listed, ask_all(screen, open_, self.n_workers))
 
     def _step(self, screen: Screen, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
         taken = {step.choice.best.name for step in done}
-        open_ = [best for best in ranked if best.score.candidate.name not in taken]
-        suspects = _in_reach([best for best in open_ if best.p < LEVEL])[:_SUSPECTS]
-        worth = bool(suspects) or (self.suspicious and not done)
-        least = max([_LEAST_NATS, *(_LEAST_SHARE * done[0].choice.best.nats for _ in done[:1])])
-        listed, rivals = together(
-            lambda: self._refits(screen, suspects, least),
-            lambda: self._rivals(screen, taken) if worth else [],
-            n_workers=self.n_workers,
-        )
-        generic = self._refits(screen, rivals, least)
+        suspects = _in_reach([best for best in ranked if best.p < LEVEL])[:_SUSPECTS]
+        first = done[0].choice.best.nats if done else 0.0
+        least = max(_LEAST_NATS, _LEAST_SHARE * first)
+        heats, rivals = self._entered(screen, suspects, taken, least)
+        others = run_heats(screen, [best.score for best in rivals], self.n_workers)
+        made = self._refits(screen, [*unbeaten(heats), *ahead(others, heats)])
+        beyond = max(least, _GENERIC_SHARE * first)
+        listed = [each for each in made if not is_generic(each.name) and each.nats > least]
+        generic = [each for each in made if is_generic(each.name) and each.nats > beyond]
         if not listed and not generic:
             return None
         choice = self._choose(listed, generic)
         by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
         return Step(choice=choice, best=by_name[choice.best.name], before=screen)
 
-    def _rivals(self, screen: Screen, taken: set[str]) -> list[Best]:
-        found = (best for best in self.rivals(screen) if best.score.candidate.name not in taken)
+    def _entered(
+        self, screen: Screen, suspects: Sequence[Best], taken: set[str], least: float
+    ) -> tuple[list[Heat], list[Best]]:
+        """Return the heats of suspects, and the effects beyond the list that are worth one."""
+        scores = [best.score for best in suspects]
+        known = {*taken, *(score.candidate.name for score in scores)}
+        if taken:
+            ran = run_heats(screen, scores, self.n_workers)
+            heats = [heat for heat in ran if heat.gains(least)]
+            return heats, self._rivals(screen, known) if heats else []
+        worth = bool(suspects) or self.suspicious
+        return together(
+            lambda: run_heats(screen, scores, self.n_workers),
+            lambda: self._rivals(screen, known) if worth else [],
+            n_workers=self.n_workers,
+        )
+
+    def _rivals(self, screen: Screen, known: set[str]) -> list[Best]:
+        """Return the clearest effects beyond the list that are no other form of known ones."""
+        found = self.rivals(screen, known)
         return _in_reach([best for best in found if abs(best.z) > RIVAL_Z])[:RIVALS]
 
-    def _refits(self, screen: Screen, bests: Sequence[Best], least: float) -> list[Refit]:
-        scores = [best.score for best in bests]
-        worth = compress(scores, unbeaten(screen, scores, self.n_workers))
+    def _refits(self, screen: Screen, heats: Sequence[Heat]) -> list[Refit]:
         with ThreadPoolExecutor(max(1, self.n_workers)) as pool:
-            made = pool.map(lambda score: refit(screen, score), worth)
-            return [each for each in made if each.nats > least]
+            return list(pool.map(lambda heat: refit(screen, heat.score), heats))
 
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
         if not listed:

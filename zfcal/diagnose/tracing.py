@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.findings import Trace
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.scores import Score
@@ -50,7 +49,7 @@ def trace(score: Score, before: Screen, after: Refit) -> Trace:
     steps: Moves = scene.moves if score.candidate.effect.on_speed else scene.turns
     unit = float(score.steps.std()) or 1.0
     own = np.sign(score.z or 1.0) * score.steps / unit
-    left = np.sign(score.z or 1.0) * _left(score.candidate, after.screen) / unit
+    left = np.sign(score.z or 1.0) * after.screen.own_scores(score.candidate) / unit
     states = scene.states[steps.at, :, steps.who]
     cue = _cue(score.candidate.name, scene, steps)
     middle, observed = _binned(cue.values, own)
@@ -69,14 +68,6 @@ def trace(score: Score, before: Screen, after: Refit) -> Trace:
         cue_name=cue.name,
         response_name="score of the effect (standard deviations a step)",
     )
-
-
-def _left(candidate: Candidate, screen: Screen) -> Floats:
-    """Return the scores of an effect in the model that has it, not projected off itself."""
-    if candidate.effect.on_speed:
-        return screen.ask(candidate).steps
-    scores = screen.heading_scores(screen.scene, candidate)
-    return screen.project(scores, off_effects=False)
 
 
 def _cue(name: str, scene: Scene, steps: Moves) -> _Cue:
