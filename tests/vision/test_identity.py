@@ -263,3 +263,19 @@ def test_who_is_known_is_not_settled_by_who_is_not():
     film.show({0: LARGE, 1: LARGE}, 1, mixed={(0, 1): 0.5})
 
     assert film.names._chance[0, 0] < 0.9
+
+
+def test_of_two_between_whom_nothing_tells_each_keeps_the_id(monkeypatch):
+    """Two others exchange theirs; the chances of these two are even but for rounding."""
+    monkeypatch.setattr("zfcal.vision.identity._MEND", 2.0)
+    for rounding in (-1e-15, 0.0, 1e-15):
+        names = Identities(4)
+        chance = np.full((4, 4), 1e-6)
+        chance[:2, :2] = 0.5
+        chance[0, 0] += rounding
+        chance[2, 3] = chance[3, 2] = 0.99
+        names._chance = chance
+
+        names._rename()
+
+        assert names._name.tolist() == [0, 1, 3, 2]

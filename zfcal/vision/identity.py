@@ -67,6 +67,9 @@ _ITSELF = 0.999
 _ENCOUNTER_S = 1.5
 """For so long two are near each other: the likely moment counts more than the last one."""
 
+_TIE = 1e-6
+"""Log odds that are none."""
+
 _LEAST = 1e-6
 _ROUNDS = 4
 
@@ -88,6 +91,7 @@ class Identities:
         self._keys: list[int | None] = [None] * n_agents
         self._chance: Floats = np.eye(n_agents)
         self._name = np.arange(n_agents)
+        self._every = np.arange(n_agents)
         self._last: list[tuple[Floats, float] | None] = [None] * n_agents
         self._n = np.zeros(n_agents)
         self._mean = np.zeros((n_agents, 2))
@@ -227,8 +231,11 @@ class Identities:
     def _rename(self) -> None:
         """Exchange ids where others are clearly likelier."""
         likely = np.log(np.maximum(self._chance, _LEAST))
-        rows, names = linear_sum_assignment(-likely)
-        gain = likely[rows, names].sum() - likely[rows, self._name].sum()
+        now = likely[self._every, self._name]
+        # Of two between whom nothing tells each stays himself, not what rounding says.
+        likely[self._every, self._name] = now + _TIE
+        names = linear_sum_assignment(-likely)[1]
+        gain = likely[self._every, names].sum() - now.sum()
         if gain > _MEND:
             self._exchanges += self._exchanged(self._name, names)
             # Before now these rows had other names.
