@@ -1,5 +1,6 @@
 """Frames of known fish are tracked: where they are, who they are, where they head."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -171,6 +172,30 @@ def test_what_lies_outside_the_region_is_not_seen(drawn):
     told = [seen for _, seen in follow(tracker, drawn.frames(drawn.circling(60)))]
 
     assert max(s.x_px for seen in told for s in seen) < 101
+
+
+@pytest.mark.parametrize("corner", [0, 64, 96])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_region_changes_nothing_about_those_within(drawn, method, corner):
+    """The same poses as in an image that is cut to the region's surroundings, shifted by these."""
+    region = np.zeros((drawn.SIZE, drawn.SIZE), bool)
+    region[corner : corner + 100, corner : corner + 100] = True
+    path = [[(corner + 50 + 30 * math.cos(k / 9), corner + 50.0, k / 9)] for k in range(120)]
+    frames = list(drawn.frames(path, noise=0.6))
+
+    told = []
+    for cut in (0, corner // 2):
+        part = np.s_[cut:, cut:]
+        tracker = FishTracker(TrackerOptions(method=method), drawn.PROJECTION, region=region[part])
+        images = [dataclasses.replace(f, image=f.image[part]) for f in frames]
+        told.append([(cut, seen) for _, seen in follow(tracker, images)])
+
+    places = [
+        [[(round(s.x_px + cut, 6), round(s.y_px + cut, 6)) for s in seen] for cut, seen in each]
+        for each in told
+    ]
+    assert places[0] == places[1]
+    assert all(len(seen) == 1 for seen in places[0])
 
 
 @pytest.mark.parametrize(

@@ -38,46 +38,95 @@ def summing(function: F) -> F:
 
 @kernel
 def shades(inside: Grey, grey: Grey, level: Grey, left: int, top: int) -> tuple[Floats, Floats]:
-    """Return the pixels within a mask that are darker than the tank, and by which share of it.
+    """Return the pixels in or beside a mask that are darker than the tank, and by which share.
 
     Parameters
     ----------
-    inside, grey, level : ndarray of uint8, shape (height, width)
-        The mask, the image and the empty tank.
+    inside : ndarray of uint8, shape (row, column)
+        The mask of a part of the image; those above, below, left and right of it count as well.
+    grey, level : ndarray of uint8, shape (height, width)
+        The image and the empty tank.
     left, top
-        Where they were cut out of the whole image.
+        Where the part begins.
 
     Returns
     -------
     pixels : ndarray, shape (pixel, 2)
-        x and y in the whole image, row by row.
+        x and y in the image, row by row.
     shares : ndarray, shape (pixel,)
+        Of the tank's grey.
     """
     height, width = inside.shape
+    pixels, shares = np.empty((height * width, 2)), np.empty(height * width)
     n = 0
     for y in range(height):
         for x in range(width):
-            n += inside[y, x] > 0 and level[y, x] > grey[y, x]
-    pixels, shares = np.empty((n, 2)), np.empty(n)
-    n = 0
-    for y in range(height):
-        for x in range(width):
-            if inside[y, x] > 0 and level[y, x] > grey[y, x]:
+            tank, seen = level[y + top, x + left], grey[y + top, x + left]
+            if tank > seen and (
+                inside[y, x]
+                or (y > 0 and inside[y - 1, x])
+                or (x > 0 and inside[y, x - 1])
+                or (x + 1 < width and inside[y, x + 1])
+                or (y + 1 < height and inside[y + 1, x])
+            ):
                 pixels[n, 0], pixels[n, 1] = x + left, y + top
-                tank = float(level[y, x])
-                shares[n] = (tank - grey[y, x]) / tank
+                shares[n] = (float(tank) - seen) / float(tank)
                 n += 1
-    return pixels, shares
+    return pixels[:n].copy(), shares[:n].copy()
 
 
 @kernel
-def moments(pixels: Floats, weights: Floats) -> tuple[float, float, float, float, Floats]:
+def _is_whole(mask: Grey, x: int, y: int) -> bool:
+    """Return whether a pixel and its four neighbours, as far as there are any, are in a mask."""
+    height, width = mask.shape
+    return (
+        mask[y, x] > 0
+        and (y == 0 or mask[y - 1, x] > 0)
+        and (x == 0 or mask[y, x - 1] > 0)
+        and (x + 1 == width or mask[y, x + 1] > 0)
+        and (y + 1 == height or mask[y + 1, x] > 0)
+    )
+
+
+@kernel
+def outlasts_opening(mask: Grey, inside: Grey, left: int, top: int) -> bool:
+    """Return whether anything of a part of a mask is left when it is opened by a cross.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+    inside : ndarray of uint8, shape (row, column)
+        Which pixels of the part count.
+    left, top
+        Where the part begins.
+    """
+    height, width = mask.shape
+    for row in range(inside.shape[0]):
+        for column in range(inside.shape[1]):
+            if not inside[row, column]:
+                continue
+            y, x = row + top, column + left
+            if (
+                _is_whole(mask, x, y)
+                or (y > 0 and _is_whole(mask, x, y - 1))
+                or (x > 0 and _is_whole(mask, x - 1, y))
+                or (x + 1 < width and _is_whole(mask, x + 1, y))
+                or (y + 1 < height and _is_whole(mask, x, y + 1))
+            ):
+                return True
+    return False
+
+
+@kernel
+def moments(
+    pixels: Floats, weights: Floats
+) -> tuple[float, float, float, float, tuple[float, float, float]]:
     """Return mass, centre and long axis of weighted pixels, and their moments along it.
 
     Returns
     -------
     total, x, y, angle_rad : float
-    central : ndarray, shape (3,)
+    central : tuple of float
         Second moment along the axis, second moments of both axes together, third along it.
     """
     total, x, y = 0.0, 0.0, 0.0
@@ -99,7 +148,7 @@ def moments(pixels: Floats, weights: Floats) -> tuple[float, float, float, float
         along = (pixels[p, 0] - x) * cos + (pixels[p, 1] - y) * sin
         second += weights[p] * along**2
         third += weights[p] * along**3
-    return total, x, y, angle, np.array([second, xx + yy, third]) / total
+    return total, x, y, angle, (second / total, (xx + yy) / total, third / total)
 
 
 @kernel
@@ -220,6 +269,113 @@ def balance(chance: Floats, least: float, rounds: int) -> None:
 
 
 @kernel
+def weigh(  # noqa: PLR0913, PLR0917 - a kernel
+    chance: Floats,
+    rows: NDArray[np.intp],
+    seen: Floats,
+    n: Floats,
+    mean: Floats,
+    within: Floats,
+    between: Floats,
+    weight: float,
+    most: float,
+) -> None:
+    """Let looks speak for identities, in place: a normal law for each, its mean not known exactly.
+
+    Parameters
+    ----------
+    chance : ndarray, shape (row, identity)
+    rows : ndarray, shape (track,)
+        Those that are looked at.
+    seen : ndarray, shape (track, measure)
+    n : ndarray, shape (identity,)
+        Sightings of each so far.
+    mean : ndarray, shape (identity, measure)
+        Of those sightings.
+    within, between : ndarray, shape (measure,)
+        Variance over time, and of identities.
+    weight
+        What one look counts.
+    most
+        By how much one look may speak against an identity, in log odds.
+    """
+    n_agents = len(n)
+    middle = np.zeros(2)
+    n_known = 0
+    for who in range(n_agents):
+        if n[who] > 0:
+            middle += mean[who]
+            n_known += 1
+    if n_known:
+        middle /= n_known
+    else:
+        for k in range(len(rows)):
+            middle += seen[k] / len(rows)
+    tells = np.empty(n_agents)
+    for k in range(len(rows)):
+        for who in range(n_agents):
+            odd = 0.0
+            for axis in range(2):
+                sights = n[who] * weight / within[axis]
+                sure = 1 / between[axis] + sights
+                at = (middle[axis] / between[axis] + sights * mean[who, axis]) / sure
+                spread = within[axis] + 1 / sure
+                odd += (seen[k, axis] - at) ** 2 / spread + math.log(spread)
+            tells[who] = -0.5 * odd
+        best = tells.max()
+        for who in range(n_agents):
+            chance[rows[k], who] *= math.exp(weight * max(tells[who] - best, -most))
+
+
+@kernel
+def learn(  # noqa: PLR0913, PLR0917 - a kernel
+    chance: Floats,
+    rows: NDArray[np.intp],
+    seen: Floats,
+    lengths: Floats,
+    n: Floats,
+    mean: Floats,
+    length: Floats,
+    within: Floats,
+    looks: float,
+    limits: tuple[float, float, float],
+) -> float:
+    """Learn from looks what identities look like, in place; return how many spreads are known from.
+
+    Parameters
+    ----------
+    chance, rows, seen, n, mean
+        As of `weigh`.
+    lengths : ndarray, shape (track,)
+        One more measure, of which the mean alone is learnt.
+    length : ndarray, shape (identity,)
+    within : ndarray, shape (measure,)
+        Squares summed over looks.
+    looks
+        How many.
+    limits
+        The chance from which a look is learnt from, the sightings from which it tells of spread,
+        and the sightings that are remembered.
+    """
+    sure, known, memory = limits
+    for k in range(len(rows)):
+        who = chance[rows[k]].argmax()
+        if chance[rows[k], who] < sure:
+            continue
+        n[who] += 1
+        weight = 1 / min(n[who], memory)
+        for axis in range(2):
+            away = seen[k, axis] - mean[who, axis]
+            if n[who] > known:
+                within[axis] += min(away**2, 9 * within[axis] / looks)
+            mean[who, axis] += weight * away
+        if n[who] > known:
+            looks += 1
+        length[who] += weight * (lengths[k] - length[who])
+    return looks
+
+
+@kernel
 def median_ratio(one: Grey, other: Grey, first: int, step: int) -> float:
     """Return the median ratio of two images on a grid, each grey counted from one.
 
@@ -243,6 +399,7 @@ def prepare() -> None:
     """Compile all, so that no frame has to wait for it."""
     mask, level, dark = (np.full((2, 2), value, np.uint8) for value in (1, 9, 3))
     pixels, weights = shades(mask, dark, level, 0, 0)
+    outlasts_opening(mask, dark, 0, 0)
     moments(pixels, weights)
     nearest_squared(pixels, pixels)
     clusters(pixels, weights, pixels.copy(), 1)
@@ -251,3 +408,7 @@ def prepare() -> None:
     read_grid(np.ones((2, 2, 2)), pixels)
     balance(np.ones((2, 2)), 0.1, 1)
     median_ratio(mask, dark, 0, 1)
+    two = np.ones((2, 2))
+    rows = np.zeros(2, np.intp)
+    weigh(two, rows, two, two[0], two, two[0], two[0], 1.0, 1.0)
+    learn(two, rows, two, two[0], two[0], two, two[0], two[0], 1.0, (0.5, 1.0, 1.0))

@@ -6,6 +6,8 @@ without a partner costs the gate. Solved exactly (`scipy.optimize.linear_sum_ass
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +38,12 @@ class Match:
     margin: float
 
 
-def assign(cost: Floats, gate: Floats) -> list[Match]:
+def assign(
+    cost: Floats,
+    gate: Floats,
+    tracks: Sequence[int] | None = None,
+    detections: Sequence[int] | None = None,
+) -> list[Match]:
     """Return the pairs of least total cost, each below its track's gate.
 
     Parameters
@@ -45,36 +52,46 @@ def assign(cost: Floats, gate: Floats) -> list[Match]:
         Non-negative.
     gate : ndarray, shape (track,)
         Largest cost of a pair of that track.
+    tracks, detections
+        Those that are matched, ascending; None for all.
 
     Returns
     -------
     list of Match
         Ascending by track.
     """
-    n_tracks, n_detections = cost.shape
+    tracks = range(cost.shape[0]) if tracks is None else tracks
+    detections = range(cost.shape[1]) if detections is None else detections
+    n_tracks, n_detections = len(tracks), len(detections)
     if not n_tracks or not n_detections:
         return []
+    if (n_tracks, n_detections) != cost.shape:
+        cost, gate = cost[np.ix_(tracks, detections)], gate[list(tracks)]
     # A column for each track to stay alone in, at the price of its gate.
-    alone = np.full((n_tracks, n_tracks), np.inf)
-    np.fill_diagonal(alone, gate)
-    full = np.hstack([np.where(cost < gate[:, None], cost, np.inf), alone])
-    rows, columns = linear_sum_assignment(full)
-    pairs = {int(r): int(c) for r, c in zip(rows, columns, strict=True) if c < n_detections}
+    full = np.full((n_tracks, n_detections + n_tracks), np.inf)
+    full[:, :n_detections] = np.where(cost < gate[:, None], cost, np.inf)
+    own = np.arange(n_tracks)
+    full[own, n_detections + own] = gate
+    rows, columns = (found.tolist() for found in linear_sum_assignment(full))
+    pairs = {r: c for r, c in zip(rows, columns, strict=True) if c < n_detections}
+    some = full[:, :n_detections].tolist()
     return [
-        Match(track=t, detection=d, cost=float(cost[t, d]), margin=_margin(full, pairs, t))
+        Match(
+            track=tracks[t],
+            detection=detections[d],
+            cost=some[t][d],
+            margin=_margin(some, pairs, t),
+        )
         for t, d in pairs.items()
     ]
 
 
-def _margin(full: Floats, pairs: dict[int, int], track: int) -> float:
+def _margin(cost: list[list[float]], pairs: dict[int, int], track: int) -> float:
     """Return how much dearer the cheapest change of this track's detection is."""
-    own = pairs[track]
-    n_detections = full.shape[1] - full.shape[0]
+    own, mine = pairs[track], cost[track]
     taken = set(pairs.values())
-    free = [full[track, d] - full[track, own] for d in range(n_detections) if d not in taken]
+    free = [mine[d] - mine[own] for d in range(len(mine)) if d not in taken]
     changed = [
-        full[track, d] + full[t, own] - full[track, own] - full[t, d]
-        for t, d in pairs.items()
-        if t != track
+        mine[d] + cost[t][own] - mine[own] - cost[t][d] for t, d in pairs.items() if t != track
     ]
-    return float(min([*free, *changed], default=np.inf))
+    return min([*free, *changed], default=math.inf)

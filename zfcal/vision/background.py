@@ -81,8 +81,12 @@ class Background:
 
         The median ratio over a coarse grid: fish cover less than half of a tank.
         """
-        one, other = np.ascontiguousarray(grey), np.ascontiguousarray(self.level)
-        return median_ratio(one, other, _GRID_PX // 2, _GRID_PX)
+        return median_ratio(whole(grey), whole(self.level), _GRID_PX // 2, _GRID_PX)
+
+
+def whole(grey: Grey) -> Grey:
+    """Return an image as kernels are compiled for: in one piece, and not read-only."""
+    return grey if grey.flags.c_contiguous and grey.flags.writeable else grey.copy()
 
 
 def grey_of(image: Image) -> Grey:
@@ -261,7 +265,7 @@ def background_of_many(images: list[Grey]) -> Background:
 def _within(level: Grey, sd: Floats) -> Background:
     width = _SIGMAS * sd
     return Background(
-        level=level,
+        level=level.copy(),
         low=np.clip(level - width, 0, 255).astype(np.uint8),
         high=np.clip(level + width, 0, 255).astype(np.uint8),
     )

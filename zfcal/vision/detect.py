@@ -9,13 +9,13 @@ down; angles turn from x towards y, as the eye sees them: clockwise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.vision._kernels import moments, shades
+from zfcal.vision._kernels import moments, outlasts_opening, shades
 from zfcal.vision.background import Background, Grey
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,7 @@ _MOST_CORNERS = 16
 
 _KERNEL = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 _MARGIN_PX = 2
+_NO_CORNERS = np.empty((0, 2))
 
 _SKEW = 0.5
 """Skewness along the axis that settles which end is the head."""
@@ -127,30 +128,19 @@ class Contrast:
         As bright as the background, its negative where fish are light.
     background
         The empty tank.
-    foreground : ndarray of uint8, shape (height, width)
-        255 where it is not the tank, closed.
-    mask : ndarray of uint8, shape (height, width)
-        The same before it was closed.
+    mask : ndarray of uint8, shape (row, column)
+        255 where it is not the tank, in a part of the image.
+    corner
+        Left and top of that part.
     inner : ndarray of uint8, shape (height, width), optional
         What is darker surely is animal.
     """
 
     grey: Grey
     background: Background
-    foreground: Grey
     mask: Grey
+    corner: tuple[int, int]
     inner: Grey | None = None
-
-    def core(self, crop: tuple[slice, slice]) -> Grey:
-        """Return what is surely not the tank, in a part of the image; it is noise without any.
-
-        Right for what hangs together and lies a pixel within that part.
-        """
-        if self.inner is None:
-            return np.asarray(cv2.morphologyEx(self.mask[crop], cv2.MORPH_OPEN, _KERNEL), np.uint8)
-        # Of three by three pixels: one of them alone is noise.
-        mean = cv2.blur(self.grey[crop], (3, 3))
-        return np.asarray(cv2.compare(mean, self.inner[crop], cv2.CMP_LT), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,10 +153,13 @@ class Limits:
         What is darker may be, if it hangs together with what surely is.
     inner : ndarray of uint8, shape (height, width), optional
         What is darker surely is; without, what is left of the foreground when it is opened.
+    box
+        Rows and columns that hold all of what may be, and two pixels more.
     """
 
     outer: Grey
     inner: Grey | None = None
+    box: tuple[slice, slice] = (slice(None), slice(None))
 
 
 def compare(grey: Grey, background: Background, limits: Limits) -> Contrast:
@@ -175,13 +168,12 @@ def compare(grey: Grey, background: Background, limits: Limits) -> Contrast:
     Bodies three pixels wide lose their tails when they are opened. So what is left of the
     opened foreground only tells which pieces count; their extent is that before.
     """
-    mask = cv2.compare(grey, limits.outer, cv2.CMP_LT)
-    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _KERNEL)
+    mask = cv2.compare(grey[limits.box], limits.outer[limits.box], cv2.CMP_LT)
     return Contrast(
         grey=grey,
         background=background,
-        foreground=np.asarray(closed, np.uint8),
         mask=np.asarray(mask, np.uint8),
+        corner=(limits.box[1].start or 0, limits.box[0].start or 0),
         inner=limits.inner,
     )
 
@@ -196,78 +188,111 @@ def find_blobs(view: Contrast, *, min_blob_px: float, corners: Corners | None = 
     corners
         How corners are sought; None for not at all.
     """
-    contours, _ = cv2.findContours(view.foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    found = [_blob(view, np.asarray(each, np.int32)) for each in contours if len(each) >= 4]
-    blobs = [blob for blob in found if blob is not None and blob.area_px >= min_blob_px]
+    closed = cv2.morphologyEx(view.mask, cv2.MORPH_CLOSE, _KERNEL)
+    contours, _ = cv2.findContours(
+        closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=view.corner
+    )
     # OpenCV lists contours from the bottom of the image up; any fixed order would do.
-    return blobs if corners is None else _with_corners(view, blobs, corners)
+    pieces = [_Piece(view, each) for each in contours if len(each) >= 4]
+    whole = [piece for piece in pieces if piece.weigh(view) >= min_blob_px]
+    if corners is None:
+        return [piece.blob(_NO_CORNERS) for piece in whole]
+    return _with_corners(view, whole, corners)
 
 
-def _blob(view: Contrast, contour: NDArray[np.int32]) -> Blob | None:
-    """Return what lies within a contour; None where nothing of it is surely animal."""
-    x0, y0, width, height = (int(value) for value in cv2.boundingRect(contour))
-    # A pixel wider: the edge of a body is a share of the pixels around its mask.
-    left, top = max(x0 - 1, 0), max(y0 - 1, 0)
-    crop = np.s_[top : y0 + height + 1, left : x0 + width + 1]
-    inside = np.zeros(view.grey[crop].shape, np.uint8)
-    cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-left, -top))
-    if not (view.core(crop) & inside).any():
-        return None
-    pixels, share = shades(
-        np.asarray(cv2.dilate(inside, _KERNEL), np.uint8),
-        view.grey[crop].copy(),
-        view.background.level[crop].copy(),
-        left,
-        top,
-    )
-    if not len(share):
-        return None
-    # Weighted by itself: the more of faint edge there is around a body, the same.
-    darkness = float(share @ share / share.sum())
-    return Blob(
-        pixels=pixels,
-        weights=np.minimum(share / (FULL * darkness), 1.0),
-        shares=share,
-        darkness=darkness,
-        contour=contour.reshape(-1, 2),
-        corners=np.empty((0, 2)),
-        box=(x0, y0, width, height),
+class _Piece:
+    """What lies within a contour, cut out of the image."""
+
+    __slots__ = (
+        "box",
+        "contour",
+        "crop",
+        "darkness",
+        "inside",
+        "left",
+        "pixels",
+        "shares",
+        "top",
+        "weights",
     )
 
+    def __init__(self, view: Contrast, contour: cv2.typing.MatLike) -> None:
+        x0, y0, width, height = self.box = cv2.boundingRect(contour)
+        # A pixel wider: the edge of a body is a share of the pixels around its mask. And one
+        # more: corners are sought by the slopes of greys.
+        self.left, self.top = max(x0 - _MARGIN_PX, 0), max(y0 - _MARGIN_PX, 0)
+        self.crop = np.s_[self.top : y0 + height + _MARGIN_PX, self.left : x0 + width + _MARGIN_PX]
+        self.inside = np.zeros(view.grey[self.crop].shape, np.uint8)
+        offset = (-self.left, -self.top)
+        cv2.drawContours(self.inside, [contour], -1, 255, cv2.FILLED, offset=offset)
+        self.contour = contour
 
-def _with_corners(view: Contrast, blobs: list[Blob], how: Corners) -> list[Blob]:
+    def weigh(self, view: Contrast) -> float:
+        """Return how many pixels it covers, those along the edge in part.
+
+        None where nothing of it is surely animal.
+        """
+        if not self._has_core(view):
+            return 0.0
+        level = view.background.level
+        self.pixels, share = shades(self.inside, view.grey, level, self.left, self.top)
+        if not len(share):
+            return 0.0
+        # Weighted by itself: the more of faint edge there is around a body, the same.
+        self.darkness = float(share @ share / share.sum())
+        self.shares, self.weights = share, np.minimum(share / (FULL * self.darkness), 1.0)
+        return float(self.weights.sum())
+
+    def _has_core(self, view: Contrast) -> bool:
+        """Return whether something of it is surely not the tank; it is noise without."""
+        if view.inner is None:
+            left, top = view.corner
+            return outlasts_opening(view.mask, self.inside, self.left - left, self.top - top)
+        # Of three by three pixels: one of them alone is noise.
+        mean = cv2.blur(view.grey[self.crop], (3, 3))
+        dark = cv2.compare(mean, view.inner[self.crop], cv2.CMP_LT)
+        return bool((np.asarray(dark, np.uint8) & self.inside).any())
+
+    def corners(self, view: Contrast, how: Corners) -> tuple[Floats, Floats]:
+        """Return corners, the strongest first, and their measures."""
+        corners, quality = cv2.goodFeaturesToTrackWithQuality(
+            np.ascontiguousarray(view.grey[self.crop]),
+            _MOST_CORNERS,
+            _QUALITY,
+            _CORNERS_APART_PX,
+            self.inside,
+            blockSize=_BLOCK_PX,
+            useHarrisDetector=how.harris,
+            k=_HARRIS_K,
+        )
+        if corners is None or not len(corners):
+            return _NO_CORNERS, np.empty(0)
+        points = corners.reshape(-1, 2).astype(np.float64) + np.array((self.left, self.top))
+        return points, np.asarray(quality, np.float64).ravel()
+
+    def blob(self, corners: Floats) -> Blob:
+        """Return it as it is told."""
+        return Blob(
+            pixels=self.pixels,
+            weights=self.weights,
+            shares=self.shares,
+            darkness=self.darkness,
+            contour=np.asarray(self.contour, np.int32).reshape(-1, 2),
+            corners=corners,
+            box=(self.box[0], self.box[1], self.box[2], self.box[3]),
+        )
+
+
+def _with_corners(view: Contrast, pieces: list[_Piece], how: Corners) -> list[Blob]:
     """Return the blobs with their corners; the best corner of all sets the threshold."""
-    found = [_corners_of(view, blob, how) for blob in blobs]
+    found = [piece.corners(view, how) for piece in pieces]
     best = max((quality[0] for _, quality in found if len(quality)), default=0.0)
     held = []
-    for blob, (points, quality) in zip(blobs, found, strict=True):
+    for piece, (points, quality) in zip(pieces, found, strict=True):
         good = points[quality >= _QUALITY * best]
         if len(good) or not how.needed:
-            held.append(replace(blob, corners=good))
+            held.append(piece.blob(good))
     return held
-
-
-def _corners_of(view: Contrast, blob: Blob, how: Corners) -> tuple[Floats, Floats]:
-    """Return corners within a blob, the strongest first, and their measures."""
-    x0, y0, width, height = blob.box
-    left, top = max(x0 - _MARGIN_PX, 0), max(y0 - _MARGIN_PX, 0)
-    crop = np.s_[top : y0 + height + _MARGIN_PX, left : x0 + width + _MARGIN_PX]
-    inside = np.zeros(view.grey[crop].shape, np.uint8)
-    cv2.drawContours(inside, [blob.contour], -1, 255, cv2.FILLED, offset=(-left, -top))
-    corners, quality = cv2.goodFeaturesToTrackWithQuality(
-        np.ascontiguousarray(view.grey[crop]),
-        _MOST_CORNERS,
-        _QUALITY,
-        _CORNERS_APART_PX,
-        inside,
-        blockSize=_BLOCK_PX,
-        useHarrisDetector=how.harris,
-        k=_HARRIS_K,
-    )
-    if corners is None or not len(corners):
-        return np.empty((0, 2)), np.empty(0)
-    points = corners.reshape(-1, 2).astype(np.float64) + np.array([left, top])
-    return points, np.asarray(quality, np.float64).ravel()
 
 
 def shape_of(pixels: Floats, weights: Floats, corners: Floats | None = None) -> Shape:
@@ -287,9 +312,9 @@ def shape_of(pixels: Floats, weights: Floats, corners: Floats | None = None) -> 
     """
     total, x, y, angle, (second, both, third) = moments(pixels, weights)
     # A pixel is a twelfth of a square pixel wide by itself.
-    long = float(second) + 1 / 12
-    wide = max(float(both) + 1 / 6 - long, 1 / 12)
-    lean = -float(third) / long**1.5 / _SKEW
+    long = second + 1 / 12
+    wide = max(both + 1 / 6 - long, 1 / 12)
+    lean = -third / long**1.5 / _SKEW
     if corners is not None and len(corners):
         ahead = (corners[0, 0] - x) * math.cos(angle) + (corners[0, 1] - y) * math.sin(angle)
         lean += _CORNER * float(ahead) / (2 * math.sqrt(long))

@@ -24,6 +24,10 @@ _SOFT_PX = 0.7
 """Blur of `SILHOUETTE`: it halves the noise and widens a body by a tenth of a pixel."""
 
 
+_AROUND_PX = 2
+"""What is closed reaches a pixel farther, and has to be seen to end."""
+
+
 class Finder:
     """Finds blobs by one of the methods.
 
@@ -47,7 +51,8 @@ class Finder:
         self.background = background
         self._region = None if region is None else (region * np.uint8(255)).astype(np.uint8)
         self._darkness = 0.0
-        self._limits = Limits(outer=self._within(background.low))
+        self._box = _box_of(background.low.shape, region)
+        self._limits = Limits(outer=self._within(background.low), box=self._box)
 
     def find(self, grey: Grey, usual: Body) -> list[Blob]:
         """Return the blobs of an image that are dark enough for an animal.
@@ -87,8 +92,21 @@ class Finder:
         inner = None
         if self._options.method == SILHOUETTE:
             inner = (level * (1 - _INNER * darkness)).astype(np.uint8)
-        self._limits = Limits(outer=self._within(outer), inner=inner)
+        self._limits = Limits(outer=self._within(outer), inner=inner, box=self._box)
         self._darkness = darkness
+
+
+def _box_of(shape: tuple[int, ...], region: NDArray[np.bool_] | None) -> tuple[slice, slice]:
+    """Return rows and columns that hold a region, and what is closed at its border."""
+    if region is None or not region.any():
+        return slice(0, shape[0]), slice(0, shape[1])
+    rows, columns = (np.asarray(region.any(axis=axis), bool) for axis in (1, 0))
+    return _span(rows), _span(columns)
+
+
+def _span(line: NDArray[np.bool_]) -> slice:
+    some = np.flatnonzero(line)
+    return slice(max(int(some[0]) - _AROUND_PX, 0), int(some[-1]) + 1 + _AROUND_PX)
 
 
 def soften(grey: Grey, method: str) -> Grey:

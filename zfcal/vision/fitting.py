@@ -127,7 +127,7 @@ def fit(pixels: Floats, shares: Floats, builds: list[Build], due: Floats, start:
     # Rows of x and of y, so that a kernel runs along them.
     some = (
         np.ascontiguousarray(pixels[::every].T),
-        shares[::every],
+        np.ascontiguousarray(shares[::every]),
         body,
         due,
         poses,

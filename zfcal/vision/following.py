@@ -83,52 +83,43 @@ class Trails:
         thought: list[list[Trail]] = [[] for _ in blobs]
         near = _NEAR * self._bodies.length_px
         for trail in self._trails:
-            if not blobs or trail.hits < _PROVEN or trail.missed > _HIDDEN or trail.is_ghost:
+            if trail.hits < _PROVEN or trail.missed > _HIDDEN or trail.is_ghost:
                 continue
-            at = trail.predicted(time_s)
-            away = [_distance(blob, at, near) for blob in blobs]
-            nearest = away.index(min(away))
-            if away[nearest] < near:
+            nearest = _nearest(blobs, trail.predicted(time_s), near)
+            if nearest is not None:
                 thought[nearest].append(trail)
         return thought
 
     def match(self, detections: list[Detection], time_s: float) -> None:
         """Give detections to tracks, begin tracks for the others, and end the lost ones."""
         cost = self._costs(detections, time_s)
-        ages_s = np.array([time_s - trail.time_s for trail in self._trails])
-        gate = np.minimum(_REACH + _REACH_PER_S * ages_s, _FARTHEST)
+        ages_s = [time_s - trail.time_s for trail in self._trails]
+        gate = np.array([min(_REACH + _REACH_PER_S * age_s, _FARTHEST) for age_s in ages_s]) ** 2
         # Who was there a frame ago comes first: else a lost track takes turns with its successor.
-        lost = np.array([t.missed > 0 or t.hits < _PROVEN for t in self._trails], bool)
+        lost = [t.missed > 0 or t.hits < _PROVEN for t in self._trails]
         matches: list[Match] = []
         for late in (False, True):
-            rows = np.flatnonzero(lost == late)
-            if not rows.size:
+            rows = [k for k, is_lost in enumerate(lost) if is_lost == late]
+            if not rows:
                 continue
             taken = {match.detection for match in matches}
-            columns = np.array([k for k in range(len(detections)) if k not in taken], int)
-            matches += [
-                Match(
-                    track=int(rows[m.track]),
-                    detection=int(columns[m.detection]),
-                    cost=m.cost,
-                    margin=m.margin,
-                )
-                for m in assign(cost[np.ix_(rows, columns)], gate[rows] ** 2)
-            ]
+            columns = [k for k in range(len(detections)) if k not in taken]
+            matches += assign(cost, gate, rows, columns)
         self._mixed = self._crossings(matches, detections, cost, ages_s)
         self._take(matches, detections, time_s)
         self.forget(time_s)
 
     def _crossings(
-        self, matches: list[Match], detections: list[Detection], cost: Floats, ages_s: Floats
+        self, matches: list[Match], detections: list[Detection], cost: Floats, ages_s: list[float]
     ) -> dict[tuple[int, int], float]:
         """Return the chances that tracks, by their keys, have just changed places."""
         mixed = {}
+        costs = cost.tolist()
         for one, other in itertools.combinations(matches, 2):
             a, b = detections[one.detection], detections[other.detection]
             dearer = (
-                cost[one.track, other.detection]
-                + cost[other.track, one.detection]
+                costs[one.track][other.detection]
+                + costs[other.track][one.detection]
                 - one.cost
                 - other.cost
             )
@@ -155,7 +146,7 @@ class Trails:
         mass = np.array([[t.mass] for t in self._trails])
         odd = np.abs(np.log(mass / np.array([d.mass for d in detections]))) - _ALIKE
         # Of those that were not told apart nobody knows how dark each is.
-        away += _SIZE * np.nan_to_num(np.maximum(odd, 0.0)) ** 2
+        away += _SIZE * np.where(odd > 0, odd, 0.0) ** 2
         return away
 
     def _take(self, matches: list[Match], detections: list[Detection], time_s: float) -> None:
@@ -235,10 +226,14 @@ class Trails:
         return sorted(seen, key=lambda trail: trail.agent)
 
 
-def _distance(blob: Blob, at: Floats, near: float) -> float:
-    """Return how far a point is from a blob, infinite where it is farther than near."""
-    x, y, width, height = blob.box
-    left, top = float(at[0]) - x, float(at[1]) - y
-    if not (-near <= left <= width + near and -near <= top <= height + near):
-        return math.inf
-    return math.sqrt(nearest_squared(at[None], blob.pixels)[0])
+def _nearest(blobs: list[Blob], at: tuple[float, float], near: float) -> int | None:
+    """Return which blob is nearest to a point; None where all are farther than near."""
+    found, least = None, near
+    for number, blob in enumerate(blobs):
+        x, y, width, height = blob.box
+        left, top = at[0] - x, at[1] - y
+        if -near <= left <= width + near and -near <= top <= height + near:
+            away = math.sqrt(nearest_squared(np.array([at]), blob.pixels)[0])
+            if away < least:
+                found, least = number, away
+    return found

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zfcal.vision._kernels import balance
+from zfcal.vision._kernels import balance, learn, weigh
 from zfcal.vision.seen import Exchange
 from zfcal.vision.trail import Trail
 from zfcal.vision.usual import Body
@@ -40,7 +40,7 @@ _WIDE = (0.5, 0.5)
 _ALIKE_S = 0.4
 """For so long one look at an animal tells nothing new: it bends, it crosses a reflection."""
 
-_FAITH = 200
+_FAITH = 200.0
 """Sightings that the spread at first is worth."""
 
 _OUTLIER = 4.0
@@ -92,12 +92,12 @@ class Identities:
         self._chance: Floats = np.eye(n_agents)
         self._name = np.arange(n_agents)
         self._every = np.arange(n_agents)
-        self._last: list[tuple[Floats, float] | None] = [None] * n_agents
+        self._last: list[tuple[tuple[float, float], float] | None] = [None] * n_agents
         self._n = np.zeros(n_agents)
         self._mean = np.zeros((n_agents, 2))
         self._length = np.zeros(n_agents)
         self._within = np.array(WITHIN) ** 2 * _FAITH
-        self._looks = float(_FAITH)
+        self._looks = _FAITH
         self._time_s = -math.inf
         self._crossed_s = {
             chance: np.full((n_agents, n_agents), -math.inf) for chance in (_LIKELY, _POSSIBLE)
@@ -149,7 +149,7 @@ class Identities:
                 self._keys[row] = new[k].key
                 rows[new[k].key] = row
         for trail in trails:
-            self._last[rows[trail.key]] = (trail.xy.copy(), time_s)
+            self._last[rows[trail.key]] = (trail.xy, time_s)
         return rows
 
     def _far(self, row: int, trail: Trail, time_s: float) -> float:
@@ -157,9 +157,9 @@ class Identities:
         last = self._last[row]
         if last is None:
             return 20.0 + 1e-3 * row
-        xy, at_s = last
+        (x, y), at_s = last
         reach = 10.0 + _REACH_PX_PER_S * (time_s - at_s)
-        return float(np.hypot(*(trail.xy - xy))) / reach
+        return float(np.hypot(trail.xy[0] - x, trail.xy[1] - y)) / reach
 
     def _mix(self, one: int, other: int, chance: float, time_s: float) -> None:
         for least, crossed_s in self._crossed_s.items():
@@ -185,37 +185,20 @@ class Identities:
     def _look(self, rows: NDArray[np.intp], trails: list[Trail], weight: float) -> None:
         """Let what tracks look like speak, and learn what they look like."""
         seen = np.log(np.array([(t.shape.area_px, t.blob.darkness) for t in trails]))
-        within = self._within / self._looks
-        n = self._n[:, None] * weight
-        known = self._n > 0
-        middle = self._mean[known].mean(axis=0) if known.any() else seen.mean(axis=0)
         # Nobody knows beforehand whether one is a lure.
-        between = np.array(BETWEEN if known.all() else _WIDE) ** 2
-        sure = 1 / between + n / within
-        mean = (middle / between + n * self._mean / within) / sure
-        spread = within + 1 / sure
-        odd = (seen[:, None] - mean) ** 2 / spread + np.log(spread)
-        tells = -0.5 * odd.sum(axis=2)
-        tells = np.maximum(tells - tells.max(axis=1, keepdims=True), -_OUTLIER)
-        self._chance[rows] *= np.exp(weight * tells)
+        between = np.array(BETWEEN if (self._n > 0).all() else _WIDE) ** 2
+        within = self._within / self._looks
+        weigh(self._chance, rows, seen, self._n, self._mean, within, between, weight, _OUTLIER)
         balance(self._chance, _LEAST, _ROUNDS)
         # Who is surely himself again has not changed places.
-        self._forget(self._chance[np.arange(len(self._name)), self._name] > _ITSELF)
-        self._learn(rows, seen, np.log([t.shape.length_px for t in trails]))
-
-    def _learn(self, rows: NDArray[np.intp], seen: Floats, lengths: Floats) -> None:
-        for row, each, length in zip(rows, seen, lengths, strict=True):
-            who = int(self._chance[row].argmax())
-            if self._chance[row, who] < _SURE:
-                continue
-            self._n[who] += 1
-            away = each - self._mean[who]
-            if self._n[who] > _FAITH:
-                self._within += np.minimum(away**2, 9 * self._within / self._looks)
-                self._looks += 1
-            weight = 1 / min(self._n[who], _MEMORY)
-            self._mean[who] += weight * away
-            self._length[who] += weight * (length - self._length[who])
+        itself = self._chance[self._every, self._name] > _ITSELF
+        if itself.any():
+            self._forget(itself)
+        lengths = np.log(np.array([t.shape.length_px for t in trails]))
+        some = self._n, self._mean, self._length, self._within
+        self._looks = learn(
+            self._chance, rows, seen, lengths, *some, self._looks, (_SURE, _FAITH, _MEMORY)
+        )
 
     def look(self, agent: int) -> Body | None:
         """Return what an animal looks like; None where it was hardly seen alone."""

@@ -20,6 +20,7 @@ from zfcal.vision.background import (
     Grey,
     grey_of,
     shows_nothing,
+    whole,
 )
 from zfcal.vision.camera import Projection
 from zfcal.vision.dividing import divide
@@ -169,7 +170,7 @@ class FishTracker:
             has, should = (f"{w} x {h}" for w, h in (frame.size_px, background.size_px))
             self._note(frame, "size", f"the image is {has} px, the background {should} px")
             return None
-        grey = grey_of(frame.image)
+        grey = whole(grey_of(frame.image))
         if shows_nothing(grey):
             self._note(frame, "black", "the image shows nothing")
             return None
@@ -187,26 +188,28 @@ class FishTracker:
         seen = self._trails.told(time_s)
         if not seen:
             return []
-        xy_px = np.array([trail.xy for trail in seen])
-        ahead_px = xy_px + [(math.cos(t.heading_rad), math.sin(t.heading_rad)) for t in seen]
-        xy_m, ahead_m = np.split(self._plane.to_metres(np.vstack([xy_px, ahead_px])), 2)
-        ahead_m = ahead_m - xy_m
+        usual = self._bodies.usual
+        px = [trail.xy for trail in seen]
+        px += [(t.xy[0] + math.cos(t.heading_rad), t.xy[1] + math.sin(t.heading_rad)) for t in seen]
+        metres = self._plane.to_metres(np.array(px)).tolist()
         return [
             Seen(
                 agent=trail.agent,
                 track=trail.key,
-                x_m=float(xy_m[k, 0]),
-                y_m=float(xy_m[k, 1]),
-                heading_rad=math.atan2(ahead_m[k, 1], ahead_m[k, 0]),
-                confidence=trail.confidence(self._bodies.usual),
-                x_px=float(trail.xy[0]),
-                y_px=float(trail.xy[1]),
+                x_m=x_m,
+                y_m=y_m,
+                heading_rad=math.atan2(ahead_m[1] - y_m, ahead_m[0] - x_m),
+                confidence=trail.confidence(usual),
+                x_px=trail.xy[0],
+                y_px=trail.xy[1],
                 contour_px=trail.blob.contour,
                 shared=trail.shared,
                 area_px=trail.shape.area_px,
             )
-            for k, trail in enumerate(seen)
-            if np.isfinite(xy_m[k]).all()
+            for trail, (x_m, y_m), ahead_m in zip(
+                seen, metres[: len(seen)], metres[len(seen) :], strict=True
+            )
+            if math.isfinite(x_m) and math.isfinite(y_m)
         ]
 
     def _judge(self, frame: Frame, detections: list[Detection], seen: list[Seen]) -> None:

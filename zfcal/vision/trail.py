@@ -5,14 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from zfcal.vision.detect import FULL, Blob, Shape
 from zfcal.vision.fitting import Build
 from zfcal.vision.usual import Body as Look
-
-Floats = NDArray[np.float64]
 
 _TRUST = 0.7
 """Weight of the newest step in the velocity."""
@@ -117,8 +112,8 @@ class Trail:
     ) -> None:
         shape = detection.shape
         self.agent = self.key = agent
-        self.xy: Floats = np.array([shape.x_px, shape.y_px])
-        self.velocity: Floats = np.zeros(2)
+        self.xy = (shape.x_px, shape.y_px)
+        self.velocity = (0.0, 0.0)
         self.time_s = time_s
         self.shape = shape
         self.blob: Blob = detection.blob
@@ -139,9 +134,11 @@ class Trail:
         self._crowded = 0
         self._evidence = shape.head
 
-    def predicted(self, time_s: float) -> Floats:
-        """Return where the animal should be at a time, in pixels, shape (2,)."""
-        return self.xy + _KEPT * self.velocity * min(time_s - self.time_s, _GLIDE_S)
+    def predicted(self, time_s: float) -> tuple[float, float]:
+        """Return where the animal should be at a time, in pixels, x and y."""
+        glide_s = min(time_s - self.time_s, _GLIDE_S)
+        (x, y), (across, down) = self.xy, self.velocity
+        return x + _KEPT * across * glide_s, y + _KEPT * down * glide_s
 
     def build(self, usual: Look) -> Build:
         """Return the body as it was when it was alone; the usual where it hardly was."""
@@ -173,13 +170,20 @@ class Trail:
     def update(self, detection: Detection, time_s: float, *, unsure: bool = False) -> None:
         """Add a sighting; unsure where it might be that of another animal."""
         shape = detection.shape
-        to = np.array([shape.x_px, shape.y_px])
-        step = (to - self.xy) / max(time_s - self.time_s, 1e-3)
+        moved = (shape.x_px - self.xy[0], shape.y_px - self.xy[1])
+        lasted_s = max(time_s - self.time_s, 1e-3)
+        step = (moved[0] / lasted_s, moved[1] / lasted_s)
         trust = _TRUST if detection.shared == 1 else _TRUST / 2
-        self.velocity = step if self.hits == 1 else trust * step + (1 - trust) * self.velocity
-        self._turn(shape, to - self.xy, shared=detection.shared)
+        if self.hits > 1:
+            step = (
+                trust * step[0] + (1 - trust) * self.velocity[0],
+                trust * step[1] + (1 - trust) * self.velocity[1],
+            )
+        self.velocity = step
+        self._turn(shape, moved, shared=detection.shared)
         self.is_clear = detection.shared == 1 and self.shared == 1
-        self.xy, self.time_s, self.shape, self.blob = to, time_s, shape, detection.blob
+        self.xy, self.time_s = (shape.x_px, shape.y_px), time_s
+        self.shape, self.blob = shape, detection.blob
         self.shared, self.darkness = detection.shared, detection.darkness
         self.hits += 1
         self.doubt = max(_FADING * self.doubt, 0.5 if unsure else 0.0)
@@ -204,7 +208,7 @@ class Trail:
             sure -= 0.1
         return max(sure - self.doubt, 0.1)
 
-    def _turn(self, shape: Shape, moved: Floats, *, shared: int) -> None:
+    def _turn(self, shape: Shape, moved: tuple[float, float], *, shared: int) -> None:
         """Follow the long axis by its nearer end, and change ends when enough speaks for it."""
         along = math.cos(shape.axis_rad - self.heading_rad)
         near = along >= 0
@@ -213,7 +217,7 @@ class Trail:
         evidence = _MEMORY * abs(along) * self._evidence
         if shared == 1:
             evidence += (1.0 if near else -1.0) * shape.head
-        ahead = float(moved @ (math.cos(heading), math.sin(heading))) / shape.length_px
+        ahead = (moved[0] * math.cos(heading) + moved[1] * math.sin(heading)) / shape.length_px
         if abs(ahead) > _MOVING:
             evidence += math.copysign(min(2 * abs(ahead), 0.5), ahead)
         if evidence < 0:
