@@ -64,14 +64,17 @@ def test_an_effect_that_is_not_there_is_not_confirmed(screen, candidate, name):
         assert told.gain_nats_per_step < 3 * told.gain_se
 
 
+@pytest.fixture(scope="module")
+def short_screens(record, tank, fish):
+    """Return ten recordings of three minutes, ready to be asked of speeds."""
+    scenes = [make_scene(record(seed, minutes=3.0), tank) for seed in range(100, 110)]
+    return [Screen(scene=scene, fitted=maximise(scene, fish, rounds=0)) for scene in scenes]
+
+
 @pytest.mark.parametrize("name", ["burst-and-coast", "speed-matching", "crowding", "fatigue"])
-def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(record, tank, fish, candidate, name):
+def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(short_screens, candidate, name):
     """One of ten recordings at the most, where one in forty would be chance."""
-    held = []
-    for seed in range(100, 110):
-        scene = make_scene(record(seed, minutes=3.0), tank)
-        own = Screen(scene=scene, fitted=maximise(scene, fish, rounds=0))
-        held.append(alone(added(own, candidate(name))).holds)
+    held = [alone(added(own, candidate(name))).holds for own in short_screens]
     assert sum(held) <= 1
 
 
