@@ -1,5 +1,7 @@
 """What holds for all statistics and scores, whatever the fish do."""
 
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -30,14 +32,29 @@ TANK = make_arena(
 
 
 @st.composite
+def coordinates(draw, shape, *, on_grid):
+    """Coordinates on a grid, or half of them anywhere, a few of the odder numbers among them.
+
+    All but these are one draw of bytes: a draw for each coordinate takes ten times as long.
+    """
+    n = math.prod(shape)
+    codes = np.frombuffer(draw(st.binary(min_size=2 * n, max_size=2 * n)), np.uint16)
+    # Sixty-fourths are exact numbers: distances between them have no rounding error.
+    metres = (codes // 2 % 35 - 1.0) / 64
+    if not on_grid:
+        metres = np.where(codes % 2, -0.02 + 0.54 * (codes / 65535), metres)
+        odd = draw(st.lists(st.floats(-0.02, 0.52), max_size=min(n, 6), unique=True))
+        metres[: len(odd)] = odd
+        metres = metres[np.random.default_rng(draw(st.integers(0, 2**32 - 1))).permutation(n)]
+    return metres.reshape(shape)
+
+
+@st.composite
 def groups(draw, *, min_samples=1, on_grid=False):
     """Agents that are here, there, lost, a little outside or far outside."""
     n_samples = draw(st.integers(min_samples, 24))
     n_agents = draw(st.integers(0, 6))
-    # Sixty-fourths are exact numbers: distances between them have no rounding error.
-    grid = st.integers(-1, 33).map(lambda i: i / 64)
-    coordinate = grid if on_grid else st.one_of(grid, st.floats(-0.02, 0.52))
-    xy_m = draw(hnp.arrays(np.float64, (n_samples, n_agents, 2), elements=coordinate))
+    xy_m = draw(coordinates((n_samples, n_agents, 2), on_grid=on_grid))
     lost = draw(hnp.arrays(np.bool_, (n_samples, n_agents)))
     xy_m[lost] = np.nan
     kind = draw(hnp.arrays(np.int8, n_agents, elements=st.integers(0, 1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from types import SimpleNamespace
 
 import cv2
@@ -50,11 +51,28 @@ def true_errors_mm(found, camera, *, n=21, low=0.0, high=1.0):
     return 1000 * np.hypot(*(found.to_metres(camera.to_pixels(m)) - m).T)
 
 
+@cache
+def rays_of_pixels(lens):
+    """Return the ray of each pixel of a lens, shape (row, column, xyz)."""
+    width, height = lens.size_px
+    down, across = np.mgrid[0:height, 0:width]
+    rays = lens.to_rays(np.stack([across, down], axis=-1))
+    return np.concatenate([rays, np.ones((height, width, 1))], axis=-1)
+
+
+def places_of_pixels(camera):
+    """Return where each pixel's ray meets the plane z = 0, NaN behind the camera."""
+    rotation, _ = cv2.Rodrigues(np.array(camera.rotation_rad))
+    plane = np.column_stack([rotation[:, :2], camera.translation_m])
+    *places, inverse_depth = np.moveaxis(
+        rays_of_pixels(camera.lens) @ np.linalg.inv(plane).T, -1, 0
+    )
+    return np.where(inverse_depth > 0, places / inverse_depth, np.nan).transpose(1, 2, 0)
+
+
 def board_image(board, camera, *, square_px=40, noise=2.0, seed=0):
     """Return what a camera sees of a board that lies in the plane z = 0."""
-    width, height = camera.size_px
-    down, across = np.mgrid[0:height, 0:width]
-    places = camera.to_metres(np.stack([across, down], axis=-1))
+    places = places_of_pixels(camera)
     # A margin and the outer squares lie before the first inner corner.
     face = np.nan_to_num((places / board.square_m + 2) * square_px - 0.5, nan=-1e4)
     drawn = draw_board(board, square_px=square_px)
