@@ -51,7 +51,7 @@ def test_new_segments_are_analysed_and_calibrated_until_the_recording_ends(watch
     assert "skipped" not in kinds(watch.events)
 
 
-def test_once_makes_what_offline_commands_make_and_leaves(process, trial, watching):
+def test_once_makes_what_offline_commands_make_and_leaves(process, zfcal, trial, watching):
     """The same bytes; run again, it does nothing and lists the same paths.
 
     Paths go to standard output, talk to standard error.
@@ -60,8 +60,8 @@ def test_once_makes_what_offline_commands_make_and_leaves(process, trial, watchi
     first = process("watch", "trial", "--once", *watching.quick)
     assert first.code == 0, first.err
     again = process("watch", "trial", "--once", *watching.quick, "-v")
-    process("analyse", "other")
-    process("calibrate", "other", *watching.quick)
+    zfcal("analyse", "other")
+    zfcal("calibrate", "other", *watching.quick)
     assert watching.contents(trial) == watching.contents(other)
     assert len(first.lines) == 10
     assert first.lines[0] == "trial/stats/000120.parquet"
@@ -86,8 +86,8 @@ def test_a_second_watch_ends_with_75(process, watching, live):
         assert watch.end() == 143
 
 
-def test_signals_end_it_with_nothing_half_done(process, trial, watching):
-    """In the middle of a round; run again, it goes on and ends in the same bytes."""
+def test_signals_end_it_with_nothing_half_done(process, zfcal, trial, watching):
+    """In the middle of a round; run again, it goes on and ends in the bytes of offline commands."""
     slow = ["--generations", "30", *watching.quick[2:]]
     other = shutil.copytree(trial, trial.parent / "other")
     # The second signal comes in the next round, whether or not the first one was over by then.
@@ -96,8 +96,9 @@ def test_signals_end_it_with_nothing_half_done(process, trial, watching):
             watch.until("takes", window_end_s=end_s)
             assert watch.end(number) == code
         assert not list(trial.rglob(".*part-*"))
-    for root in (trial, other):
-        assert process("watch", root, "--once", *slow).code == 0
+    assert process("watch", trial, "--once", *slow).code == 0
+    assert zfcal("analyse", other).code == 0
+    assert zfcal("calibrate", other, *slow).code == 0
     assert watching.contents(trial) == watching.contents(other)
 
 

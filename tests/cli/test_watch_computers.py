@@ -128,7 +128,7 @@ def computers(trial, tmp_path, debian):
 @pytest.mark.apt
 @pytest.mark.slow
 def test_three_computers_close_the_loop_and_a_cut_link_heals(
-    computers, trial, tmp_path, process, watching
+    computers, trial, tmp_path, zfcal, watching
 ):
     """Each link is cut in turn while segments appear; in the end all have the offline files."""
     waiting = tmp_path / "waiting"
@@ -167,8 +167,8 @@ def test_three_computers_close_the_loop_and_a_cut_link_heals(
         assert calibrate.wait() == 0
     assert not any("skipped" in event["event"] for event in calibrate.events)
     shutil.copytree(waiting, trial / "tracks")
-    assert process("analyse", trial).code == 0
-    assert process("calibrate", trial, *watching.quick).code == 0
+    assert zfcal("analyse", trial).code == 0
+    assert zfcal("calibrate", trial, *watching.quick).code == 0
     expected = watching.contents(trial)
     ours = computers.roots["tracker"]
     ends_s = time.monotonic() + 20

@@ -51,13 +51,16 @@ def run_pipe(command, root, bring, quick):
     assert (analyse.returncode, calibrate.returncode) == (0, 0)
 
 
-def run_cron(process, root, bring, quick):
-    """Run both commands, some segments later again, and once more."""
+def run_cron(zfcal, root, bring, quick):
+    """Run both commands, some segments later again, and once more.
+
+    Not as processes: how cron starts them is tested with pipes.
+    """
     for starts in ((0, 60), (120, 180), ()):
         for start in starts:
             bring(root, start)
-        assert process("analyse", root).code == 0
-        assert process("calibrate", root, *quick).code == 0
+        assert zfcal("analyse", root).code == 0
+        assert zfcal("calibrate", root, *quick).code == 0
 
 
 def run_watch(watching, root, bring):
@@ -72,11 +75,11 @@ def run_watch(watching, root, bring):
         assert watch.wait() == 0
 
 
-def test_pipe_cron_and_watch_end_in_the_same_bytes(three, command, process, watching):
+def test_pipe_cron_and_watch_end_in_the_same_bytes(three, command, zfcal, watching):
     """While segments appear one after the other; offline gives that too, as other tests show."""
     (pipe, cron, watched), bring = three
     run_pipe(command, pipe, bring, watching.quick)
-    run_cron(process, cron, bring, watching.quick)
+    run_cron(zfcal, cron, bring, watching.quick)
     run_watch(watching, watched, bring)
     found = [watching.contents(root) for root in (pipe, cron, watched)]
     assert "models/000180.toml" in found[0]
