@@ -14,6 +14,7 @@ from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.pose_files import read_poses
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.errors import InputError
+from zfcal.online.below import Below
 from zfcal.online.cameras import write_camera
 from zfcal.online.events import Note, Result, say_nothing
 from zfcal.online.rig import CameraChoice
@@ -28,6 +29,7 @@ from zfcal.vision.rig import below_camera, overhead_camera
 from zfcal.vision.robot import LedOptions
 from zfcal.vision.seen import TrackerOptions
 from zfcal.vision.swimming import swimming
+from zfcal.vision.tracker import FishTracker
 from zfcal.vision.video import encoded
 
 FPS = 15.0
@@ -175,3 +177,25 @@ def test_both_cameras_are_live_or_none(root, filmed):
     """A recording has no arrival times to pair with."""
     with pytest.raises(InputError, match="One camera is live and the other a recording"):
         track(root, options_of(filmed, source="0"), say_nothing)
+
+
+def test_fish_are_found_before_the_image_below_is_asked_for(root, filmed, monkeypatch):
+    """It arrives meanwhile; while the background is learnt no image below is let go by."""
+    calls, at, step = [], Below.at, FishTracker.step
+
+    def asked(self, time_s):
+        calls.append(("below", round(time_s * FPS)))
+        return at(self, time_s)
+
+    def stepped(self, frame):
+        calls.append(("fish", frame.number))
+        return step(self, frame)
+
+    monkeypatch.setattr(Below, "at", asked)
+    monkeypatch.setattr(FishTracker, "step", stepped)
+    track(root, options_of(filmed), say_nothing)
+
+    assert calls[:60] == [("below", k) for k in range(60)]
+    assert calls[60:120] == [("fish", k) for k in range(60)]
+    later = [(who, k) for k in range(60, N) for who in ("fish", "below")]
+    assert calls[120:] == later

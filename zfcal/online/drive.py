@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import gc
 import json
-import os
 import sys
 import threading
 import time
@@ -28,6 +26,7 @@ from zfcal.online.driving import Crew, Driver
 from zfcal.online.events import LeftOut, Note, Result, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.online.pilot import Manner
+from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
 from zfcal.robot.fishbot import FishBot, Watchdog
 from zfcal.robot.port import SerialLine
 from zfcal.robot.virtual_process import VirtualProcess
@@ -165,7 +164,7 @@ def _drive(
         _hurry(options, tell, stack)
     driver.warm_up()
     if is_live:
-        _keep_garbage(stack)
+        stack.enter_context(garbage_left_alone())
         log.write_behind()
     follower = PoseFollower(opened.trial.root, newest=is_live)
     # The robot's own end comes first on the way out: whatever fails later, it stands.
@@ -220,28 +219,9 @@ def _hurry(options: DriveOptions, tell: Tell, stack: contextlib.ExitStack) -> No
     # Other threads write and talk: when a tick is due they let go of the interpreter soon.
     stack.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(_SWITCH_S)
-    try:
-        for thread in threading.enumerate():
-            number = thread.native_id or 0
-            before = os.getpriority(os.PRIO_PROCESS, number)
-            os.setpriority(os.PRIO_PROCESS, number, NICENESS)
-            stack.callback(_lower, number, before)
-    except OSError as error:
-        if options.verbose:
-            tell(Note(text=f"No higher priority: {error.strerror}; other work may delay ticks."))
-
-
-def _lower(thread: int, niceness: int) -> None:
-    """Take back the priority of a thread, if it is still there."""
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, thread, niceness)
-
-
-def _keep_garbage(stack: contextlib.ExitStack) -> None:
-    """Keep the collector of garbage away from what is there."""
-    gc.collect()
-    gc.freeze()
-    stack.callback(gc.unfreeze)
+    problem = stack.enter_context(ahead_of_others(NICENESS))
+    if problem is not None and options.verbose:
+        tell(Note(text=f"No higher priority: {problem.strerror}; other work may delay ticks."))
 
 
 def _conclude(driver: Driver, log: DriveLog, tell: Tell) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import time
 from collections.abc import Iterator
 from typing import final
+
+import cv2
 
 from zfcal.artifacts.frame_files import FRAMES
 from zfcal.artifacts.images import read_image
@@ -22,6 +25,7 @@ from zfcal.online.resuming import STARTED, Resumed, take_up
 from zfcal.online.rig import BELOW, OVERHEAD, Feed, open_feed
 from zfcal.online.sources import Recorder
 from zfcal.online.track_plan import Plan
+from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
 from zfcal.tracks import FramePoses
 from zfcal.vision.background import Background, background_of
 from zfcal.vision.frames import Frame
@@ -34,6 +38,9 @@ from zfcal.vision.robot import RobotSeen
 from zfcal.vision.seen import Seen
 from zfcal.vision.stamps import FrameClock, Shot, number_frames
 from zfcal.vision.tracker import FishTracker, follow
+
+_NICENESS = -5
+"""Behind the robot's driver, ahead of all else: images that are not looked at in time are gone."""
 
 
 @final
@@ -106,6 +113,10 @@ class Following:
         StorageError
             A file cannot be written.
         """
+        with self._undisturbed():
+            self._run()
+
+    def _run(self) -> None:
         plan = self._plan
         overhead = open_feed(plan.opened, plan.overhead, self._clock)
         below = self._open_below()
@@ -119,7 +130,8 @@ class Following:
         self._outcome.begin(overhead, below)
         take_up(self._resumed, self._minutes)
         try:
-            for frame, seen in follow(tracker, self._frames(overhead, below)):
+            for frame, seen in follow(tracker, self._frames(overhead, below, tracker)):
+                self._look_below(below, frame)
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
                 self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()), frame.time_s)
                 self._take(frame, seen, bad, drawing)
@@ -136,6 +148,21 @@ class Following:
         drawing.finish(self._tell)
         self._outcome.finish()
 
+    @contextlib.contextmanager
+    def _undisturbed(self) -> Iterator[None]:
+        """Keep away what makes an image wait: it is for a live camera alone."""
+        if not self._plan.is_live:
+            yield
+            return
+        threads = cv2.getNumThreads()
+        # An image is too small to be worth waiting for a second core that is busy.
+        cv2.setNumThreads(1)
+        try:
+            with ahead_of_others(_NICENESS), garbage_left_alone():
+                yield
+        finally:
+            cv2.setNumThreads(threads)
+
     def _said_clock(self) -> dict[str, str]:
         return {STARTED: repr(self._clock.started_unix_s)}
 
@@ -149,9 +176,16 @@ class Following:
         )
         self._hindsight.note(frame.number, frame.time_s, self._fuser.agents)
         words = self._outcome.judge(frame, poses, bad, robot)
-        self._minutes.add(poses, next_agent=self._fuser.next_agent, bad=words)
+        self._minutes.add(
+            poses,
+            next_agent=self._fuser.next_agent,
+            bad=words,
+            is_urgent=self._plan.is_live,
+        )
         self._end_s = frame.time_s + 1 / self._fps
         self._note_time(frame)
+        # The poses are out: from here on there is time until the next image.
+        self._minutes.close_passed()
         outlines = [each.contour_px for each in seen]
         drawing.add(Scene(frame=frame, poses=poses, outlines=outlines, bad=words))
 
@@ -167,11 +201,16 @@ class Following:
         elif frame.time_s > self._held_s:
             self._outcome.took(self._clock.now() - frame.time_s)
 
-    def _frames(self, feed: Feed, below: Below | None) -> Iterator[Frame]:
+    def _look_below(self, below: Below | None, frame: Frame) -> None:
+        """Look for the robot in a frame, where that has not been done yet."""
+        if below is not None and frame.number not in self._robots:
+            self._robots[frame.number] = below.at(frame.time_s)
+
+    def _frames(self, feed: Feed, below: Below | None, tracker: FishTracker) -> Iterator[Frame]:
         """Yield the frames that are asked for, as they are read.
 
-        The robot is looked for at once: frames may wait for a background, images of the
-        camera below do not.
+        While they wait for a background the robot is looked for at once, since images of the
+        camera below do not wait. Afterwards fish come first: the image below arrives meanwhile.
         """
         shots: Iterator[Shot] = feed.shots
         options = self._plan.options
@@ -186,12 +225,12 @@ class Following:
         length_s = options.duration_s or (feed.source.length_s or 0.0) - first_s
         for frame in number_frames(shots, self._numbers):
             self._handed = (frame.number, time.perf_counter())
-            if below is not None:
-                self._robots[frame.number] = below.at(frame.time_s)
+            if tracker.is_learning:
+                self._look_below(below, frame)
+            yield frame
             done_s = frame.time_s - first_s
             if int(done_s) > int(done_s - 1 / self._fps) and length_s > 0:
                 self._tell(Progress(stage="track", done=int(done_s), total=int(length_s) + 1))
-            yield frame
 
     def _open_below(self) -> Below | None:
         plan = self._plan

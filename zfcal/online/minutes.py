@@ -57,6 +57,7 @@ class Origins:
 class _Minute:
     start_s: int
     writer: PoseWriter | None
+    next_agent: int = 0
     frames: list[FramePoses] = field(default_factory=list)
     bad: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
 
@@ -98,11 +99,18 @@ class Minutes:
         self._tell = tell
         self._task = task
         self._minute: _Minute | None = None
+        self._passed: _Minute | None = None
         self._first_s: float | None = None
         self._seen: set[int] = set()
-        self._next_agent = 0
 
-    def add(self, poses: FramePoses, *, next_agent: int, bad: tuple[str, ...] = ()) -> None:
+    def add(
+        self,
+        poses: FramePoses,
+        *,
+        next_agent: int,
+        bad: tuple[str, ...] = (),
+        is_urgent: bool = False,
+    ) -> None:
         """Take the next frame; of the minute before, all files are closed first.
 
         Parameters
@@ -113,10 +121,15 @@ class Minutes:
             The first id that is free.
         bad
             What was wrong with the frame, in words such as ``few``.
+        is_urgent
+            Whether the poses are written first, and the minute before waits for `close_passed`.
         """
         start_s = int((poses.time_s + _SLACK_S) // STEP_S) * STEP_S
         if self._minute is not None and self._minute.start_s != start_s:
-            self._close(self._minute.start_s + STEP_S)
+            self.close_passed()
+            self._passed, self._minute = self._minute, None
+            if not is_urgent:
+                self.close_passed()
         if self._minute is None:
             self._minute = _Minute(start_s=start_s, writer=self._pose_writer(start_s))
         minute = self._minute
@@ -126,12 +139,22 @@ class Minutes:
         for word in bad:
             minute.bad[word].append(poses.frame)
         self._first_s = poses.time_s if self._first_s is None else self._first_s
-        self._next_agent = next_agent
+        minute.next_agent = next_agent
+
+    def close_passed(self) -> None:
+        """Close the files of the minute that has passed, where there is one.
+
+        That takes as long as some frames: the poses of the next frame are written before.
+        """
+        if self._passed is not None:
+            passed, self._passed = self._passed, None
+            self._close(passed, passed.start_s + STEP_S)
 
     def take_up(self, start_s: int, frames: list[FramePoses], *, next_agent: int) -> None:
         """Go on with a minute that was interrupted: its frames are written anew, then more."""
+        self.close_passed()
         if self._minute is not None:
-            self._close(self._minute.start_s + STEP_S)
+            self._close(self._minute, self._minute.start_s + STEP_S)
         path = _poses_path(self._opened.trial.root, start_s)
         part = path.with_name(f".{path.name}.taken-up")
         writer = PoseWriter(
@@ -140,8 +163,9 @@ class Minutes:
         for poses in frames:
             writer.add(poses)
         writer.move_to(path)
-        self._minute = _Minute(start_s=start_s, writer=writer, frames=list(frames))
-        self._next_agent = next_agent
+        self._minute = _Minute(
+            start_s=start_s, writer=writer, next_agent=next_agent, frames=list(frames)
+        )
 
     def finish(self, end_s: float) -> None:
         """Close the last minute, which may be a part, and remove what an earlier run left.
@@ -151,24 +175,26 @@ class Minutes:
         end_s
             The second up to which the recording went.
         """
+        self.close_passed()
         if self._minute is not None:
             whole = [] if self._first_s is None else [self._first_s, end_s]
-            self._close(end_s, stretch=whole)
+            self._close(self._minute, end_s, stretch=whole)
+            self._minute = None
         if not self._origins.is_live:
             self._remove_others()
 
     def interrupt(self, end_s: float) -> None:
         """End early: what a camera gave is kept, what can be read again stays unfinished."""
+        self.close_passed()
         if self._minute is None:
             return
-        if self._origins.is_live:
-            self._close(end_s)
-        elif self._minute.writer is not None:
-            self._minute.writer.abandon()
-
-    def _close(self, end_s: float, *, stretch: list[float] | None = None) -> None:
         minute, self._minute = self._minute, None
-        assert minute is not None  # noqa: S101 - for the type checker
+        if self._origins.is_live:
+            self._close(minute, end_s)
+        elif minute.writer is not None:
+            minute.writer.abandon()
+
+    def _close(self, minute: _Minute, end_s: float, *, stretch: list[float] | None = None) -> None:
         root = self._opened.trial.root
         if minute.writer is not None:
             minute.writer.close()
@@ -181,7 +207,7 @@ class Minutes:
             extra: dict[str, JSON] = {
                 **self._measure(tracks),
                 BAD_KEY: dict(minute.bad),
-                NEXT_KEY: self._next_agent,
+                NEXT_KEY: minute.next_agent,
                 END_KEY: min(float(end_s), float(minute.start_s + STEP_S)),
             }
             if stretch:
