@@ -30,11 +30,15 @@ settings.load_profile("zfcal-ci" if os.environ.get("CI") else "zfcal")
 
 
 def pytest_configure(config):
-    """Compile the kernels before there are workers, when the whole suite was asked for.
+    """Prepare for workers; compile the kernels before, when the whole suite was asked for.
 
     With an empty cache each worker would otherwise compile the same ones at the same time.
     What fails here fails once more in a test, which says what it is about.
     """
+    if config.getoption("numprocesses", None):
+        # For the workers, and what they start: they are side by side already, and threads that
+        # wait for a matrix of ten rows take the processor from the other worker.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     option = config.option
     is_part = option.keyword or option.markexpr or option.collectonly
     is_whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not is_part
