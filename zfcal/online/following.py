@@ -25,7 +25,7 @@ from zfcal.online.resuming import STARTED, Resumed, take_up
 from zfcal.online.rig import BELOW, OVERHEAD, Feed, open_feed
 from zfcal.online.sources import Recorder
 from zfcal.online.track_plan import Plan
-from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
+from zfcal.online.undisturbed import garbage_left_alone
 from zfcal.tracks import FramePoses
 from zfcal.vision.background import Background, background_of
 from zfcal.vision.frames import Frame
@@ -38,9 +38,6 @@ from zfcal.vision.robot import RobotSeen
 from zfcal.vision.seen import Seen
 from zfcal.vision.stamps import FrameClock, Shot, number_frames
 from zfcal.vision.tracker import FishTracker, follow
-
-_NICENESS = -5
-"""Behind the robot's driver, ahead of all else: images that are not looked at in time are gone."""
 
 
 @final
@@ -158,7 +155,7 @@ class Following:
         # An image is too small to be worth waiting for a second core that is busy.
         cv2.setNumThreads(1)
         try:
-            with ahead_of_others(_NICENESS), garbage_left_alone():
+            with garbage_left_alone():
                 yield
         finally:
             cv2.setNumThreads(threads)
