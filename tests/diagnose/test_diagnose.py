@@ -244,14 +244,30 @@ LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}
 
 def test_another_form_of_a_listed_effect_is_called_by_its_name(ask, record):
     """Speed follows the own speed in a straight line, not by a power: that is burst and coast."""
-    found = ask(record(61, LINEAR))
+    found = ask(record(61, LINEAR, minutes=6.0))
     assert found.effects[0].name == "burst-and-coast"
 
 
 def test_what_is_small_beside_a_listed_effect_is_no_effect_beyond_the_list(ask, record):
     """Strong handedness, and a little pull to walls: by itself that is said, beside it not."""
     walls = {"generic:heading:wall": {"strength": -0.55}}
-    alone = ask(record(62, walls))
+    alone = ask(record(62, walls, minutes=4.0))
     assert [each.name for each in alone.effects] == ["generic:heading:wall"]
-    both = ask(record(62, {"turning-bias": {"strength": 0.7}, **walls}))
+    both = ask(record(62, {"turning-bias": {"strength": 0.7}, **walls}, minutes=6.0))
     assert [each.name for each in both.effects] == ["turning-bias"]
+
+
+def test_beside_what_is_only_a_guess_a_small_listed_effect_is_not_said(ask, record):
+    """A strong pull to walls has no mechanism; a little handedness may be left over from it."""
+    walls = {"generic:heading:wall": {"strength": -1.2}}
+    bias = {"turning-bias": {"strength": 0.35}}
+    assert [each.name for each in ask(record(63, bias, minutes=4.0)).effects] == ["turning-bias"]
+    both = ask(record(63, {**walls, **bias}, minutes=6.0))
+    assert [each.name for each in both.effects] == ["generic:heading:wall"]
+
+
+def test_speeds_are_another_matter_beside_a_guess_about_headings(ask, record):
+    """The same pull to walls, and fish that get slower: both are said."""
+    walls = {"generic:heading:wall": {"strength": -1.2}}
+    found = ask(record(64, {**walls, "fatigue": {"per_hour": 4.0}}))
+    assert {each.name for each in found.effects} == {"generic:heading:wall", "fatigue"}

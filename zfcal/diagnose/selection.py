@@ -39,8 +39,9 @@ _LEAST_SHARE = 0.15
 is a little different from its mechanism leaves something over that others answer to."""
 
 _GENERIC_SHARE = 0.5
-"""The same of a further effect beyond the list: it names no mechanism, and what a strong effect of
-another form leaves over is nearly always asked for by some of them."""
+"""The same where one of the two is beyond the list. It names no mechanism: as the further one it
+answers to nearly all that a strong effect of another form leaves over, and as the first one its
+own form is a guess. Of headings and speeds one leaves nothing over in the other."""
 
 _IN_REACH = 0.5
 """Share of the clearest one's standard errors below which a suspect is not put into the model:
@@ -133,6 +134,15 @@ def best_of(asked: Asked, scores: Sequence[Score]) -> list[Best]:
 def _in_reach(ranked: Sequence[Best]) -> list[Best]:
     """Return the suspects that could turn out to be the clearest one, of a ranked list."""
     return [best for best in ranked if abs(best.z) >= _IN_REACH * abs(ranked[0].z)]
+
+
+def _least_beside(first: Refit | None, further: Refit) -> float:
+    """Return what a further effect must gain where one of the two is beyond the list."""
+    if first is None:
+        return 0.0
+    pair = (first.candidate.effect, further.candidate.effect)
+    guessed = is_generic(first.name) and pair[0].on_speed == pair[1].on_speed
+    return _GENERIC_SHARE * first.nats if guessed or is_generic(further.name) else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,14 +241,14 @@ class Selector:
     def _step(self, screen: Screen, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
         taken = {step.choice.best.name for step in done}
         suspects = _in_reach([best for best in ranked if best.p < LEVEL])[:_SUSPECTS]
-        first = done[0].choice.best.nats if done else 0.0
-        least = max(_LEAST_NATS, _LEAST_SHARE * first)
+        first = done[0].choice.best if done else None
+        least = max(_LEAST_NATS, _LEAST_SHARE * first.nats if first else 0.0)
         heats, rivals = self._entered(screen, suspects, taken, least)
         others = run_heats(screen, [best.score for best in rivals], self.n_workers)
         made = self._refits(screen, [*unbeaten(heats), *ahead(others, heats)])
-        beyond = max(least, _GENERIC_SHARE * first)
-        listed = [each for each in made if not is_generic(each.name) and each.nats > least]
-        generic = [each for each in made if is_generic(each.name) and each.nats > beyond]
+        worth = [each for each in made if each.nats > max(least, _least_beside(first, each))]
+        listed = [each for each in worth if not is_generic(each.name)]
+        generic = [each for each in worth if is_generic(each.name)]
         if not listed and not generic:
             return None
         choice = self._choose(listed, generic)
