@@ -31,9 +31,10 @@ demo: install  ## Run the main job on the sample; say where the figures lie
 
 check: lint test-plain test  ## Run everything that must pass before a change lands
 
-# tests/warming.py compiles the kernels once, before the workers start.
+# tests/warming.py compiles the kernels once, before the workers start. Bytecode is kept, whatever the
+# shell says: the tests start some hundred processes, of which each would compile zfcal anew.
 test: install  ## Run the whole test suite
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 # The kernels once more as plain Python: what the compiler hides, such as an index out of bounds.
 test-plain: install  ## Run the model's quick tests without the compiler
