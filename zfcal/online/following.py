@@ -28,6 +28,7 @@ from zfcal.online.track_plan import Plan
 from zfcal.online.undisturbed import garbage_left_alone
 from zfcal.tracks import FramePoses
 from zfcal.vision.background import Background, background_of
+from zfcal.vision.fitting import prepare
 from zfcal.vision.frames import Frame
 from zfcal.vision.fusing import Fuser
 from zfcal.vision.hindsight import Hindsight
@@ -115,6 +116,8 @@ class Following:
 
     def _run(self) -> None:
         plan = self._plan
+        # A camera waits for nobody, and compiling takes twenty seconds on a first start.
+        prepare()
         overhead = open_feed(plan.opened, plan.overhead, self._clock)
         below = self._open_below()
         tracker = FishTracker(
