@@ -283,12 +283,17 @@ def test_a_camera_its_recording_and_a_video_give_the_same_tracks(new, images, st
     And from a video of these images: the same places.
     """
     data = [cv2.imencode(".jpg", image)[1].tobytes() for image in images[:90]]
-    live, again, video = new("live", fps=20.0), new("again", fps=20.0), new("video", fps=20.0)
+    again, video = new("again", fps=20.0), new("video", fps=20.0)
     options = TrackOptions(tracker=TrackerOptions(learn_frames=30))
-    with streaming.Camera(data, fps=20.0) as camera:
-        overhead = asked(camera.url).overhead
-        given = replace(options, overhead=overhead, record="png", duration_s=3.0)
-        track(live, given, say_nothing)
+    for attempt in range(3):
+        live = new(f"live-{attempt}", fps=20.0)
+        with streaming.Camera(data, fps=20.0) as camera:
+            overhead = asked(camera.url).overhead
+            given = replace(options, overhead=overhead, record="png", duration_s=3.0)
+            track(live, given, say_nothing)
+        # A busy computer takes some images too late to be in their turn, which no video shows.
+        if (np.diff(np.unique(all_tracks(live).frame)) == 1).all():
+            break
     recorded = live / "frames" / "overhead"
     track(again, replace(options, overhead=asked(recorded).overhead), say_nothing)
     of_live, of_recording = all_tracks(live), all_tracks(again)
