@@ -58,7 +58,7 @@ def markdown(found: Mapping[str, Any]) -> str:
         }
         for title, blocks in sections.items():
             parts += [f"## {title}: {MODES[mode]}\n", *blocks] if blocks else []
-    return "\n".join([*parts, *_gap(found), *_time(found)])
+    return "\n".join([*parts, *_gap(found), *_through_video(found), *_time(found)])
 
 
 def _modes(found: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
@@ -245,9 +245,20 @@ def _gap(found: Mapping[str, Any]) -> list[str]:
         made.append("Medians and quartiles; targets: 80 % closed, the placebo at most 5 %.\n")
     else:
         made.append(f"Not run: {found['lacking'].get(EXTEND, 'no trial was extended yet')}.\n")
-    made.append("## Through video\n")
-    made.append(f"Not run: {found['lacking'].get(VIDEO, 'no trial was rendered yet')}.\n")
     return made
+
+
+def _through_video(found: Mapping[str, Any]) -> list[str]:
+    rows = [
+        [trial["kind"], f"{trial['nats']:.0f}", ", ".join(trial["effects"]) or trial["answer"]]
+        for trial in found["trials"]
+        if trial["section"] == VIDEO and trial["error"] is None
+    ]
+    if rows:
+        told = table(("hidden", "oracle nats", "said"), rows)
+    else:
+        told = f"Not run: {found['lacking'].get(VIDEO, 'no trial was rendered yet')}.\n"
+    return ["## Through video\n", told]
 
 
 def _quartiles(found: Mapping[str, Any]) -> str:

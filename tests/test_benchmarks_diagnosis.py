@@ -422,6 +422,21 @@ def test_the_document_says_that_a_run_is_partial(bench, summary, row, tmp_path):
         assert (tmp_path / "pictures" / f"diagnosis-{figure}-quick.png").stat().st_size > 5000
 
 
+def test_trials_through_video_are_told_one_by_one(bench, summary, row):
+    """What was hidden, how strong, and what was said; those that failed are not among them."""
+    document = sys.modules["diagnosis_document"]
+    rows = [
+        {**row(("alignment",), ("alignment",), section="video", nats=76.4), "kind": "alignment"},
+        {**row(("alignment",), section="video", nats=90.0, seed=2), "kind": "alignment"},
+        {**row(("crowding",), section="video", nats=80.0, seed=3), "error": "no video"},
+    ]
+    found = summary.summarise(rows, planned={"video": 5}, lacking={})
+    text = "".join(document._through_video(found))
+    assert "| alignment | 76 | alignment |" in text
+    assert "| alignment | 90 | no-effect |" in text
+    assert "80" not in text
+
+
 def test_a_complete_run_says_so(bench, summary, row):
     """With all that was planned in the mode with replicates."""
     document = sys.modules["diagnosis_document"]
