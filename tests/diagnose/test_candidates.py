@@ -123,6 +123,7 @@ def test_other_forms_of_what_is_known_are_not_asked_for(tank):
     gone = {each.name for each in generic} - left
     assert gone == {"generic:speed:own-speed", "generic:heading:place"}
     assert not_forms_of(generic, ()) == generic
+    assert not_forms_of(generic, {"turning-memory", "wall-persistence"}) == generic
     assert "generic:speed:wall" not in {
         each.name for each in not_forms_of(generic, {"generic:speed:wall"})
     }

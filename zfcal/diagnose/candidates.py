@@ -55,14 +55,14 @@ class Candidate:
 
 FORMS = {
     "generic:heading:neighbour-heading": "alignment",
-    "generic:heading:own-turn": "turning-memory",
     "generic:heading:place": "place-preference",
     "generic:speed:neighbour-speed": "speed-matching",
     "generic:speed:own-speed": "burst-and-coast",
     "generic:speed:own-turn": "speed-turn-coupling",
 }
 """Effects beyond the list that say what a listed one says, in another form: the same cue and
-the same response."""
+the same response. (`generic:heading:own-turn` is none: without its share of the last turn fish
+keep their heading, which is no memory of turns, and what real fish do most.)"""
 
 
 def is_generic(name: str) -> bool:
