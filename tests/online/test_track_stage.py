@@ -537,3 +537,16 @@ def test_the_source_of_trial_toml_is_used(new, film, heard):
     track(root, options, heard.append)
     assert "film.avi" in read_lineage(root / "tracks" / "000000.parquet").inputs
     assert math.isclose(all_tracks(root).time_s[-1], 119 / 5, rel_tol=1e-6)
+
+
+def test_a_file_of_poses_that_is_still_empty_is_made_anew(new, images, tmp_path):
+    """A command was killed after it had made the file, and before its first byte."""
+    film = write_video(tmp_path / "v.avi", images[:60], fps=30.0)
+    whole, begun = new("whole", fps=30.0), new("begun", fps=30.0)
+    track(whole, asked(film), say_nothing)
+    (begun / "poses").mkdir()
+    (begun / "poses" / "000000.mcap").touch()
+    track(begun, asked(film), say_nothing)
+    first, second = (list(read_poses(root / "poses" / "000000.mcap")) for root in (whole, begun))
+    assert len(first) == 60
+    assert first == second
