@@ -17,12 +17,12 @@ from zfcal.online.events import say_nothing
 from zfcal.online.rig import CameraChoice, open_feed
 from zfcal.online.track import track
 from zfcal.online.track_plan import TrackOptions
-from zfcal.vision import _kernels, fitting
+from zfcal.vision import _beliefs, _kernels, fitting
 
 compiled = []
 
 def opened(*words):
-    some = _kernels.learn, _kernels.shades, fitting._fit
+    some = _beliefs.learn, _kernels.shades, fitting._fit
     compiled.extend(len(each.signatures) for each in some)
     return open_feed(*words)
 

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
+from zfcal.vision import _beliefs as b
 from zfcal.vision import _kernels as k
 
 RNG = np.random.default_rng(1)
@@ -30,7 +31,7 @@ CASES = {
     ),
     "moments": (k.moments, (PIXELS, WEIGHTS)),
     "weigh": (
-        k.weigh,
+        b.weigh,
         (
             RNG.uniform(0.1, 1, (3, 3)),
             np.array([0, 2]),
@@ -40,7 +41,7 @@ CASES = {
         ),
     ),
     "learn": (
-        k.learn,
+        b.learn,
         (
             np.eye(3),
             np.array([0, 2]),
@@ -140,7 +141,7 @@ def test_a_look_speaks_by_the_laws_of_normal_numbers():
     before = chance.copy()
     seen = np.array([[0.05, 1.1]])
 
-    k.weigh(chance, np.array([0]), seen, n, mean, within, between, 1.0, 4.0)
+    b.weigh(chance, np.array([0]), seen, n, mean, within, between, 1.0, 4.0)
 
     sights = n[:, None] / within
     at = (mean.mean(axis=0) / between + sights * mean) / (1 / between + sights)
@@ -156,7 +157,7 @@ def test_one_look_tells_so_much_at_most_and_half_a_look_half_of_it():
         chance, mean = np.full((2, 2), 0.5), np.array([[0.0, 0.0], [9.0, 9.0]])
         some = np.array([5.0, 5.0]), mean, np.full(2, 0.01), np.ones(2)
 
-        k.weigh(chance, np.array([1]), np.zeros((1, 2)), *some, weight, 4.0)
+        b.weigh(chance, np.array([1]), np.zeros((1, 2)), *some, weight, 4.0)
 
         assert np.log(chance[1, 0] / chance[1, 1]) == pytest.approx(4.0 * weight)
         assert chance[0].tolist() == [0.5, 0.5]
@@ -168,7 +169,7 @@ def test_a_look_is_learnt_by_whom_it_is_surely():
     chance, within = np.array([[0.9, 0.1], [0.4, 0.6]]), np.ones(2)
     looks = [np.array([0, 1]), np.full((2, 2), 0.3), np.full(2, 3.0)]
 
-    counted = k.learn(chance, *looks, n, mean, length, within, 50.0, (0.85, 9.0, 100.0))
+    counted = b.learn(chance, *looks, n, mean, length, within, 50.0, (0.85, 9.0, 100.0))
 
     np.testing.assert_allclose(mean, [[0.1, 0.1], [0.0, 0.0]])
     assert (n.tolist(), length.tolist(), counted) == ([3.0, 2.0], [1.0, 0.0], 50.0)
@@ -180,7 +181,7 @@ def test_the_spread_is_learnt_from_those_long_known_and_an_outlier_counts_little
     n, mean = np.array([9.0]), np.zeros((1, 2))
     within, looks = np.array([2.0, 2.0]), [np.array([0]), np.array([[0.1, 5.0]]), np.zeros(1)]
 
-    counted = k.learn(np.eye(1), *looks, n, mean, np.zeros(1), within, 50.0, (0.8, 9.0, 20.0))
+    counted = b.learn(np.eye(1), *looks, n, mean, np.zeros(1), within, 50.0, (0.8, 9.0, 20.0))
 
     np.testing.assert_allclose(within, [2.0 + 0.01, 2.0 + 9 * 2.0 / 50.0])
     np.testing.assert_allclose(mean, [[0.01, 0.5]])
@@ -298,7 +299,7 @@ def test_chances_are_balanced():
     chance = RNG.uniform(0, 1, (5, 5))
     chance[2, 3] = 0.0
 
-    k.balance(chance, 1e-6, 20)
+    b.balance(chance, 1e-6, 20)
 
     np.testing.assert_allclose(chance.sum(axis=0), 1.0)
     np.testing.assert_allclose(chance.sum(axis=1), 1.0, atol=1e-3)

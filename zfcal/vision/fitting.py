@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.vision import _kernels
+from zfcal.vision import _beliefs, _kernels
 from zfcal.vision._kernels import kernel, summing
 
 Floats = NDArray[np.float64]
@@ -101,6 +101,7 @@ class Fit:
 def prepare() -> None:
     """Compile, so that the first crossing does not have to wait for it."""
     _kernels.prepare()
+    _beliefs.prepare()
     some, body = np.zeros((1, 3)), Build(length_px=9.0, width_px=3.0, darkness=0.5)
     fit(np.zeros((1, 2)), np.zeros(1), [body], some, some)
 

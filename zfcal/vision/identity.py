@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zfcal.vision._kernels import balance, learn, weigh
+from zfcal.vision._beliefs import balance, learn, weigh
 from zfcal.vision.seen import Exchange
 from zfcal.vision.trail import Trail
 from zfcal.vision.usual import Body
