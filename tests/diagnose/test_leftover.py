@@ -1,6 +1,5 @@
 """Whether a further effect is there, or is what an earlier one of another form leaves over."""
 
-import numpy as np
 import pytest
 
 from zfcal.diagnose.leftover import outlasts
@@ -68,7 +67,7 @@ def test_headings_leave_nothing_over_in_speeds(with_cohesion, candidate):
 
 
 def test_without_an_earlier_effect_all_stand(with_cohesion, candidate):
-    """There is no form of nothing; nor does a fish alone, or a robot unseen, make it fail."""
+    """What falls beside cohesion stands by itself: there is no form of nothing."""
     made = with_cohesion(71, **FADED)
     score = made.screen.ask(candidate("interaction-range", range_m=0.15))
     assert outlasts(score, made.screen, [])
@@ -91,9 +90,10 @@ def test_effects_on_speed_have_forms_as_well(screen, candidate):
 
 
 def test_one_fish_alone_has_no_neighbours_to_depend_on(screen, candidate):
-    """What it has about it is known nevertheless: no number is missing."""
-    found = screen(74, {"turning-bias": {"strength": 0.4}}, minutes=6.0, n_fish=1)
+    """What it has about it is known nevertheless, and a second effect stands as with others."""
+    effects = {"turning-bias": {"strength": 0.4}, "wall-persistence": {"strength": 0.5}}
+    found = screen(74, effects, minutes=12.0, n_fish=1)
     made = refit(found, found.ask(candidate("turning-bias")))
-    score = made.screen.ask(candidate("turning-memory"))
-    assert np.isfinite(score.steps).all()
-    assert outlasts(score, made.screen, [made.candidate]) in (True, False)
+    score = made.screen.ask(candidate("wall-persistence"))
+    assert score.z > 5.0
+    assert outlasts(score, made.screen, [made.candidate])

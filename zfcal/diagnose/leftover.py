@@ -73,7 +73,13 @@ def _forms(screen: Screen, candidate: Candidate, about: Floats) -> Floats:
 
 
 def _modulators(scene: Scene, steps: Moves) -> Floats:
-    """Return what an effect's strength may depend on, known when a step begins."""
+    """Return what an effect's strength may depend on, known when a step begins.
+
+    Returns
+    -------
+    ndarray, shape (step, modulator)
+        Ones, then columns of mean zero and standard deviation one, or of zeros.
+    """
     about = surroundings(scene, steps)
     near_m = np.where(np.isfinite(about.near_m), about.near_m, _FAR_M)
     columns = [
