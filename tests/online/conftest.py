@@ -2,7 +2,10 @@
 
 import dataclasses
 import functools
+import os
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -128,3 +131,24 @@ def copy_trial(tmp_path):
         return shutil.copytree(root, tmp_path / name)
 
     return copy
+
+
+@pytest.fixture(scope="session")
+def need_priority():
+    """Return what asks whether this user may give a process a priority: asked of another one.
+
+    Without the right a test is skipped; who runs CI (where ``CI`` is set) as root has it, and the
+    test fails.
+    """
+
+    def need(niceness):
+        asks = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {niceness})"
+        done = subprocess.run([sys.executable, "-c", asks], capture_output=True, check=False)
+        if done.returncode == 0:
+            return
+        lacks = f"a niceness of {niceness} is not allowed here: needs root, or `ulimit -e`"
+        if os.environ.get("CI") and os.geteuid() == 0:
+            pytest.fail(f"{lacks}; CI runs as root.", pytrace=False)
+        pytest.skip(lacks)
+
+    return need

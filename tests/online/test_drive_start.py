@@ -3,8 +3,6 @@
 import contextlib
 import importlib.util
 import os
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -120,16 +118,9 @@ def test_warming_up_leaves_no_trace(recorded):
         assert pilots[0].tick(poses.time_s) == pilots[1].tick(poses.time_s)
 
 
-def may_go_ahead():
-    """Tell whether this user may give a process a high priority: asked of another one."""
-    asks = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {NICENESS})"
-    done = subprocess.run([sys.executable, "-c", asks], capture_output=True, check=False)
-    return done.returncode == 0
-
-
-@pytest.mark.skipif(not may_go_ahead(), reason="a high priority is not allowed here (needs root)")
-def test_every_thread_goes_ahead_of_others():
+def test_every_thread_goes_ahead_of_others(need_priority):
     """One that was there before as well: who has the interpreter and no processor stops all."""
+    need_priority(NICENESS)
     ends = threading.Event()
     other = threading.Thread(target=ends.wait)
     other.start()

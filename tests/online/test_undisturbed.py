@@ -3,20 +3,9 @@
 import contextlib
 import gc
 import os
-import subprocess
-import sys
 import threading
 
-import pytest
-
 from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
-
-
-def may_go_ahead(niceness):
-    """Tell whether this user may give a process that priority: asked of another one."""
-    asks = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {niceness})"
-    done = subprocess.run([sys.executable, "-c", asks], capture_output=True, check=False)
-    return done.returncode == 0
 
 
 def niceness_of(thread=0):
@@ -24,9 +13,9 @@ def niceness_of(thread=0):
     return os.getpriority(os.PRIO_PROCESS, thread)
 
 
-@pytest.mark.skipif(not may_go_ahead(-5), reason="a high priority is not allowed here (needs root)")
-def test_threads_that_are_begun_meanwhile_go_ahead_too():
+def test_threads_that_are_begun_meanwhile_go_ahead_too(need_priority):
     """Such as those that read the cameras; one that has ended is not asked for."""
+    need_priority(-5)
     before, seen = niceness_of(), []
     with ahead_of_others(-5) as problem:
         reader = threading.Thread(target=lambda: seen.append(niceness_of()))
@@ -36,9 +25,9 @@ def test_threads_that_are_begun_meanwhile_go_ahead_too():
     assert niceness_of() == before
 
 
-@pytest.mark.skipif(not may_go_ahead(-5), reason="a high priority is not allowed here (needs root)")
-def test_a_failure_takes_the_priority_back():
+def test_a_failure_takes_the_priority_back(need_priority):
     """Whoever handles it goes on as before."""
+    need_priority(-5)
     before = niceness_of()
     with contextlib.suppress(ValueError), ahead_of_others(-5):
         raise ValueError
