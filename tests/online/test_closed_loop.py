@@ -174,4 +174,6 @@ def test_eyes_need_no_background_of_their_own(loop):
     """The empty tank is drawn once: the first frame is tracked at once."""
     opened = open_trial(loop[0] / "trial")
     truth = next(iter(read_poses(loop[0] / "tank" / "poses" / "000000.mcap")))
-    assert len(VirtualEyes(opened).see(truth).agents) >= 4
+    eyes = VirtualEyes(opened)
+    assert len(eyes.see(truth).agents) >= 4
+    eyes.close()

@@ -7,12 +7,14 @@ import time
 
 import pytest
 
+from zfcal.errors import ZfcalError
 from zfcal.online.events import Note
 from zfcal.online.worker import Done, Failure, Worker
 
 JOB = """
 import logging, os, time
 from zfcal.errors import InputError, LockedError
+from zfcal.errors import ZfcalError
 from zfcal.online.events import Note
 
 def job(order, tell):
@@ -93,6 +95,30 @@ def test_a_process_that_dies_is_a_failure_without_a_code(worker, number):
 def test_a_bug_ends_the_process_and_is_a_failure(worker):
     """Its traceback goes to standard error; the watch starts the stage anew."""
     assert answer(worker, "bug")[-1].exit_code is None
+
+
+def test_an_answer_can_be_waited_for(worker):
+    """What was told before it is passed on; without an order there is nothing to wait for."""
+    heard = []
+    assert worker.answer(heard.append) is None
+    worker.order("this")
+    assert worker.answer(heard.append) == "this"
+    assert heard == [Note(text="hears this")]
+    assert not worker.is_busy
+
+
+def test_errors_are_raised_for_who_waits(worker):
+    """With their hint; so is a death. The process that lives carries on."""
+    worker.order("error")
+    with pytest.raises(ZfcalError, match="It is wrong") as caught:
+        worker.answer(print)
+    assert caught.value.hint == "Mend it."
+    worker.order("still there")
+    assert worker.answer(print) == "still there"
+    worker.order("sleep")
+    os.kill(worker.process, signal.SIGKILL)
+    with pytest.raises(ZfcalError, match="process of test ended"):
+        worker.answer(print)
 
 
 def test_its_priority_is_lowered(worker):

@@ -3,25 +3,31 @@
 Time is that of the frames. A frame is what the fish and the robot make of it; the drive
 hears of it as of any frame, and says to the robot's serial port what it would say on a
 rig; the robot moves on to the next frame. Rounds of analysis and calibration run when a
-rig would have ended them. All is fed by files, so that the trial can be done over.
+rig would have ended them: a process beside the loop begins with a window when it has
+ended, and the loop waits for it where its model is due. All is fed by files, so that the
+trial can be done over.
 """
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
 from zfcal.online.events import Progress, Tell
 from zfcal.online.lockstep import LockstepDriver
 from zfcal.online.opening import Task
-from zfcal.online.segments import STEP_S, segment_starts
+from zfcal.online.segments import STEP_S
 from zfcal.online.virtual_eyes import VirtualEyes
+from zfcal.online.virtual_fish import VirtualFish
+from zfcal.online.virtual_rounds import RoundsBeside, Windows, do_rounds, rounds_beside
 from zfcal.online.virtual_trial import (
     FPS,
     Experiment,
+    Eyes,
     Files,
     LoopOptions,
     Noisy,
@@ -68,43 +74,61 @@ def closed_loop(
     """
     task = task or Task()
     experiment = prepare(folder, options, tell, task)
-    if task.force or not is_whole(experiment):
-        clear(experiment)
+    if not task.force and is_whole(experiment):
+        do_rounds(Windows.of(experiment), tell)
+        return experiment.root
+    clear(experiment)
+    with rounds_beside(experiment, tell) as rounds:
         with robot_of(experiment, stepped=True) as robot:
-            driver = LockstepDriver(experiment.trial, robot.port, tell)
+            driver = LockstepDriver(experiment.trial, robot.port, tell, after_s=ROUND_S)
             try:
-                _run(experiment, robot, driver, tell)
+                _run(Parts(experiment, robot, driver, rounds), tell)
             finally:
                 driver.close()
         keep(experiment)
-    _rounds(experiment, tell)
+        rounds.finish()
     return experiment.root
 
 
-def _run(experiment: Experiment, robot: VirtualProcess, driver: LockstepDriver, tell: Tell) -> None:
+class Parts(NamedTuple):
+    """What makes up a loop."""
+
+    experiment: Experiment
+    robot: VirtualProcess
+    driver: LockstepDriver
+    rounds: RoundsBeside
+
+
+def _run(parts: Parts, tell: Tell) -> None:
+    experiment, robot, driver, rounds = parts
     options, fish = experiment.options, fish_of(experiment)
-    eyes = VirtualEyes(experiment.trial) if options.video else Noisy(fish)
-    files = Files(experiment, fish, eyes)
-    n_frames, due_s = round(options.duration_s * FPS), 2 * STEP_S + ROUND_S
-    for number in range(n_frames):
-        at = robot.control.ask("advance", to_s=number / FPS, received=driver.n_sent)
-        where = np.array([at["x_m"], at["y_m"], at["heading_rad"]])
-        seen = files.add(fish.next_frame(where))
-        if seen.time_s >= due_s and options.robot == "calibrated":
-            _rounds(experiment, tell)
-            due_s += STEP_S
-        driver.take(seen)
-        if number % _TOLD_EVERY == 0:
-            tell(Progress(stage="closed loop", done=number, total=n_frames))
-    files.finish()
+    with eyes_of(experiment, fish) as eyes:
+        files = Files(experiment, fish, eyes)
+        n_frames, ended_s, due_s = round(options.duration_s * FPS), 2 * STEP_S, 2 * STEP_S + ROUND_S
+        for number in range(n_frames):
+            at = robot.control.ask("advance", to_s=number / FPS, received=driver.n_sent)
+            where = np.array([at["x_m"], at["y_m"], at["heading_rad"]])
+            seen = files.add(fish.next_frame(where))
+            if seen.time_s >= ended_s:
+                rounds.begin()
+                ended_s += STEP_S
+            if seen.time_s >= due_s:
+                rounds.wait()
+                due_s += STEP_S
+            driver.take(seen)
+            if number % _TOLD_EVERY == 0:
+                tell(Progress(stage="closed loop", done=number, total=n_frames))
+        files.finish()
 
 
-def _rounds(experiment: Experiment, tell: Tell) -> None:
-    """Analyse all windows that have ended; calibrate them, unless the robot does without."""
-    root, options = experiment.root, experiment.options
-    if not segment_starts(root):
+@contextlib.contextmanager
+def eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
+    """Give who tracks: cameras and a tracker, or the truth with noise."""
+    if not experiment.options.video:
+        yield Noisy(fish)
         return
-    analyse(root, AnalyseOptions(), tell)
-    if options.robot == "calibrated":
-        rounds = CalibrateOptions(settings=options.settings, n_workers=options.n_workers)
-        calibrate(root, rounds, tell)
+    eyes = VirtualEyes(experiment.trial)
+    try:
+        yield eyes
+    finally:
+        eyes.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from pathlib import Path
 from typing import final
 
@@ -22,6 +23,9 @@ class DriveModels:
     ----------
     opened
         The trial.
+    after_s
+        A model that is there sooner drives only so many seconds after its window has ended;
+        the starting model at once.
 
     Attributes
     ----------
@@ -29,8 +33,8 @@ class DriveModels:
         What is wrong with a file that was passed over at the last look; empty for nothing.
     """
 
-    def __init__(self, opened: OpenTrial) -> None:
-        self._opened = opened
+    def __init__(self, opened: OpenTrial, *, after_s: float = -math.inf) -> None:
+        self._opened, self._after_s = opened, after_s
         self._folder = opened.trial.root / "models"
         self._force: InForce | None = None
         self._known: tuple[int, tuple[int, int, int]] | None = None
@@ -53,10 +57,18 @@ class DriveModels:
             hint=f"Make one with: zfcal calibrate {self._opened.trial.root}",
         )
 
-    def look(self) -> InForce | None:
-        """Return a model that is newer than the last one; None if there is none."""
+    def look(self, now_s: float = math.inf) -> InForce | None:
+        """Return a model that is newer than the last one; None if there is none.
+
+        Parameters
+        ----------
+        now_s
+            Seconds since the trial began.
+        """
         self.problem = ""
         for second, path in sorted(self._files(), reverse=True):
+            if second and second + self._after_s > now_s:
+                continue
             sign = _sign(path)
             if sign is None or self._bad.get(path) == sign:
                 continue

@@ -292,7 +292,7 @@ class Driver:
         self._crew.tell(Note(text=text, warning=not ended, kind="fault", values=values))
 
     def _look_for_model(self, time_s: float) -> None:
-        found = self._crew.models.look()
+        found = self._crew.models.look(time_s)
         if self._crew.models.problem:
             says = f"{self._crew.models.problem} The model before drives on."
             self._fault(time_s, "model", says)

@@ -32,6 +32,8 @@ class LockstepDriver:
         The robot's serial port.
     tell
         Hears of models and faults.
+    after_s
+        So many seconds after its window has ended a model drives.
 
     Raises
     ------
@@ -39,7 +41,7 @@ class LockstepDriver:
         The port cannot be opened.
     """
 
-    def __init__(self, opened: OpenTrial, port: Path, tell: Tell) -> None:
+    def __init__(self, opened: OpenTrial, port: Path, tell: Tell, *, after_s: float) -> None:
         options = DriveOptions(port=str(port), clock="poses")
         line = SerialLine(str(port))
         if not line.wait(_OPENING_S):
@@ -50,7 +52,7 @@ class LockstepDriver:
         crew = Crew(
             robot=self._robot,
             clock=PoseClock(opened.trial.fps),
-            models=DriveModels(opened),
+            models=DriveModels(opened, after_s=after_s),
             log=self._log,
             tell=tell,
         )

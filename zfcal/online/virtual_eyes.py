@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import final
 
 import cv2
 import numpy as np
 
+from zfcal.online.events import Tell, say_nothing
 from zfcal.online.film import encoded
-from zfcal.online.opening import OpenTrial
+from zfcal.online.opening import OpenTrial, open_trial
+from zfcal.online.worker import Worker
 from zfcal.tracks import FramePoses, tracks_of
 from zfcal.vision.background import background_of
 from zfcal.vision.bodies import Bodies
@@ -22,13 +24,51 @@ from zfcal.vision.region import region_of
 from zfcal.vision.render import OverheadPainter
 from zfcal.vision.render_below import BelowPainter
 from zfcal.vision.rig import below_camera, overhead_camera
-from zfcal.vision.robot import LedOptions, RobotFinder
+from zfcal.vision.robot import LedOptions, RobotFinder, RobotSeen
 from zfcal.vision.seen import TrackerOptions
 from zfcal.vision.swimming import Moment, swimming
 from zfcal.vision.tracker import FishTracker
 
 _PAST = 12
 """Frames from which a posture follows: a fish turns within four."""
+
+
+@final
+class Postures:
+    """How everybody lies in each frame.
+
+    Parameters
+    ----------
+    opened
+        The trial: its frame rate and seed.
+    """
+
+    def __init__(self, opened: OpenTrial) -> None:
+        self._fps, self._seed, self._look = opened.trial.fps, opened.trial.seed, look_of(USUAL)
+        self._past: deque[FramePoses] = deque(maxlen=_PAST)
+
+    def moment(self, truth: FramePoses) -> Moment:
+        """Return how everybody lies in a frame; frames come in their order."""
+        self._past.append(truth)
+        swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
+        return swum.at(len(swum) - 1)
+
+
+def above_of(opened: OpenTrial) -> OverheadPainter:
+    """Return what draws for the camera over the tank of a trial."""
+    arena, seed = opened.arena, opened.trial.seed
+    return OverheadPainter(arena, overhead_camera(arena), look_of(USUAL), seed=seed)
+
+
+def below_of(opened: OpenTrial) -> BelowPainter:
+    """Return what draws for the camera under the tank of a trial."""
+    arena, seed = opened.arena, opened.trial.seed
+    return BelowPainter(arena, below_camera(arena), look_of(USUAL), seed=seed)
+
+
+def photo_of(painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
+    """Return a moment as a camera would take it, as a JPEG file."""
+    return encoded(painter.paint(moment), look_of(USUAL).jpeg_quality)
 
 
 @final
@@ -49,40 +89,51 @@ class Drawn:
     """
 
     def __init__(self, opened: OpenTrial) -> None:
-        trial, arena = opened.trial, opened.arena
-        self._fps, self._seed, self._look = trial.fps, trial.seed, look_of(USUAL)
-        self._above = OverheadPainter(arena, overhead_camera(arena), self._look, seed=trial.seed)
-        self._under = BelowPainter(arena, below_camera(arena), self._look, seed=trial.seed)
-        self._past: deque[FramePoses] = deque(maxlen=_PAST)
-        self.nobody = (self._encoded(self._above, _nobody()), self._encoded(self._under, _nobody()))
+        self._postures = Postures(opened)
+        self._above, self._under = above_of(opened), below_of(opened)
+        self.nobody = (photo_of(self._above, _nobody()), photo_of(self._under, _nobody()))
         self.empty = decoded(self.nobody[0])
 
     def images(self, truth: FramePoses) -> tuple[bytes, bytes]:
         """Return the images of a frame from above and from below, as JPEG files."""
-        moment = self.moment(truth)
-        return self.above(moment), self.below(moment)
-
-    def moment(self, truth: FramePoses) -> Moment:
-        """Return how everybody lies in a frame; frames come in their order."""
-        self._past.append(truth)
-        swum = swimming(tracks_of(self._past), self._look, fps=self._fps, seed=self._seed)
-        return swum.at(len(swum) - 1)
-
-    def above(self, moment: Moment) -> bytes:
-        """Return the image from above, as a JPEG file."""
-        return self._encoded(self._above, moment)
-
-    def below(self, moment: Moment) -> bytes:
-        """Return the image from below, as a JPEG file."""
-        return self._encoded(self._under, moment)
-
-    def _encoded(self, painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
-        return encoded(painter.paint(moment), self._look.jpeg_quality)
+        moment = self._postures.moment(truth)
+        return photo_of(self._above, moment), photo_of(self._under, moment)
 
 
 def decoded(data: bytes) -> Image:
     """Return an image from its file."""
     return np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
+
+
+@final
+class EyeBelow:
+    """Draws each frame as the camera below would take it, and finds the robot in it.
+
+    It is the job of a `Worker`: both cameras have nothing to do with each other.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._ready: tuple[BelowPainter, RobotFinder] | None = None
+
+    def __call__(self, moment: Moment | None, tell: Tell) -> RobotSeen | None:  # noqa: ARG002 - the signature of jobs
+        """Return the robot in a moment, frames in their order; None: get ready for the first."""
+        painter, finder = self._ready = self._ready or self._prepared()
+        if moment is None:
+            return None
+        image = decoded(photo_of(painter, moment))
+        return finder.step(Frame(number=moment.number, time_s=moment.time_s, image=image))
+
+    def _prepared(self) -> tuple[BelowPainter, RobotFinder]:
+        opened = open_trial(self._root)
+        under = below_camera(opened.arena)
+        mask = (region_of(opened.arena, under) * np.uint8(255)).astype(np.uint8)
+        return below_of(opened), RobotFinder(LedOptions(), under, mask=mask)
 
 
 @final
@@ -97,20 +148,19 @@ class VirtualEyes:
 
     def __init__(self, opened: OpenTrial) -> None:
         trial, arena = opened.trial, opened.arena
-        above, under = overhead_camera(arena), below_camera(arena)
-        self._drawn = Drawn(opened)
+        self._beside = Worker("camera-below", EyeBelow(trial.root))
+        self._beside.order(None)
+        above = overhead_camera(arena)
+        self._postures, self._above = Postures(opened), above_of(opened)
         self._tracker = FishTracker(
             TrackerOptions(n_agents=trial.n_agents),
             above,
-            background=background_of(self._drawn.empty),
+            background=background_of(decoded(photo_of(self._above, _nobody()))),
             region=region_of(arena, above),
         )
-        mask = (region_of(arena, under) * np.uint8(255)).astype(np.uint8)
-        self._finder = RobotFinder(LedOptions(), under, mask=mask)
-        # Both cameras have nothing to do with each other, and OpenCV lets others run.
-        self._beside = ThreadPoolExecutor(1, "camera-below")
         self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
         self._hindsight = Hindsight(trial.longest_step_s)
+        self._beside.answer(say_nothing)
 
     @property
     def next_agent(self) -> int:
@@ -119,13 +169,13 @@ class VirtualEyes:
 
     def see(self, truth: FramePoses) -> FramePoses:
         """Return what the tracker makes of the images of a frame."""
-        moment = self._drawn.moment(truth)
-        robot = self._beside.submit(
-            lambda: self._finder.step(_frame(truth, self._drawn.below(moment)))
-        )
-        seen = self._tracker.step(_frame(truth, self._drawn.above(moment)))
+        moment = self._postures.moment(truth)
+        self._beside.order(moment)
+        image = decoded(photo_of(self._above, moment))
+        seen = self._tracker.step(Frame(number=truth.frame, time_s=truth.time_s, image=image))
         self._hindsight.exchange(self._fuser.named(self._tracker.take_exchanges()), truth.time_s)
-        agents = self._fuser.step(seen, robot.result(), truth.time_s)
+        robot: RobotSeen = self._beside.answer(say_nothing)
+        agents = self._fuser.step(seen, robot, truth.time_s)
         self._hindsight.note(truth.frame, truth.time_s, self._fuser.agents)
         return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)
 
@@ -137,9 +187,9 @@ class VirtualEyes:
         """Return what was wrong with the last frame."""
         return tuple(bad.reason for bad in self._tracker.take_bad_frames())
 
-
-def _frame(truth: FramePoses, data: bytes) -> Frame:
-    return Frame(number=truth.frame, time_s=truth.time_s, image=decoded(data))
+    def close(self) -> None:
+        """End the process of the camera below."""
+        self._beside.stop()
 
 
 def _nobody() -> Moment:

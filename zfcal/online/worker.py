@@ -111,6 +111,36 @@ class Worker:
             told.append(Failure(message=f"The process of {self.name} ended with code {code}."))
         return told
 
+    def answer(self, tell: Tell) -> Any:
+        """Wait until it has nothing more to do.
+
+        Parameters
+        ----------
+        tell
+            Hears of what it has told since.
+
+        Returns
+        -------
+        Any
+            What came of its last order; None if it had none.
+
+        Raises
+        ------
+        ZfcalError
+            The order could not be carried out, or the process has died.
+        """
+        result = None
+        while self.is_busy:
+            connection.wait([self.pipe])
+            for each in self.take():
+                if isinstance(each, Failure):
+                    raise ZfcalError(each.message, hint=each.hint)
+                if isinstance(each, Done):
+                    result = each.result
+                else:
+                    tell(each)
+        return result
+
     def stop(self) -> None:
         """End it; what it was writing is whole or not there."""
         if self._process.is_alive():

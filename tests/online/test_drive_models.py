@@ -1,0 +1,61 @@
+"""Which model drives, and from when on: on a rig, and where rounds are done sooner than there."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from zfcal.online.drive_models import DriveModels
+from zfcal.online.opening import open_trial
+
+_spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
+driven = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(driven)
+
+
+@pytest.fixture
+def opened(tmp_path):
+    """Return a trial with the models of three windows beside the starting one."""
+    root = driven.make_trial(tmp_path / "trial")
+    start = (root / "models" / "000000.toml").read_bytes()
+    for second in (120, 180, 240):
+        (root / "models" / f"{second:06d}.toml").write_bytes(start)
+    return open_trial(root)
+
+
+def names(models, seconds):
+    """Return the model that a look at each of some seconds brings; None for no news."""
+    found = [models.look(second) for second in seconds]
+    return [each and each.name.removeprefix("models/") for each in found]
+
+
+def test_the_newest_drives_as_soon_as_it_is_there(opened):
+    """Whatever the time says: a trial may begin with models of an older one."""
+    models = DriveModels(opened)
+    assert models.first().name == "models/000240.toml"
+    assert names(models, [0.0, 500.0]) == [None, None]
+    assert names(DriveModels(opened), [3.0]) == ["000240.toml"]
+
+
+def test_a_model_that_is_there_too_soon_waits(opened):
+    """Until so many seconds after its window has ended, and not a frame longer."""
+    models = DriveModels(opened, after_s=55.0)
+    assert names(models, [0.0, 174.9, 175.0, 175.2, 234.9, 235.0]) == [
+        *("000000.toml", None, "000120.toml", None, None, "000180.toml")
+    ]
+
+
+def test_one_that_comes_late_drives_at_once(opened):
+    """Past its time nothing is waited for, and one that was missed is passed over."""
+    late = opened.trial.root / "models" / "000300.toml"
+    models = DriveModels(opened, after_s=55.0)
+    assert names(models, [300.0, 400.0]) == ["000240.toml", None]
+    late.write_bytes((late.parent / "000000.toml").read_bytes())
+    assert names(models, [400.2]) == ["000300.toml"]
+
+
+def test_the_starting_model_waits_for_nobody(opened):
+    """It has no window."""
+    for second in (120, 180, 240):
+        (opened.trial.root / "models" / f"{second:06d}.toml").unlink()
+    assert names(DriveModels(opened, after_s=55.0), [0.0, 1.0]) == ["000000.toml", None]
