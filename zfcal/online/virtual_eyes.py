@@ -14,6 +14,7 @@ from zfcal.online.film import encoded
 from zfcal.online.opening import OpenTrial, open_trial
 from zfcal.online.worker import Worker
 from zfcal.tracks import FramePoses, tracks_of
+from zfcal.vision._painting import prepare
 from zfcal.vision.background import background_of
 from zfcal.vision.bodies import Bodies
 from zfcal.vision.frames import Frame, Image
@@ -89,6 +90,8 @@ class Drawn:
     """
 
     def __init__(self, opened: OpenTrial) -> None:
+        # In real time no frame has to wait for a compiler.
+        prepare()
         self._postures = Postures(opened)
         self._above, self._under = above_of(opened), below_of(opened)
         self.nobody = (photo_of(self._above, _nobody()), photo_of(self._under, _nobody()))

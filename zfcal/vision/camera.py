@@ -8,6 +8,7 @@ and fits are the business of others; what the lens does stands in `lens`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol
 
 import cv2
@@ -26,6 +27,8 @@ from zfcal.vision.lens import (
 )
 
 __all__ = ["FISHEYE", "PINHOLE", "Camera", "Floats", "Homography", "Projection", "check_fits"]
+
+Distortion = tuple[float, ...]
 
 _NEAREST_M = 1e-4
 """A camera nearer to the plane than that stands in it, and sees it as a line."""
@@ -92,12 +95,7 @@ class Camera:
     @property
     def lens(self) -> Lens:
         """The lens, without the pose."""
-        return Lens(
-            size_px=self.size_px,
-            model=self.model,
-            matrix=self.matrix,
-            distortion=self.distortion,
-        )
+        return _lens(self.size_px, self.model, self.matrix, self.distortion)
 
     @classmethod
     def of(cls, lens: Lens, rotation_rad: Floats, translation_m: Floats) -> Camera:
@@ -158,7 +156,7 @@ class Camera:
         rays = self.lens.to_rays(points_px)
         # On the plane the camera maps (x, y, 1) by three columns: a homography, whose inverse
         # leaves one over the depth as the third coordinate.
-        points_m, inverse_depth = _seen(rays, _inverse(self._plane()))
+        points_m, inverse_depth = _seen(rays, _from_plane(self.rotation_rad, self.translation_m))
         points_m[~(inverse_depth > 0)] = np.nan
         return points_m.reshape(np.shape(points_px))
 
@@ -174,8 +172,35 @@ class Camera:
         return replace(self, size_px=lens.size_px, matrix=lens.matrix)
 
     def _plane(self) -> Floats:
-        rotation, _ = cv2.Rodrigues(np.array(self.rotation_rad, np.float64))
-        return np.column_stack([rotation[:, 0], rotation[:, 1], self.translation_m])
+        return _to_plane(self.rotation_rad, self.translation_m)
+
+
+_Triple = tuple[float, float, float]
+_N_KEPT = 32
+"""Cameras whose constants are kept: an image asks for them several times."""
+
+
+@lru_cache(maxsize=_N_KEPT)
+def _lens(size_px: tuple[int, int], model: str, matrix: Matrix, distortion: Distortion) -> Lens:
+    return Lens(size_px=size_px, model=model, matrix=matrix, distortion=distortion)
+
+
+@lru_cache(maxsize=_N_KEPT)
+def _to_plane(rotation_rad: _Triple, translation_m: _Triple) -> Floats:
+    """Return how a camera maps (x, y, 1) of the plane, not to be written to."""
+    rotation, _ = cv2.Rodrigues(np.array(rotation_rad, np.float64))
+    return _constant(np.column_stack([rotation[:, 0], rotation[:, 1], translation_m]))
+
+
+@lru_cache(maxsize=_N_KEPT)
+def _from_plane(rotation_rad: _Triple, translation_m: _Triple) -> Floats:
+    """Return the inverse of that map."""
+    return _constant(_inverse(_to_plane(rotation_rad, translation_m)))
+
+
+def _constant(matrix: Floats) -> Floats:
+    matrix.flags.writeable = False
+    return matrix
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from zfcal.vision import _painting
 from zfcal.vision.frames import Image
 
 Floats = NDArray[np.float64]
@@ -21,6 +22,8 @@ FINE = 16
 
 _SHIFT = 6
 """Bits behind the point in OpenCV's coordinates."""
+
+_PARTS = float(1 << _SHIFT)
 
 _SHARPEST = 0.3
 """One and the cosine of the angle by which an outline turns at a corner, at least."""
@@ -87,32 +90,20 @@ def patch_of(fills: Sequence[Fill], *, blur_px: float = 0.0) -> Patch:
     corners = np.concatenate([fill.corners_px for fill in fills])
     margin = 1 + int(np.ceil(3 * blur_px))
     low = np.floor(corners.min(axis=0)).astype(int) - margin
+    corner_px = int(low[0]), int(low[1])
     wide, high = np.ceil(corners.max(axis=0)).astype(int) + margin + 1 - low
     fine = np.zeros((high * FINE, wide * FINE, 2), np.uint8)
     for fill in fills:
-        # A pixel's centre has whole coordinates, so its left edge lies at -1/2.
-        corners = (fill.corners_px - low + 0.5) * FINE - 0.5
-        corners = corners if fill.inner else _inset(corners)
-        points = np.round(corners * (1 << _SHIFT)).astype(np.int32)
+        # Moved inwards by half a fine pixel: OpenCV also fills those on a polygon's edge.
+        sharpest = 0.0 if fill.inner else _SHARPEST
+        outline = np.ascontiguousarray(fill.corners_px, np.float64)
+        points = _painting.fine_points(outline, corner_px, FINE, _PARTS, sharpest)
         cv2.fillPoly(fine, [points], (255 * fill.opacity, fill.grey * fill.opacity), shift=_SHIFT)
-    small = cv2.resize(fine, (int(wide), int(high)), interpolation=cv2.INTER_AREA)
-    both = small.astype(np.float32)
+    both = _painting.block_means(fine, FINE)
     if blur_px > 0:
         both = np.asarray(cv2.GaussianBlur(both, (0, 0), blur_px), np.float32)
-    return Patch(corner_px=(int(low[0]), int(low[1])), cover=both[..., 0] / 255.0, ink=both[..., 1])
-
-
-def _inset(corners: Floats) -> Floats:
-    """Return a polygon moved inwards by half a pixel: OpenCV also fills those on its edge."""
-    along = np.concatenate([corners[1:], corners[:1]]) - corners
-    area = float(corners[:, 0] @ along[:, 1] - corners[:, 1] @ along[:, 0])
-    length = np.hypot(along[:, 0], along[:, 1])
-    after = along / np.maximum(length, 1e-9)[:, None]
-    before = np.concatenate([after[-1:], after[:-1]])
-    # Both edges of a corner move by the half: the corner moves along the mitre, but not far.
-    mitre = 0.5 * np.sign(area) / np.maximum(1 + (after * before).sum(axis=1), _SHARPEST)
-    inwards = (after + before) * mitre[:, None]
-    return np.stack([corners[:, 0] - inwards[:, 1], corners[:, 1] + inwards[:, 0]], axis=1)
+    ink = np.ascontiguousarray(both[..., 1])
+    return Patch(corner_px=corner_px, cover=both[..., 0] / 255.0, ink=ink)
 
 
 def mean_patch(patches: Sequence[Patch]) -> Patch:
@@ -133,50 +124,26 @@ def mean_patch(patches: Sequence[Patch]) -> Patch:
 
 def lay_over(image: Image, patch: Patch) -> None:
     """Lay a patch over a grey image, in place; what lies outside the image is cut off."""
-    inside = _inside(image, patch)
-    if inside is None:
-        return
-    here, there = inside
-    under = image[here] * (1.0 - patch.cover[there])
-    image[here] = np.rint(np.clip(under + patch.ink[there], 0, 255)).astype(np.uint8)
+    _painting.lay_over(image, patch.cover, patch.ink, patch.corner_px)
 
 
 def darken(image: Image, patch: Patch, opacity: float, only: Floats32 | None = None) -> None:
-    """Take light from a grey image where a patch covers it, in place.
+    """Take light from an image where a patch covers it, in place.
 
     Parameters
     ----------
     image
-        Is changed.
+        Is changed; grey, or with channels that lose the same share.
     patch
         Its cover counts, its ink does not.
     opacity
         Share of the light that is taken.
-    only : ndarray, shape of the image
+    only : ndarray of float32, shape (height, width)
         Where and how much, from 0 to 1; everywhere if None.
     """
-    inside = _inside(image, patch)
-    if inside is None:
-        return
-    here, there = inside
-    taken = opacity * patch.cover[there]
-    if only is not None:
-        taken = taken * only[here]
-    image[here] = np.rint(image[here] * (1.0 - taken)).astype(np.uint8)
-
-
-_Slices = tuple[slice, slice]
-
-
-def _inside(image: Image, patch: Patch) -> tuple[_Slices, _Slices] | None:
-    """Return what of an image a patch covers, and what of the patch that is."""
-    x, y = patch.corner_px
-    high, wide = patch.cover.shape
-    x0, y0 = max(x, 0), max(y, 0)
-    x1, y1 = min(x + wide, image.shape[1]), min(y + high, image.shape[0])
-    if x0 >= x1 or y0 >= y1:
-        return None
-    return (slice(y0, y1), slice(x0, x1)), (slice(y0 - y, y1 - y), slice(x0 - x, x1 - x))
+    channels = image if image.ndim == 3 else image[..., None]
+    everywhere = np.empty((0, 0), np.float32) if only is None else only
+    _painting.darken(channels, patch.cover, opacity, everywhere, patch.corner_px)
 
 
 def smooth_field(rng: np.random.Generator, shape: tuple[int, ...], size_px: float) -> Floats32:
@@ -202,9 +169,11 @@ class Noise:
     def __init__(self, shape: tuple[int, ...], sd_grey: float, seed: int) -> None:
         rng = np.random.default_rng([seed, _N_FIELDS])
         wide = (shape[0] + _SPARE_PX, shape[1] + _SPARE_PX, *shape[2:])
-        self._shape = shape
+        self._step = int(np.prod(shape[2:]))
         self._fields = [
-            np.rint(sd_grey * rng.standard_normal(wide, np.float32)).astype(np.int16)
+            np.rint(sd_grey * rng.standard_normal(wide, np.float32))
+            .astype(np.int16)
+            .reshape(wide[0], -1)
             for _ in range(_N_FIELDS if sd_grey > 0 else 0)
         ]
 
@@ -213,5 +182,7 @@ class Noise:
         if not self._fields:
             return image
         which, x, y = rng.integers(0, (_N_FIELDS, _SPARE_PX, _SPARE_PX))
-        field = self._fields[which][y : y + self._shape[0], x : x + self._shape[1]]
-        return np.asarray(cv2.add(image, field, dtype=cv2.CV_8U), np.uint8)
+        flat = _painting.add_field(
+            image.reshape(len(image), -1), self._fields[which], y, self._step * x
+        )
+        return flat.reshape(image.shape)

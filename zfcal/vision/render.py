@@ -82,7 +82,8 @@ class OverheadPainter:
         seed: int,
         photograph: Image | None = None,
     ) -> None:
-        self._arena, self._camera, self._look, self._seed = arena, camera, look, seed
+        self._camera, self._look, self._seed = camera, look, seed
+        self._walls = _Walls(arena)
         tank = overhead_tank(arena, camera, look, seed=seed)
         self._wall = tank.wall
         self._empty = tank.image if photograph is None else photographed(photograph, camera)
@@ -180,9 +181,7 @@ class OverheadPainter:
     def _draw_reflections(self, image: Image, outlines: Outlines, moment: Moment) -> None:
         look = self._look
         for body, xy_m in enumerate(moment.bodies.xy_m):
-            for origin, normal, distance_m in _near_walls(
-                self._arena, xy_m, look.reflection_reach_m
-            ):
+            for origin, normal, distance_m in self._walls.near(xy_m, look.reflection_reach_m):
                 ring = outlines.silhouette_m[body]
                 mirrored = ring - 2 * ((ring - origin) @ normal)[:, None] * normal
                 corners_px = self._camera.to_pixels(mirrored)
@@ -255,24 +254,34 @@ def _blurred(fills: list[Fill], moved_px: Floats, n: int, defocus_px: float) -> 
     )
 
 
-def _near_walls(arena: Arena, xy_m: Floats, reach_m: float) -> list[tuple[Floats, Floats, float]]:
-    """Return a point, the normal and the distance of at most two walls within reach."""
-    start, end = arena.segments_m[:, :2], arena.segments_m[:, 2:]
-    along = end - start
-    length_m = np.hypot(along[:, 0], along[:, 1])
-    unit = along / length_m[:, None]
-    foot = ((xy_m - start) * unit).sum(axis=1)
-    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    distance_m = np.abs(((xy_m - start) * normal).sum(axis=1))
-    beside = (foot >= 0) & (foot <= length_m) & (distance_m < reach_m)
-    found: list[tuple[Floats, Floats, float]] = []
-    for wall in np.flatnonzero(beside)[np.argsort(distance_m[beside])]:
-        turned = [abs(normal[wall] @ other) < np.cos(_ASIDE_RAD) for _, other, _ in found]
-        if all(turned):
-            found.append((start[wall], normal[wall], float(distance_m[wall])))
-        if len(found) == 2:
-            break
-    return found
+@final
+class _Walls:
+    """The walls of an arena, as mirrors."""
+
+    def __init__(self, arena: Arena) -> None:
+        self._start, end = arena.segments_m[:, :2], arena.segments_m[:, 2:]
+        along = end - self._start
+        self._length_m = np.hypot(along[:, 0], along[:, 1])
+        self._unit = along / self._length_m[:, None]
+        self._normal = np.stack([-self._unit[:, 1], self._unit[:, 0]], axis=1)
+
+    def near(self, xy_m: Floats, reach_m: float) -> list[tuple[Floats, Floats, float]]:
+        """Return a point, the normal and the distance of at most two walls within reach."""
+        to = xy_m - self._start
+        distance_m = np.abs((to * self._normal).sum(axis=1))
+        if not (distance_m < reach_m).any():
+            return []
+        foot = (to * self._unit).sum(axis=1)
+        beside = (foot >= 0) & (foot <= self._length_m) & (distance_m < reach_m)
+        found: list[tuple[Floats, Floats, float]] = []
+        for wall in np.flatnonzero(beside)[np.argsort(distance_m[beside])]:
+            normal = self._normal[wall]
+            turned = [abs(normal @ other) < np.cos(_ASIDE_RAD) for _, other, _ in found]
+            if all(turned):
+                found.append((self._start[wall], normal, float(distance_m[wall])))
+            if len(found) == 2:
+                break
+        return found
 
 
 def _px_per_m(arena: Arena, camera: Projection) -> float:

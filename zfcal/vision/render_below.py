@@ -6,12 +6,14 @@ and behind its position, on the plane on which that camera is calibrated.
 
 from __future__ import annotations
 
+import math
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.vision._painting import add_light
 from zfcal.vision.camera import Projection
 from zfcal.vision.frames import Image
 from zfcal.vision.look import Look
@@ -90,8 +92,7 @@ class BelowPainter:
 
     def _draw_hull(self, image: Image, corners_px: Floats) -> None:
         patch = patch_of([Fill(corners_px=corners_px, grey=0.0)], blur_px=_SOFT_PX)
-        for channel in range(3):
-            darken(image[..., channel], patch, _ROBOT_OPACITY)
+        darken(image, patch, _ROBOT_OPACITY)
 
     def _light_up(self, image: Image, place_px: Floats, colour: Floats32) -> None:
         """Add an LED: a disc with soft edge, its glow, and its reflection in the glass."""
@@ -148,8 +149,9 @@ def _add_light(
     image: Image, place_px: Floats, radius_px: float, glow: float, colour: Floats32
 ) -> None:
     x, y = np.rint(place_px).astype(int)
-    x0, y0 = max(x - _REACH_PX, 0), max(y - _REACH_PX, 0)
-    x1, y1 = min(x + _REACH_PX + 1, image.shape[1]), min(y + _REACH_PX + 1, image.shape[0])
+    reach = _reach_px(radius_px, glow)
+    x0, y0 = max(x - reach, 0), max(y - reach, 0)
+    x1, y1 = min(x + reach + 1, image.shape[1]), min(y + reach + 1, image.shape[0])
     if x0 >= x1 or y0 >= y1:
         return
     across = np.arange(x0, x1, dtype=np.float32) - np.float32(place_px[0])
@@ -158,8 +160,15 @@ def _add_light(
     disc = 1 / (1 + np.exp(np.clip((away - radius_px) / (_SOFT_PX / 2), -30.0, 30.0)))
     light = disc + glow * np.exp(-((away / _GLOW_PX) ** 2) / 2)
     light *= 1 - _fading(away)
-    sum_ = image[y0:y1, x0:x1] + _BRIGHTEST * light[..., None] * colour
-    image[y0:y1, x0:x1] = np.rint(np.minimum(sum_, 255.0)).astype(np.uint8)
+    add_light(image, np.asarray(_BRIGHTEST * light, np.float32), colour, (int(x0), int(y0)))
+
+
+def _reach_px(radius_px: float, glow: float) -> int:
+    """Return how far from its middle a light changes an image: by half a grey level or more."""
+    disc = radius_px + _SOFT_PX / 2 * math.log(2 * _BRIGHTEST)
+    halo = _GLOW_PX * math.sqrt(2 * math.log(max(2 * _BRIGHTEST * glow, 1.0)))
+    # A pixel more: the middle lies between pixels, and where both end they add up.
+    return min(math.ceil(max(disc, halo)) + 2, _REACH_PX)
 
 
 def _fading(away: Floats32) -> Floats32:

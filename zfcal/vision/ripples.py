@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import final
 
-import cv2
 import numpy as np
 
+from zfcal.vision._painting import add_fields
 from zfcal.vision.frames import Image
 from zfcal.vision.painting import smooth_field
 
@@ -43,8 +43,7 @@ class Ripples:
         """Return a copy of the image with the ripples of an instant."""
         if not self._fields:
             return image.copy()
-        cuts = []
-        for field, (dx, dy) in zip(self._fields, _DRIFT_PX_S, strict=True):
-            x, y = int(dx * time_s) % self._shape[1], int(dy * time_s) % self._shape[0]
-            cuts.append(field[y : y + self._shape[0], x : x + self._shape[1]])
-        return np.asarray(cv2.add(image, cuts[0] + cuts[1], dtype=cv2.CV_8U), np.uint8)
+        high, wide = self._shape
+        places = [(int(dy * time_s) % high, int(dx * time_s) % wide) for dx, dy in _DRIFT_PX_S]
+        one, other = self._fields
+        return add_fields(image, one, other, np.array(places, np.int64))
