@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from zfcal.model.extended import bounds_of, maximise, start_of, with_effect, without_effects
+from zfcal.model.extended import (
+    bounds_of,
+    maximise,
+    nats_at,
+    start_of,
+    with_effect,
+    without_effects,
+)
 from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_log_p, zone_scores, zone_turns
 from zfcal.model.kernels.extended import (
     BASE,
@@ -447,3 +454,52 @@ def test_effects_come_and_go(model):
 def test_units_of_a_fit():
     """Kappa of the base and of the neighbours in units of 30, alpha of 50."""
     assert SCALES.tolist() == [30.0, 30.0, 50.0]
+
+
+def test_a_place_is_found_to_the_millimetre(two_rooms, model):
+    """From 30 cm beside it; a place can be 100 m away, and is told to less than its error."""
+    place = {"strength": 1.5, "x_m": 0.3, "y_m": 0.2, "reach_m": 0.4}
+    true = having(model, {"place-preference": place})
+    xy_m, _ = simulate_tracks(true, two_rooms, n_agents=5, n_steps=3000, seed=22)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    start = having(model, {"place-preference": {**place, "x_m": 0.6, "y_m": 0.3}})
+    free = tuple(("place-preference", key) for key in place)
+    fitted = maximise(scene, start, free=free)
+    found = fitted.parameters.effects["place-preference"]
+    top = fitted.nats
+    for key, by in (("x_m", 0.002), ("y_m", 0.002), ("strength", 0.02)):
+        for sign in (-1, 1):
+            moved = with_effect(
+                fitted.parameters, "place-preference", {key: found[key] + sign * by}
+            )
+            assert nats_at(scene, [moved], fitted.x)[0] < top + 0.02
+    assert np.hypot(found["x_m"] - 0.3, found["y_m"] - 0.2) < 4 * math.sqrt(
+        fitted.covariance[1, 1] + fitted.covariance[2, 2]
+    )
+
+
+def test_a_parameter_at_its_bound_holds_none_of_the_others_up(two_rooms, model):
+    """A place far away acts as a drift where its reach is as large as it can be, and strong."""
+    place = {"strength": 1.0, "x_m": 2.4, "y_m": 1.6, "reach_m": 2.0}
+    far = having(model, {"directional-drift": {"strength": 0.4, "direction_rad": 0.6}})
+    xy_m, _ = simulate_tracks(far, two_rooms, n_agents=5, n_steps=3000, seed=23)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    held = (("place-preference", "strength"),)
+    alone = maximise(scene, having(model, {"place-preference": place}), free=held)
+    both = maximise(
+        scene,
+        having(model, {"place-preference": place}),
+        free=(*held, ("place-preference", "reach_m")),
+    )
+    assert both.parameters.effects["place-preference"]["reach_m"] == 2.0
+    assert both.nats == pytest.approx(alone.nats, abs=0.05)
+
+
+def test_the_fit_does_not_depend_on_the_threads(short_scene, model):
+    """Zones and derivatives are each computed by themselves."""
+    start = having(model, HOOKS["factor"])
+    free = (("turning-bias", "strength"),)
+    one, two = (maximise(short_scene, start, free=free, n_workers=n) for n in (1, 2))
+    assert one.nats == two.nats
+    assert one.parameters == two.parameters
+    np.testing.assert_array_equal(one.effect_scores, two.effect_scores)

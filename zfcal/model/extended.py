@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,7 @@ _LOW, _HIGH = np.array([1e-3, 1e-3, 0.0]), np.array([4.0, 4.0, 10.0])
 _LOG_GAMMA_SPAN = 7.0
 _LAPSE = (1e-6, 0.2)
 _DIFFERENCE = 1e-4
+"""Of a parameter's range, and at most so much in its unit: places may be 100 m away."""
 _SHRINK = 0.2
 _MOST_ROUNDS = 25
 _ENOUGH_NATS = 0.02
@@ -66,6 +69,7 @@ def maximise(
     free: Free = (),
     start: Sequence[Floats] | None = None,
     rounds: int = _MOST_ROUNDS,
+    n_workers: int = 1,
 ) -> Fitted:
     """Return a model with its parameters at their maximum likelihood.
 
@@ -81,18 +85,23 @@ def maximise(
         Per zone, as `zone_scores` takes it; None for the model's own.
     rounds
         At most so many steps uphill.
+    n_workers
+        Threads; the numbers do not depend on them.
     """
-    climb = _Climb(scene=scene, free=free, seen=view_of(scene, without_effects(parameters)))
+    seen = view_of(scene, without_effects(parameters))
+    climb = _Climb(scene=scene, free=free, seen=seen, n_workers=n_workers)
     x = [values.copy() for values in (start_of(parameters) if start is None else start)]
     here = climb.at(parameters, x)
+    psi = None
     for _ in range(rounds):
-        there = climb.step(here)
+        psi = climb.differences(here)
+        there = climb.step(here, psi)
         if there is None:
             break
-        gain, here = there.nats - here.nats, there
+        gain, here, psi = there.nats - here.nats, there, None
         if gain < _ENOUGH_NATS:
             break
-    return climb.finish(here)
+    return climb.finish(here, climb.differences(here) if psi is None else psi)
 
 
 def nats_at(
@@ -129,6 +138,7 @@ class _Climb:
     scene: Scene
     free: Free
     seen: View
+    n_workers: int = 1
 
     @cached_property
     def turns(self) -> tuple[ZoneTurns, ...]:
@@ -139,14 +149,14 @@ class _Climb:
         view = view_of(self.scene, parameters, self.seen)
         n = len(self.scene.turns)
         log_p, weight = np.full(n, np.nan), np.ones(n)
-        scores = []
-        for own, turns in zip(x, self.turns, strict=True):
+
+        def of_zone(own: Floats, turns: ZoneTurns) -> Floats:
             if not turns.enough:
-                scores.append(np.zeros((len(turns.rows), own.size)))
-                continue
-            some, slope, sure = zone_scores(own, turns, view)
-            log_p[turns.rows], weight[turns.rows] = some, sure
-            scores.append(slope)
+                return np.zeros((len(turns.rows), own.size))
+            log_p[turns.rows], slope, weight[turns.rows] = zone_scores(own, turns, view)
+            return slope
+
+        scores = self._at_once(of_zone, x, self.turns)
         return Fitted(
             parameters=parameters,
             x=tuple(x),
@@ -170,23 +180,31 @@ class _Climb:
 
     def differences(self, here: Fitted) -> Floats:
         """Return the scores of the effects' parameters, in units of their ranges."""
-        columns = np.zeros((len(here.log_p), len(self.free)))
-        for p, (name, key) in enumerate(self.free):
+
+        def column(name: str, key: str) -> Floats:
             low, high = bounds_of(name, key)
             value = here.parameters.effects[name][key]
-            by = _DIFFERENCE * (high - low)
+            by = _DIFFERENCE * min(high - low, 1.0)
             by = by if value + by <= high else -by
             moved = with_effect(here.parameters, name, {key: value + by})
             there = self.log_p(moved, here.x)
-            columns[:, p] = np.nan_to_num(there - here.log_p) / by * (high - low)
-        return columns
+            return np.asarray(np.nan_to_num(there - here.log_p) / by * (high - low))
 
-    def step(self, here: Fitted) -> Fitted | None:
+        columns = self._at_once(column, *zip(*self.free, strict=True)) if self.free else []
+        return np.array(columns).reshape(len(columns), len(here.log_p)).T
+
+    def _at_once(self, asked: Callable[..., Floats], *values: Iterable[Any]) -> list[Floats]:
+        """Return what is asked of the first of all values, of the second, and so on."""
+        if self.n_workers < 2:
+            return list(map(asked, *values))
+        with ThreadPoolExecutor(self.n_workers) as pool:
+            return list(pool.map(asked, *values))
+
+    def step(self, here: Fitted, psi: Floats) -> Fitted | None:
         """Return a better point, None if none is found."""
-        psi = self.differences(here)
-        blocks, by_psi = _directions(here, psi)
+        blocks, by_psi, promise = _directions(here, psi, self._pushed(here.parameters, psi))
         length = 1.0
-        for _ in range(8):
+        while length * promise > _ENOUGH_NATS:
             x = [
                 _shifted(own, length * by, turns) if turns.enough else own
                 for own, by, turns in zip(here.x, blocks, self.turns, strict=True)
@@ -196,6 +214,16 @@ class _Climb:
                 return there
             length /= 3
         return None
+
+    def _pushed(self, parameters: Parameters, psi: Floats) -> NDArray[np.bool_]:
+        """Return which of the effects' parameters are at a bound, and uphill is beyond it."""
+        slope = psi.sum(axis=0)
+        pushed = np.zeros(len(self.free), dtype=bool)
+        for p, (name, key) in enumerate(self.free):
+            low, high = bounds_of(name, key)
+            value = parameters.effects[name][key]
+            pushed[p] = (value <= low and slope[p] < 0) or (value >= high and slope[p] > 0)
+        return pushed
 
     def _moved(self, parameters: Parameters, by: Floats) -> Parameters:
         for (name, key), change in zip(self.free, by, strict=True):
@@ -208,8 +236,8 @@ class _Climb:
             parameters = with_effect(parameters, name, {key: float(np.clip(value, low, high))})
         return parameters
 
-    def finish(self, here: Fitted) -> Fitted:
-        psi = self.differences(here)
+    def finish(self, here: Fitted, psi: Floats) -> Fitted:
+        """Return a point as the maximum."""
         information = _information(here, psi)
         k = len(self.free)
         whole: Floats = np.asarray(linalg.pinvh(information)) if k else np.zeros((0, 0))
@@ -271,8 +299,10 @@ def _information(here: Fitted, psi: Floats) -> Floats:
     return whole
 
 
-def _directions(here: Fitted, psi: Floats) -> tuple[list[Floats], Floats]:
-    """Return the way uphill, per zone and for the effects' parameters."""
+def _directions(
+    here: Fitted, psi: Floats, psi_pushed: NDArray[np.bool_]
+) -> tuple[list[Floats], Floats, float]:
+    """Return the way uphill, per zone and for the effects' parameters, and the nats it promises."""
     information = _information(here, psi)
     slope = np.concatenate([*(scores.sum(axis=0) for scores in here.scores), psi.sum(axis=0)])
     open_ = np.diag(information) > 1e-12
@@ -284,12 +314,13 @@ def _directions(here: Fitted, psi: Floats) -> tuple[list[Floats], Floats]:
         )
         open_[at : at + x.size] &= ~pushed
         at += x.size
+    open_[at:] &= ~psi_pushed
     by = np.zeros_like(slope)
     inner = information[np.ix_(open_, open_)]
     ridge = _RIDGE * np.diag(inner).mean() if inner.size else 0.0
     by[open_] = linalg.solve(inner + ridge * np.eye(len(inner)), slope[open_], assume_a="pos")
     parts = np.split(by, np.cumsum([x.size for x in here.x]))
-    return parts[:-1], parts[-1]
+    return parts[:-1], parts[-1], 0.5 * float(slope @ by)
 
 
 def _zone_of(x: Floats, zone: ZoneParameters, names: tuple[str, ...]) -> ZoneParameters:
