@@ -15,7 +15,7 @@ from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
 from zfcal.model.simulate import tank_of
-from zfcal.model.views import factors_of, harmonics_of, smooth_factors_of, view_of
+from zfcal.model.views import factors_of, polynomial_of, smooth_factors_of, view_of
 
 SMOOTH = [e for e in (*all_effects(), *generic_effects()) if e.harmonics is not None]
 
@@ -30,23 +30,24 @@ def few(screen):
 
 
 def packed_with(own, effect, arena):
-    """Return a model with an effect, each of its parameters well away from zero."""
+    """Return an effect as a model has it, each of its parameters well away from zero."""
     middling = {p.name: p.default or min(0.7, p.high) for p in effect.parameters}
     here = own.scene.states[own.scene.turns.at[0], :, own.scene.turns.who[0]]
     place = {"x_m": here[X] + 0.05, "y_m": here[Y]}
     middling |= {name: at for name, at in place.items() if name in middling}
     model = with_effect(own.fitted.parameters, effect.name, middling)
-    return model, pack([model], arena)
+    return pack([model], arena)
 
 
 @pytest.mark.parametrize("effect", SMOOTH, ids=lambda effect: effect.name)
 def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, few, tank):
     """An effect that says it is a polynomial of some degree is one, up to a common factor."""
     own, scene = few
-    model, packed = packed_with(own, effect, tank)
+    packed = packed_with(own, effect, tank)
     angle_sr = view_of(scene, own.fitted.parameters).angle_sr
     whole, at_taken = factors_of(scene, packed, angle_sr)
-    few_points, at_taken_again = smooth_factors_of(scene, packed, angle_sr, harmonics_of(model))
+    form = polynomial_of([effect])
+    few_points, at_taken_again = smooth_factors_of(scene, packed, angle_sr, form)
     lands = scene.turns.share.any(axis=2)
     np.testing.assert_allclose(few_points[lands], whole[lands], rtol=1e-5)
     np.testing.assert_allclose(at_taken_again, at_taken, rtol=1e-9)
@@ -59,7 +60,7 @@ def test_the_factors_differ_between_headings(few, tank):
     flat = {
         effect.name
         for effect in SMOOTH
-        for whole, _ in [factors_of(scene, packed_with(own, effect, tank)[1], angle_sr)]
+        for whole, _ in [factors_of(scene, packed_with(own, effect, tank), angle_sr)]
         if np.ptp(whole, axis=1).max() < 0.01
     }
     assert flat <= {"collective-departure"}

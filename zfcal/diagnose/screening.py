@@ -51,7 +51,16 @@ from zfcal.model.kernels.scores import (
 from zfcal.model.kernels.world import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
-from zfcal.model.views import attended, components_of, factors_of, harmonics, late_sight, spin_of
+from zfcal.model.views import (
+    Polynomial,
+    attended,
+    components_of,
+    factors_of,
+    harmonics,
+    late_sight,
+    polynomial_of,
+    spin_of,
+)
 from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]
@@ -187,19 +196,19 @@ class Screen:
         if effect.calls("rotation", shape):
             total += self._turned_scores(scene, at(effect.probe)) / effect.probe
         if effect.calls("factor", shape):
-            tilted = self._tilted_scores(scene, at(effect.probe), effect.harmonics)
+            tilted = self._tilted_scores(scene, at(effect.probe), polynomial_of([effect]))
             total += tilted * fitted.weight / effect.probe
         return total
 
-    def _tilted_scores(self, scene: Scene, packed: Packed, degree: int | None) -> Floats:
+    def _tilted_scores(self, scene: Scene, packed: Packed, form: Polynomial | None) -> Floats:
         """Return the change of the log density by factors on headings."""
         angle, probability = self.fitted.view.seen_sr, self.probability
         scores = np.empty(len(scene.turns))
-        if degree is None:
+        if form is None:
             tilt, tilt_taken = factors_of(scene, packed, angle, probability)
             factor_score(tilt, tilt_taken, probability, scores)
             return scores
-        waves, zones, log_taken = harmonics(scene, packed, angle, degree)
+        waves, zones, log_taken = harmonics(scene, packed, angle, form)
         expected, lands = self._mean_waves
         scores[:] = log_taken - (waves * expected[:, : waves.shape[1]]).sum(axis=1)
         return scores - (zones * lands).sum(axis=1)

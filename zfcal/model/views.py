@@ -6,12 +6,13 @@ It comes from the very functions that a simulation calls; the base's parameters 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.effects import find_effect
+from zfcal.model.effects import Effect, find_effect
 from zfcal.model.kernels.asking import (
     PART,
     ask_components,
@@ -83,11 +84,11 @@ def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> V
         toward = np.concatenate([toward, late_toward], axis=1)
         angle = np.concatenate([(1 - share) * angle, share * late_angle], axis=1)
     parts = components_of(scene, packed, own)
-    degree = harmonics_of(parameters)
-    if degree is None:
+    form = polynomial_of([find_effect(name) for name in parameters.effects])
+    if form is None:
         tilt, tilt_taken = factors_of(scene, packed, own)
     else:
-        tilt, tilt_taken = smooth_factors_of(scene, packed, own, degree)
+        tilt, tilt_taken = smooth_factors_of(scene, packed, own, form)
     return View(
         toward=toward,
         angle_sr=angle,
@@ -191,16 +192,34 @@ def factors_of(
     return tilt, taken
 
 
-def harmonics_of(parameters: Parameters) -> int | None:
-    """Return the degree of the polynomial that a model's factors are; None where one is none."""
-    effects = [find_effect(name) for name in parameters.effects]
-    degrees = [effect.harmonics for effect in effects if effect.factor is not None]
+@dataclass(frozen=True, slots=True)
+class Polynomial:
+    """What the log of factors is: a trigonometric polynomial of the heading.
+
+    Parameters
+    ----------
+    degree
+        Of it.
+    by_landing
+        Whether a number of the landing zone is added.
+    """
+
+    degree: int
+    by_landing: bool
+
+
+def polynomial_of(effects: Sequence[Effect]) -> Polynomial | None:
+    """Return what the log of the product of effects' factors is; None where one is none."""
+    factors = [effect for effect in effects if effect.factor is not None]
+    degrees = [effect.harmonics for effect in factors]
     known = [degree for degree in degrees if degree is not None]
-    return max(known, default=0) if len(known) == len(degrees) else None
+    if len(known) < len(degrees):
+        return None
+    return Polynomial(max(known, default=0), any(effect.by_landing for effect in factors))
 
 
 def harmonics(
-    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial
 ) -> tuple[Floats, Floats, Floats]:
     """Return the log of the effects' factors as a polynomial, and at the heading taken.
 
@@ -210,22 +229,22 @@ def harmonics(
         As `zfcal.model.kernels.asking.ask_harmonics` has them.
     """
     turns, n = scene.turns, len(scene.turns)
-    waves, log_taken = np.empty((n, 1 + 2 * degree)), np.empty(n)
+    waves, log_taken = np.empty((n, 1 + 2 * form.degree)), np.empty(n)
     zones = np.empty((n, turns.share.shape[2]))
     ask_harmonics(
         scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
-        turns.landing, waves, zones, log_taken,
+        turns.landing, form.by_landing, waves, zones, log_taken,
     )  # fmt: skip
     return waves, zones, log_taken
 
 
 def smooth_factors_of(
-    scene: Scene, packed: Packed, angle_sr: Floats, degree: int
+    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial
 ) -> tuple[Floats, Floats]:
     """Return what `factors_of` does, of factors that are polynomials in their log."""
     if not len(packed.factors):
         return np.zeros((0, ANGLES)), np.zeros(0)
-    waves, zones, log_taken = harmonics(scene, packed, angle_sr, degree)
+    waves, zones, log_taken = harmonics(scene, packed, angle_sr, form)
     tilt = np.empty((len(scene.turns), ANGLES))
     harmonic_tilt(waves, zones, scene.turns.share, tilt)
     return tilt, np.exp(log_taken)

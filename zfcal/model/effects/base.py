@@ -117,6 +117,8 @@ class Effect:
         The log of its factor is a trigonometric polynomial of the heading, of this degree,
         plus a number of the landing zone; None where it is not, or where there is no factor.
         So few headings are asked instead of all.
+    by_landing
+        Whether that number differs between zones.
     lag
         Name of a parameter in seconds by which agents respond late; the strength is the
         share of what they see that is late, and ``felt_m`` and ``whole`` say of whom and
@@ -154,6 +156,7 @@ class Effect:
     sight: Any = None
     rotation: Any = None
     harmonics: int | None = None
+    by_landing: bool = False
     lag: str | None = None
     shapes: Callable[[Arena], Shapes] = _as_it_is
     lacks: Callable[[Company], str | None] = _always

@@ -57,6 +57,7 @@ EFFECT = Effect(
     probe=0.01,
     factor=factor,
     harmonics=1,
+    by_landing=True,
     shapes=_shapes,
     lacks=_lacks,
     identity_s=300.0,

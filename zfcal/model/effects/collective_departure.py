@@ -54,6 +54,7 @@ EFFECT = Effect(
     probe=0.01,
     factor=factor,
     harmonics=1,
+    by_landing=True,
     shapes=lambda _arena: tuple(
         {"memory_s": memory_s, "heading_share": share}
         for share in (1.0, 0.0)

@@ -199,10 +199,21 @@ def _log_factor(
     return math.log(max(product, 1e-300))
 
 
+@inlined
+def _polynomial(waves: Floats, x: float, y: float) -> float:
+    """Return a trigonometric polynomial at the unit vector ``(x, y)``."""
+    total, c, s = waves[0], 1.0, 0.0
+    for d in range(1, waves.size // 2 + 1):
+        c, s = c * x - s * y, s * x + c * y
+        total += waves[2 * d - 1] * c + waves[2 * d] * s
+    return total
+
+
 @kernel
 def ask_harmonics(
     states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
-    speed_m_s: Floats, landing: Ints, waves: Floats, zones: Floats, log_taken: Floats,
+    speed_m_s: Floats, landing: Ints, by_landing: bool, waves: Floats, zones: Floats,
+    log_taken: Floats,
 ) -> None:  # fmt: skip
     """Write the log of the effects' factors, as a trigonometric polynomial of the heading.
 
@@ -210,6 +221,8 @@ def ask_harmonics(
     ----------
     taken : ndarray, shape (step, 2)
     speed_m_s, landing : ndarray, shape (step,)
+    by_landing
+        Whether a factor depends on the landing zone.
     waves : ndarray, shape (step, 1 + 2 * degree)
         Receives the mean, then the cosine's and the sine's share of each degree, for
         headings that land in the first zone.
@@ -237,12 +250,12 @@ def ask_harmonics(
             for d in range(1, points // 2 + 1):
                 waves[s, 2 * d - 1] += 2.0 * value[p] * gx[p * d % points] / points
                 waves[s, 2 * d] += 2.0 * value[p] * gy[p * d % points] / points
-        zones[s, 0] = 0.0
-        for z in range(1, zones.shape[1]):
-            there = _log_factor(packed, state, seen, me, (gx[0], gy[0]), speed_m_s[s], z + 1)
-            zones[s, z] = there - value[0]
-        own = (taken[s, 0], taken[s, 1])
-        log_taken[s] = _log_factor(packed, state, seen, me, own, speed_m_s[s], landing[s])
+        zones[s] = 0.0
+        if by_landing:
+            for z in range(1, zones.shape[1]):
+                there = _log_factor(packed, state, seen, me, (gx[0], gy[0]), speed_m_s[s], z + 1)
+                zones[s, z] = there - value[0]
+        log_taken[s] = _polynomial(waves[s], taken[s, 0], taken[s, 1]) + zones[s, landing[s] - 1]
         for j in range(n):
             row[i * n + j] = 0.0
 
