@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from zfcal.diagnose import heats
-from zfcal.diagnose.heats import ahead, run_heats, unbeaten
+from zfcal.diagnose import heats, naming
+from zfcal.diagnose.heats import Sampled, ahead, hopeful, run_heats, unbeaten
 from zfcal.diagnose.naming import refit
 
 SUSPECTS = ("group-cohesion", "leader-following", "wall-persistence", "burst-and-coast")
@@ -26,7 +26,8 @@ def short(monkeypatch):
 @pytest.fixture
 def ran(asked, short):
     """The four suspects' heats."""
-    return run_heats(*asked, 2)
+    screen, scores = asked
+    return run_heats(Sampled(whole=screen), scores, 2)
 
 
 def names(found):
@@ -49,7 +50,7 @@ def test_a_recording_without_any_of_them_keeps_them_all(screen, candidate, short
     """Nobody is five standard errors ahead where there is nothing."""
     nothing = screen(32, minutes=8.0)
     scores = [nothing.ask(candidate(name)) for name in SUSPECTS]
-    assert names(unbeaten(run_heats(nothing, scores, 1))) == list(SUSPECTS)
+    assert names(unbeaten(run_heats(Sampled(whole=nothing), scores, 1))) == list(SUSPECTS)
 
 
 def test_what_must_be_ahead_in_the_end_is_out_sooner(ran):
@@ -73,7 +74,8 @@ def test_what_all_steps_may_gain_is_told_by_some(asked, ran):
 
 def test_few_steps_are_worth_no_heat(asked):
     """All are then fitted to everything, and may gain anything."""
-    ran = run_heats(*asked, 1)
+    screen, scores = asked
+    ran = run_heats(Sampled(whole=screen), scores, 1)
     assert [heat.first for heat in ran] == [None] * 4
     assert unbeaten(ran) == ran == ahead(ran, ran)
     assert all(heat.gains(1e9) for heat in ran)
@@ -81,6 +83,43 @@ def test_few_steps_are_worth_no_heat(asked):
 
 def test_a_heat_does_not_depend_on_the_threads(asked, ran):
     """The same fits by one and by two."""
-    alone = run_heats(*asked, 1)
+    screen, scores = asked
+    alone = run_heats(Sampled(whole=screen), scores, 1)
     assert [heat.first.values for heat in alone] == [heat.first.values for heat in ran]
     assert [heat.first.nats for heat in alone] == [heat.first.nats for heat in ran]
+
+
+def test_a_fit_goes_on_where_its_heat_ended(asked, ran, monkeypatch):
+    """It comes to the same maximum as one that looks for its start, and looks for none."""
+    screen, scores = asked
+    found = refit(screen, scores[0])
+    monkeypatch.setattr(naming, "_start", None)
+    again = refit(screen, scores[0], ran[0].first)
+    assert again.nats == pytest.approx(found.nats, abs=0.05)
+    assert again.values["weight"] == pytest.approx(found.values["weight"], rel=0.02)
+
+
+def test_what_all_steps_cannot_ask_for_is_not_asked_of_them(asked, short, candidate):
+    """Cohesion may reach what it reaches in the end, and none of the idle ones so much."""
+    screen, scores = asked
+    candidates = [score.candidate for score in scores]
+    sampled = Sampled(whole=screen)
+    assert sampled.share >= 2
+    assert hopeful(sampled, candidates, scores[0].z, 2) == candidates[:1]
+    assert hopeful(sampled, candidates, 3 * scores[0].z, 2) == []
+
+
+def test_what_some_steps_do_not_tell_has_hope(asked, short, candidate):
+    """How individuals differ, and rests; a score that all may have; a recording that is short."""
+    screen, _scores = asked
+    candidates = [candidate("boldness"), candidate("freezing"), candidate("fatigue")]
+    assert hopeful(Sampled(whole=screen), candidates, 1e3, 1) == candidates[:2]
+    assert hopeful(Sampled(whole=screen), candidates, 2.0, 1) == candidates
+
+
+def test_few_steps_leave_hope_to_all(asked):
+    """There is no part of them to be asked first."""
+    screen, scores = asked
+    candidates = [score.candidate for score in scores]
+    assert Sampled(whole=screen).part is screen
+    assert hopeful(Sampled(whole=screen), candidates, 1e3, 1) == candidates

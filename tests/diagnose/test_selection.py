@@ -75,3 +75,8 @@ def test_the_family_is_as_large_however_many_are_asked(shapes):
     (among,) = (each for each in best_of(family, scores) if each.score is scores[2])
     assert alone.p == among.p
     assert alone.p == pytest.approx(1 - (1 - 2 * norm.sf(3.5)) ** len(shapes), rel=1e-6)
+
+
+def test_where_nothing_was_asked_nothing_is_best(shapes):
+    """None beyond the list may have had any hope."""
+    assert best_of(Asked(candidates=shapes, held=(), null=theory(0)), []) == []

@@ -50,9 +50,16 @@ class Case:
 
     def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
         """Return the located residuals and the omnibus statistics of a screen."""
-        rng = np.random.default_rng([self.question.seed, 5, number])
         standing = standing_of(screen.scene, screen.fitted, screen.probability)
-        return residuals(standing), statistics(standing, rng)
+        return residuals(standing), statistics(standing, self._lots(number))
+
+    def ranks(self, number: int, screen: Screen) -> dict[str, float]:
+        """Return the omnibus statistics of a screen alone."""
+        standing = standing_of(screen.scene, screen.fitted, screen.probability)
+        return statistics(standing, self._lots(number))
+
+    def _lots(self, number: int) -> np.random.Generator:
+        return np.random.default_rng([self.question.seed, 5, number])
 
     @cached_property
     def chain(self) -> Chain:
@@ -108,7 +115,7 @@ def open_case(question: Question) -> Case:
     )
     scene = make_scene(question.samples, question.arena)
     check_length(question.samples, scene, LEAST_STEPS)
-    fitted = maximise(scene, model, free=free_of_model(model))
+    fitted = maximise(scene, model, free=free_of_model(model), n_workers=question.n_workers)
     effects, lacks = askable(scene, model)
     own = tuple(model.effects)
     return Case(

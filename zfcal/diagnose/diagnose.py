@@ -29,6 +29,7 @@ from zfcal.diagnose.findings import (
     Screened,
     Verdict,
 )
+from zfcal.diagnose.heats import Sampled, hopeful
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.null import (
@@ -43,7 +44,6 @@ from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import (
     LEVEL,
-    RIVAL_Z,
     RIVALS,
     Asked,
     Best,
@@ -129,7 +129,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
             held=asked,
             null=_null([row.listed for row in rows], len(asked)),
         ),
-        rivals=lambda screen, known: _rivals(case, screen, known),
+        rivals=lambda sampled, known, z: _rivals(case, sampled, known, z),
         suspicious=is_suspicious(question, omnibus),
         n_workers=question.n_workers,
         told=tell,
@@ -144,7 +144,7 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
     steps, nulls = selection.steps, [row.at_large[1] for row in rows if row.at_large]
 
     def after(step: Step) -> Omnibus:
-        return judge(case.at_large(0, step.choice.best.screen)[1], nulls)
+        return judge(case.ranks(0, step.choice.best.screen), nulls)
 
     (confirmed, halves), last = together(
         lambda: confirm(case.screen, steps, n_workers=case.question.n_workers),
@@ -217,12 +217,13 @@ def _null(rows: Sequence[Floats], n_statistics: int) -> Null:
     return from_replicates(np.array(rows)) if len(rows) > 2 else theory(n_statistics)
 
 
-def _rivals(case: Case, screen: Screen, known: set[str]) -> list[Best]:
+def _rivals(case: Case, sampled: Sampled, known: set[str], least_z: float) -> list[Best]:
     """Return what beyond the list a model is asked for, held against a few replicates."""
     question, generic = case.question, not_forms_of(case.generic, known)
     alone = Asked(candidates=generic, held=(), null=theory(0))
-    found = best_of(alone, ask_all(screen, generic, question.n_workers))
-    found = [best for best in found if abs(best.z) > RIVAL_Z][: 2 * RIVALS]
+    clear = hopeful(sampled, generic, least_z, question.n_workers)
+    found = best_of(alone, ask_all(sampled.whole, clear, question.n_workers))
+    found = [best for best in found if abs(best.z) > least_z][: 2 * RIVALS]
     if not found or (question.quick and not has_noise(question)):
         return found
     asked = tuple(best.score.candidate for best in found)

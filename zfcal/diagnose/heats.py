@@ -11,12 +11,17 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.heldout import evaluate
 from zfcal.diagnose.naming import HEAT_TURNS, Refit, refit, some_of
 from zfcal.diagnose.scores import Score
-from zfcal.diagnose.screening import Screen
-from zfcal.model.scene import Moves, Scene, thin
+from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.model.scene import thin
 
 _BEATEN = 5.0
 """Standard errors behind the best: that far no further steps bring it back."""
@@ -26,6 +31,41 @@ _BEHIND = 1.0
 
 _SHORT = 1.5
 """Standard errors by which a suspect falls short of what it must gain."""
+
+
+_HOPE = 2.0
+"""Standard errors by which some of the steps may say less than they should."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sampled:
+    """A model, and the same on as many of its steps as a first answer is taken from.
+
+    Parameters
+    ----------
+    whole
+        With all steps.
+    """
+
+    whole: Screen
+
+    @property
+    def share(self) -> int:
+        """Of so many steps one is in the part; 1 where there are too few to leave any out."""
+        return max(1, len(self.whole.scene.turns) // HEAT_TURNS)
+
+    @cached_property
+    def rows(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which turns and moves are in the part, shape (turn,) and (move,)."""
+        scene = self.whole.scene
+        return some_of(scene, scene.turns, self.share), some_of(scene, scene.moves, self.share)
+
+    @cached_property
+    def part(self) -> Screen:
+        """With every so-many-th block, nothing fitted anew."""
+        if self.share == 1:
+            return self.whole
+        return evaluate(self.whole, thin(self.whole.scene, *self.rows))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,28 +95,52 @@ class Heat:
         return self.share * (self.first.nats + _SHORT * error) > nats
 
 
-def run_heats(screen: Screen, scores: Sequence[Score], n_workers: int) -> list[Heat]:
+def hopeful(
+    sampled: Sampled, candidates: Sequence[Candidate], z: float, n_workers: int
+) -> list[Candidate]:
+    """Return the candidates that all steps together may ask for so clearly.
+
+    Parameters
+    ----------
+    sampled
+        The model so far.
+    candidates
+        How individuals differ, and rests, show in all steps alone: they stay.
+    z
+        Standard errors that are wanted with all steps.
+    n_workers
+        Threads; the answer does not depend on them.
+    """
+    least = z / math.sqrt(sampled.share) - _HOPE
+    if sampled.share == 1 or least <= 0:
+        return list(candidates)
+    open_ = [each for each in candidates if not (each.effect.individual or each.effect.stops)]
+    scores = ask_all(sampled.part, open_, n_workers)
+    clear = {id(s.candidate) for s in scores if (abs(s.z) if s.candidate.signed else s.z) > least}
+    shut = {id(each) for each in open_} - clear
+    return [each for each in candidates if id(each) not in shut]
+
+
+def run_heats(sampled: Sampled, scores: Sequence[Score], n_workers: int) -> list[Heat]:
     """Return suspects, each fitted to some of the steps.
 
     Parameters
     ----------
-    screen
+    sampled
         The model so far.
     scores
         Of the suspects in it, each at the shape that is asked for most.
     n_workers
         Threads; the numbers do not depend on them.
     """
-    share = len(screen.scene.turns) // HEAT_TURNS
-    if not scores or share < 2:
+    if sampled.share == 1 or not scores:
         return [Heat(score=score, first=None) for score in scores]
-    turns, moves = (some_of(screen.scene, steps, share) for steps in _both(screen.scene))
-    small = evaluate(screen, thin(screen.scene, turns, moves))
+    part, rows = sampled.part, sampled.rows
 
     def fitted(score: Score) -> Heat:
-        rows = moves if score.candidate.effect.on_speed else turns
-        first = refit(small, replace(score, steps=score.steps[rows]))
-        return Heat(score=score, first=first, share=share)
+        steps = score.steps[rows[score.candidate.effect.on_speed]]
+        first = refit(part, replace(score, steps=steps))
+        return Heat(score=score, first=first, share=sampled.share)
 
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         return list(pool.map(fitted, scores))
@@ -104,7 +168,3 @@ def _behind(heat: Heat, best: Refit) -> float:
     if heat.first is None or heat.first is best:
         return 0.0
     return float(best.over(heat.first))
-
-
-def _both(scene: Scene) -> tuple[Moves, Moves]:
-    return scene.turns, scene.moves

@@ -94,7 +94,7 @@ def free_of(candidate: Candidate) -> Free:
     return tuple((effect.name, name) for name in effect.names if name not in effect.fixed)
 
 
-def refit(screen: Screen, score: Score) -> Refit:
+def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers: int = 1) -> Refit:
     """Return the model with a suspect added, all parameters at their maximum likelihood.
 
     Parameters
@@ -103,6 +103,10 @@ def refit(screen: Screen, score: Score) -> Refit:
         The model so far.
     score
         Of the suspect: its shape, and a strength to start from.
+    near
+        The suspect fitted to some of the steps, if it was.
+    n_workers
+        Threads; the numbers do not depend on them.
     """
     candidate = score.candidate
     if candidate.effect.on_speed:
@@ -111,13 +115,14 @@ def refit(screen: Screen, score: Score) -> Refit:
     if candidate.effect.individual:
         scene = with_traits(scene, score)
     free = free_of(candidate)
-    start = _start(scene, screen.fitted, score)
+    start = _start(scene, screen.fitted, score) if near is None else near.values
     fitted = maximise(
         scene,
         with_effect(screen.fitted.parameters, candidate.name, start),
         free=(*screen.fitted.free, *free),
         start=screen.fitted.x,
         rounds=_ROUNDS,
+        n_workers=n_workers,
     )
     by_step = np.nan_to_num(fitted.log_p - screen.fitted.log_p)
     values = dict(fitted.parameters.effects[candidate.name])

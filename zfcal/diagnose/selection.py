@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate, is_generic
-from zfcal.diagnose.heats import Heat, ahead, run_heats, unbeaten
+from zfcal.diagnose.heats import Heat, Sampled, ahead, hopeful, run_heats, unbeaten
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
@@ -81,7 +81,7 @@ class Asked:
         # What noise does to another shape of the effect is not known: it may be nothing.
         exact = np.array([score.candidate in self.held for score in scores], dtype=bool)
         z = np.where(exact | (np.abs(z) < np.abs(raw)), z, raw)
-        one_sided = np.array([not score.candidate.signed for score in scores])
+        one_sided = np.array([not score.candidate.signed for score in scores], dtype=bool)
         return np.where(one_sided & (z < 0), 0.0, z)
 
     def family_p(self, z: Floats) -> Floats:
@@ -134,6 +134,11 @@ def best_of(asked: Asked, scores: Sequence[Score]) -> list[Best]:
 def _in_reach(ranked: Sequence[Best]) -> list[Best]:
     """Return the suspects that could turn out to be the clearest one, of a ranked list."""
     return [best for best in ranked if abs(best.z) >= _IN_REACH * abs(ranked[0].z)]
+
+
+def _least(done: Sequence[Step]) -> float:
+    """Return what a further effect must gain, in nats."""
+    return max([_LEAST_NATS, *(_LEAST_SHARE * step.choice.best.nats for step in done[:1])])
 
 
 def _least_beside(first: Refit | None, further: Refit) -> float:
@@ -193,8 +198,8 @@ class Selector:
         The family of candidates.
     rivals
         Effects beyond the list that a model is asked for, the clearest first, without other
-        forms of the effects named; they cost time, and are asked where there is something to
-        explain.
+        forms of the effects named, and without those less clear than so many standard errors;
+        they cost time, and are asked where there is something to explain.
     suspicious
         Whether something is to be explained even if no listed effect answers.
     n_workers
@@ -204,7 +209,7 @@ class Selector:
     """
 
     listed: Asked
-    rivals: Callable[[Screen, set[str]], list[Best]]
+    rivals: Callable[[Sampled, set[str], float], list[Best]]
     suspicious: bool
     n_workers: int
     told: Told = field(default=lambda _stage, _done, _all: None)
@@ -223,9 +228,10 @@ class Selector:
         ranked = best_of(self.listed, scores)
         first = tuple(ranked)
         for number in range(_MOST_EFFECTS):
+            sampled = Sampled(whole=screen)
             if number:
-                ranked = self._ranked(screen, {each.choice.best.name for each in steps})
-            step = self._step(screen, ranked, steps)
+                ranked = self._ranked(sampled, steps)
+            step = self._step(sampled, ranked, steps)
             if step is None:
                 break
             steps.append(step)
@@ -233,19 +239,22 @@ class Selector:
             self.told("adding effects", number + 1, _MOST_EFFECTS)
         return Selection(steps=tuple(steps), screened=first, final=screen)
 
-    def _ranked(self, screen: Screen, taken: set[str]) -> list[Best]:
-        """Return the listed effects that a model lacks, the clearest first."""
+    def _ranked(self, sampled: Sampled, done: Sequence[Step]) -> list[Best]:
+        """Return the listed effects that a model lacks and are worth it, the clearest first."""
+        taken = {step.choice.best.name for step in done}
         open_ = [each for each in self.listed.candidates if each.name not in taken]
-        return best_of(self.listed, ask_all(screen, open_, self.n_workers))
+        worth = math.sqrt(2 * _least(done))
+        open_ = hopeful(sampled, open_, worth, self.n_workers)
+        return best_of(self.listed, ask_all(sampled.whole, open_, self.n_workers))
 
-    def _step(self, screen: Screen, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
+    def _step(self, sampled: Sampled, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
         taken = {step.choice.best.name for step in done}
         suspects = _in_reach([best for best in ranked if best.p < LEVEL])[:_SUSPECTS]
         first = done[0].choice.best if done else None
-        least = max(_LEAST_NATS, _LEAST_SHARE * first.nats if first else 0.0)
-        heats, rivals = self._entered(screen, suspects, taken, least)
-        others = run_heats(screen, [best.score for best in rivals], self.n_workers)
-        made = self._refits(screen, [*unbeaten(heats), *ahead(others, heats)])
+        least = _least(done)
+        heats, rivals = self._entered(sampled, suspects, taken, least)
+        others = run_heats(sampled, [best.score for best in rivals], self.n_workers)
+        made = self._refits(sampled.whole, [*unbeaten(heats), *ahead(others, heats)])
         worth = [each for each in made if each.nats > max(least, _least_beside(first, each))]
         listed = [each for each in worth if not is_generic(each.name)]
         generic = [each for each in worth if is_generic(each.name)]
@@ -253,33 +262,39 @@ class Selector:
             return None
         choice = self._choose(listed, generic)
         by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
-        return Step(choice=choice, best=by_name[choice.best.name], before=screen)
+        return Step(choice=choice, best=by_name[choice.best.name], before=sampled.whole)
 
     def _entered(
-        self, screen: Screen, suspects: Sequence[Best], taken: set[str], least: float
+        self, sampled: Sampled, suspects: Sequence[Best], taken: set[str], least: float
     ) -> tuple[list[Heat], list[Best]]:
         """Return the heats of suspects, and the effects beyond the list that are worth one."""
         scores = [best.score for best in suspects]
         known = {*taken, *(score.candidate.name for score in scores)}
         if taken:
-            ran = run_heats(screen, scores, self.n_workers)
+            ran = run_heats(sampled, scores, self.n_workers)
             heats = [heat for heat in ran if heat.gains(least)]
-            return heats, self._rivals(screen, known) if heats else []
+            return heats, self._rivals(sampled, known, suspects) if heats else []
         worth = bool(suspects) or self.suspicious
         return together(
-            lambda: run_heats(screen, scores, self.n_workers),
-            lambda: self._rivals(screen, known) if worth else [],
+            lambda: run_heats(sampled, scores, self.n_workers),
+            lambda: self._rivals(sampled, known, suspects) if worth else [],
             n_workers=self.n_workers,
         )
 
-    def _rivals(self, screen: Screen, known: set[str]) -> list[Best]:
+    def _rivals(self, sampled: Sampled, known: set[str], suspects: Sequence[Best]) -> list[Best]:
         """Return the clearest effects beyond the list that are no other form of known ones."""
-        found = self.rivals(screen, known)
-        return _in_reach([best for best in found if abs(best.z) > RIVAL_Z])[:RIVALS]
+        least = max([RIVAL_Z, *(_IN_REACH * abs(best.z) for best in suspects)])
+        found = self.rivals(sampled, known, least)
+        return _in_reach([best for best in found if abs(best.z) > least])[:RIVALS]
 
     def _refits(self, screen: Screen, heats: Sequence[Heat]) -> list[Refit]:
-        with ThreadPoolExecutor(max(1, self.n_workers)) as pool:
-            return list(pool.map(lambda heat: refit(screen, heat.score), heats))
+        n_workers = max(1, self.n_workers)
+
+        def made(heat: Heat) -> Refit:
+            return refit(screen, heat.score, heat.first, n_workers=n_workers)
+
+        with ThreadPoolExecutor(n_workers) as pool:
+            return list(pool.map(made, heats))
 
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
         if not listed:
