@@ -6,6 +6,7 @@ import pytest
 from zfcal.diagnose import heats, naming
 from zfcal.diagnose.heats import Sampled, ahead, hopeful, run_heats, unbeaten
 from zfcal.diagnose.naming import refit
+from zfcal.diagnose.selection import least_z
 
 SUSPECTS = ("group-cohesion", "leader-following", "wall-persistence", "burst-and-coast")
 
@@ -123,3 +124,12 @@ def test_few_steps_leave_hope_to_all(asked):
     candidates = [score.candidate for score in scores]
     assert Sampled(whole=screen).part is screen
     assert hopeful(Sampled(whole=screen), candidates, 1e3, 1) == candidates
+
+
+def test_a_strong_effect_gains_more_than_its_score_promises(screen, candidate):
+    """Half the square of the score is less than the gain; what is asked for allows for that."""
+    fast = screen(33, {"burst-and-coast": {"exponent": 0.9}}, minutes=8.0)
+    score = fast.ask(candidate("burst-and-coast"))
+    nats = refit(fast, score).nats
+    assert score.z < np.sqrt(2 * nats)
+    assert score.z > least_z(nats)

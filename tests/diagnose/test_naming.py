@@ -25,7 +25,7 @@ N = 400
 def suspect(candidate):
     """Return what makes a suspect up: a mean gain per sample, and its own scatter."""
 
-    def of(name, mean, *, scatter=0.0, seed=1):
+    def of(name, mean, *, scatter=0.0, seed=1, n_free=1):
         own = np.random.default_rng(seed).normal(0, scatter, N) if scatter else np.zeros(N)
         return Refit(
             candidate=candidate(name),
@@ -33,7 +33,7 @@ def suspect(candidate):
             values={},
             interval={},
             gain=mean + own - own.mean(),
-            n_free=1,
+            n_free=n_free,
         )
 
     return of
@@ -63,6 +63,17 @@ def test_how_far_one_is_ahead_by_hand(suspect, candidate):
     assert one.over(one) == 0.0
 
 
+def test_a_parameter_more_must_be_worth_it(suspect):
+    """Three more at half the log of 400 samples are 9 nats: behind with 8 more, ahead with 10."""
+    few = suspect("directional-drift", 0.25, scatter=0.5, seed=2, n_free=1)
+    more, most = (suspect("place-preference", mean, n_free=4) for mean in (0.27, 0.275))
+    assert few.worth == pytest.approx(100 - 0.5 * math.log(400))
+    assert more.nats > few.nats
+    assert more.over(few) < 0 < most.over(few)
+    assert choose([more, few], stands()).best is few
+    assert choose([most, few], stands()).best is most
+
+
 def test_a_clear_winner_is_named(suspect):
     """100 nats ahead at a standard error of 10: what stands beside it does not matter."""
     best = suspect("alignment", 0.5, scatter=0.5)
@@ -78,6 +89,15 @@ def test_a_shadow_is_no_tie(suspect):
     best = suspect("alignment", 0.26, scatter=0.5)
     shadow = suspect("group-cohesion", 0.25)
     assert choose([best, shadow], stands("alignment")).ties == ()
+
+
+def test_whoever_is_much_richer_has_no_shadows(suspect):
+    """A place says what a drift says, and more; so a drift that gains as much is a tie."""
+    place = suspect("place-preference", 0.3, n_free=4)
+    drift = suspect("directional-drift", 0.26, scatter=0.5, n_free=2)
+    bias = suspect("turning-bias", 0.26, scatter=0.5, n_free=3)
+    assert choose([place, drift], stands("place-preference")).ties == (drift,)
+    assert choose([place, bias], stands("place-preference")).ties == ()
 
 
 @pytest.mark.parametrize(

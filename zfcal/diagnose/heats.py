@@ -151,7 +151,7 @@ def unbeaten(heats: Sequence[Heat]) -> list[Heat]:
     made = [heat.first for heat in heats if heat.first is not None]
     if not made:
         return list(heats)
-    best = max(made, key=lambda each: each.nats)
+    best = max(made, key=lambda each: each.worth)
     return [heat for heat in heats if _behind(heat, best) < _BEATEN]
 
 
@@ -160,7 +160,7 @@ def ahead(heats: Sequence[Heat], of: Sequence[Heat]) -> list[Heat]:
     made = [heat.first for heat in of if heat.first is not None]
     if not made:
         return list(heats)
-    best = max(made, key=lambda each: each.nats)
+    best = max(made, key=lambda each: each.worth)
     return [heat for heat in heats if _behind(heat, best) < _BEHIND]
 
 

@@ -39,6 +39,9 @@ _BLOCK_S = 10.0
 _SURE = 2.0
 """Standard errors by which one suspect must beat another."""
 
+_RICHER = 2
+"""Parameters more: a place with a reach of its own bends to a drift of any form."""
+
 _OWN_SHARE = 0.5
 """Of what a suspect gains alone, it gains so much beside another if both are there."""
 
@@ -80,11 +83,20 @@ class Refit:
         """Log likelihood gained, less what as many idle parameters would gain."""
         return float(self.gain.sum()) - self.n_free
 
+    @property
+    def worth(self) -> float:
+        """Log likelihood gained, less half the log of the samples for each parameter.
+
+        By this suspects are told apart (Schwarz 1978, Annals of Statistics 6: 461-464): where the
+        true form is another one than both, the one with more parameters comes nearer to it.
+        """
+        return float(self.gain.sum() - 0.5 * self.n_free * np.log(len(self.gain)))
+
     def over(self, other: Refit) -> float:
-        """Return by how many standard errors it gains more than another (Vuong 1989)."""
+        """Return by how many standard errors it is worth more than another (Vuong 1989)."""
         by = self.gain - other.gain
         spread = float(by.std()) * np.sqrt(len(by))
-        ahead = self.nats - other.nats
+        ahead = self.worth - other.worth
         return ahead / spread if spread > 1e-9 else 0.0
 
 
@@ -221,11 +233,11 @@ class Choice:
     Parameters
     ----------
     best
-        The one that gains most.
+        The one that is worth most.
     ties
         The others.
     considered
-        All that were refitted, the largest gain first.
+        All that were refitted, the worthiest first.
     """
 
     best: Refit
@@ -243,14 +255,16 @@ def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]
     standing
         Tells whether a suspect still has something to say beside another.
     """
-    order = sorted(refits, key=lambda each: -each.nats)
+    order = sorted(refits, key=lambda each: -each.worth)
     best, ties = order[0], []
     for other in order[1:]:
         if best.over(other) > _SURE:
             continue
         # It gains as much. If it falls beside the best one, which stands beside it, then
         # it is a shadow; if both fall they say the same, and if both stand neither does all.
-        if standing(best.candidate, other) and not standing(other.candidate, best):
+        # One that is so much richer follows whatever form the other has: its standing says nothing.
+        richer = best.n_free - other.n_free >= _RICHER
+        if not richer and standing(best.candidate, other) and not standing(other.candidate, best):
             continue
         ties.append(other)
     return Choice(best=best, ties=tuple(ties), considered=tuple(order))

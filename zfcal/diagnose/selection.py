@@ -136,6 +136,14 @@ def _in_reach(ranked: Sequence[Best]) -> list[Best]:
     return [best for best in ranked if abs(best.z) >= _IN_REACH * abs(ranked[0].z)]
 
 
+def least_z(nats: float) -> float:
+    """Return the standard errors that an effect has at least which gains so many nats.
+
+    A strong effect gains more than half the square of its score, as a rule not four times it.
+    """
+    return _IN_REACH * math.sqrt(2 * nats)
+
+
 def _least(done: Sequence[Step]) -> float:
     """Return what a further effect must gain, in nats."""
     return max([_LEAST_NATS, *(_LEAST_SHARE * step.choice.best.nats for step in done[:1])])
@@ -243,8 +251,7 @@ class Selector:
         """Return the listed effects that a model lacks and are worth it, the clearest first."""
         taken = {step.choice.best.name for step in done}
         open_ = [each for each in self.listed.candidates if each.name not in taken]
-        worth = math.sqrt(2 * _least(done))
-        open_ = hopeful(sampled, open_, worth, self.n_workers)
+        open_ = hopeful(sampled, open_, least_z(_least(done)), self.n_workers)
         return best_of(self.listed, ask_all(sampled.whole, open_, self.n_workers))
 
     def _step(self, sampled: Sampled, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
@@ -298,9 +305,9 @@ class Selector:
 
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
         if not listed:
-            return Choice(best=max(generic, key=lambda each: each.nats), ties=(), considered=())
+            return Choice(best=max(generic, key=lambda each: each.worth), ties=(), considered=())
         choice = choose(listed, self._stands)
-        for rival in sorted(generic, key=lambda each: -each.nats):
+        for rival in sorted(generic, key=lambda each: -each.worth):
             ahead = rival.over(choice.best) > _RIVAL_AHEAD
             if ahead and rival.nats > _RIVAL_TIMES * choice.best.nats:
                 return Choice(best=rival, ties=(), considered=choice.considered)
