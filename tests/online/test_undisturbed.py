@@ -13,25 +13,28 @@ def niceness_of(thread=0):
     return os.getpriority(os.PRIO_PROCESS, thread)
 
 
-def test_threads_that_are_begun_meanwhile_go_ahead_too(need_priority):
-    """Such as those that read the cameras; one that has ended is not asked for."""
-    need_priority(-5)
-    before, seen = niceness_of(), []
+def test_threads_that_are_begun_meanwhile_go_ahead_too(granted):
+    """Such as those that read the cameras; one that has ended is not asked for.
+
+    Who lacks the right is told, and all stay as they were.
+    """
+    before, seen, wanted = niceness_of(), [], granted(-5)
     with ahead_of_others(-5) as problem:
         reader = threading.Thread(target=lambda: seen.append(niceness_of()))
         reader.start()
         reader.join()
-        assert (problem, niceness_of(), seen) == (None, -5, [-5])
+        assert (problem is None) == (wanted == -5)
+        assert (niceness_of(), seen) == (wanted, [wanted])
     assert niceness_of() == before
 
 
-def test_a_failure_takes_the_priority_back(need_priority):
+def test_a_failure_takes_the_priority_back(granted):
     """Whoever handles it goes on as before."""
-    need_priority(-5)
-    before = niceness_of()
+    before, meanwhile = niceness_of(), []
     with contextlib.suppress(ValueError), ahead_of_others(-5):
+        meanwhile.append(niceness_of())
         raise ValueError
-    assert niceness_of() == before
+    assert (meanwhile, niceness_of()) == ([granted(-5)], before)
 
 
 def test_who_may_not_go_ahead_goes_on(monkeypatch):
