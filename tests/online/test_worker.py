@@ -13,8 +13,7 @@ from zfcal.online.worker import Done, Failure, Worker
 
 JOB = """
 import logging, os, time
-from zfcal.errors import InputError, LockedError
-from zfcal.errors import ZfcalError
+from zfcal.errors import DamagedError, InputError, LockedError
 from zfcal.online.events import Note
 
 def job(order, tell):
@@ -22,6 +21,8 @@ def job(order, tell):
         raise InputError("It is wrong.", hint="Mend it.")
     if order == "locked":
         raise LockedError("It is locked.")
+    if order == "damaged":
+        raise DamagedError("It is damaged.")
     if order == "log":
         logging.getLogger("zfcal.model").info("It compiles.")
     if order == "sleep":
@@ -108,11 +109,16 @@ def test_an_answer_can_be_waited_for(worker):
 
 
 def test_errors_are_raised_for_who_waits(worker):
-    """With their hint; so is a death. The process that lives carries on."""
+    """With hint and exit code; so is a death. The process that lives carries on."""
     worker.order("error")
     with pytest.raises(ZfcalError, match="It is wrong") as caught:
         worker.answer(print)
     assert caught.value.hint == "Mend it."
+    for order, code in (("locked", 75), ("damaged", 3)):
+        worker.order(order)
+        with pytest.raises(ZfcalError) as caught:
+            worker.answer(print)
+        assert caught.value.exit_code == code
     worker.order("still there")
     assert worker.answer(print) == "still there"
     worker.order("sleep")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.lock import lock
-from zfcal.errors import InputError, LockedError, ZfcalError
+from zfcal.errors import InputError, ZfcalError
 from zfcal.online import events as of
 from zfcal.online.arrivals import FOLDERS, Arrivals, Arrived, Signature, segment_ends
 from zfcal.online.hints import Hints, reason_to_poll
@@ -345,8 +345,7 @@ class Watch:
         elif self._options.once or (
             stage.name == TRACK and stage.status.last_s is None and failure.exit_code == 1
         ):
-            error = LockedError if failure.exit_code == LockedError.exit_code else ZfcalError
-            raise error(failure.message, hint=failure.hint)
+            raise failure.error
         wait_s = _RETRY_S[min(stage.failures, len(_RETRY_S) - 1)]
         stage.failures += 1
         stage.retry_s = self._clock() + wait_s

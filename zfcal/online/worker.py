@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, NoReturn, TypeAlias, final
 
-from zfcal.errors import ZfcalError
+from zfcal.errors import DamagedError, LockedError, ZfcalError
 from zfcal.online.events import Event, Note, Tell
 
 Job: TypeAlias = Callable[[Any, Tell], Any]
@@ -57,6 +57,14 @@ class Failure:
     message: str
     hint: str = ""
     exit_code: int | None = None
+
+    @property
+    def error(self) -> ZfcalError:
+        """What was raised in the process, or its death, to be raised in this one."""
+        kinds: dict[int | None, type[ZfcalError]] = {
+            kind.exit_code: kind for kind in (DamagedError, LockedError)
+        }
+        return kinds.get(self.exit_code, ZfcalError)(self.message, hint=self.hint)
 
 
 @final
@@ -134,7 +142,7 @@ class Worker:
             connection.wait([self.pipe])
             for each in self.take():
                 if isinstance(each, Failure):
-                    raise ZfcalError(each.message, hint=each.hint)
+                    raise each.error
                 if isinstance(each, Done):
                     result = each.result
                 else:
