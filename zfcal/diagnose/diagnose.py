@@ -184,7 +184,7 @@ def _best_shapes(scores: Sequence[Score]) -> list[tuple[float, Candidate]]:
     """Return each effect at the shape that the recording asks for most, after its z."""
     best: dict[str, tuple[float, Candidate]] = {}
     for score in scores:
-        z = abs(score.z) if score.candidate.signed else score.z
+        z = score.clearness
         if score.candidate.name not in best or z > best[score.candidate.name][0]:
             best[score.candidate.name] = (z, score.candidate)
     return list(best.values())

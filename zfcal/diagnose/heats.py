@@ -32,7 +32,6 @@ _BEHIND = 1.0
 _SHORT = 1.5
 """Standard errors by which a suspect falls short of what it must gain."""
 
-
 _HOPE = 2.0
 """Standard errors by which some of the steps may say less than they should."""
 
@@ -114,11 +113,10 @@ def hopeful(
     least = z / math.sqrt(sampled.share) - _HOPE
     if sampled.share == 1 or least <= 0:
         return list(candidates)
-    open_ = [each for each in candidates if not (each.effect.individual or each.effect.stops)]
-    scores = ask_all(sampled.part, open_, n_workers)
-    clear = {id(s.candidate) for s in scores if (abs(s.z) if s.candidate.signed else s.z) > least}
-    shut = {id(each) for each in open_} - clear
-    return [each for each in candidates if id(each) not in shut]
+    told = [each for each in candidates if not (each.effect.individual or each.effect.stops)]
+    scores = ask_all(sampled.part, told, n_workers)
+    hopeless = {id(score.candidate) for score in scores if score.clearness <= least}
+    return [each for each in candidates if id(each) not in hopeless]
 
 
 def run_heats(sampled: Sampled, scores: Sequence[Score], n_workers: int) -> list[Heat]:

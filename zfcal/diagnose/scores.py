@@ -52,6 +52,11 @@ class Score:
     information: float
     steps: Floats
 
+    @property
+    def clearness(self) -> float:
+        """The size of z; where the effect has one sign only, z itself."""
+        return abs(self.z) if self.candidate.signed else self.z
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tables:
