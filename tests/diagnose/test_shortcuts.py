@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.model.effects import all_effects
+from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import with_effect
 from zfcal.model.geometry import zone_of
@@ -15,7 +15,7 @@ from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
 from zfcal.model.simulate import tank_of
-from zfcal.model.views import factors_of, polynomial_of, smooth_factors_of, view_of
+from zfcal.model.views import factors_of, harmonics, polynomial_of, smooth_factors_of, view_of
 
 SMOOTH = [e for e in (*all_effects(), *generic_effects()) if e.harmonics is not None]
 
@@ -29,12 +29,12 @@ def few(screen):
     return own, thin(own.scene, rows, np.zeros(len(own.scene.moves), dtype=bool))
 
 
-def packed_with(own, effect, arena):
+def packed_with(own, effect, arena, **given):
     """Return an effect as a model has it, each of its parameters well away from zero."""
     middling = {p.name: p.default or min(0.7, p.high) for p in effect.parameters}
     here = own.scene.states[own.scene.turns.at[0], :, own.scene.turns.who[0]]
     place = {"x_m": here[X] + 0.05, "y_m": here[Y]}
-    middling |= {name: at for name, at in place.items() if name in middling}
+    middling |= {name: at for name, at in place.items() if name in middling} | given
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return pack([model], arena)
 
@@ -51,6 +51,20 @@ def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, few, tank
     lands = scene.turns.share.any(axis=2)
     np.testing.assert_allclose(few_points[lands], whole[lands], rtol=1e-5)
     np.testing.assert_allclose(at_taken_again, at_taken, rtol=1e-9)
+
+
+def test_a_factor_of_the_landing_zone_is_given_for_each(few, tank):
+    """Steps out of a room and within it differ, for all headings alike: by 1.4 in their logs."""
+    own, scene = few
+    effect = find_effect("boldness")
+    packed = packed_with(own, effect, tank, heading_share=0.0)
+    angle_sr = view_of(scene, own.fitted.parameters).angle_sr
+    form = polynomial_of([effect])
+    waves, zones, log_taken = harmonics(scene, packed, angle_sr, form)
+    _, at_taken = factors_of(scene, packed, angle_sr)
+    np.testing.assert_allclose(waves[:, 1:], 0.0, atol=1e-12)
+    assert np.ptp(zones, axis=1).max() == pytest.approx(2 * 0.7)
+    np.testing.assert_allclose(np.exp(log_taken), at_taken, rtol=1e-9)
 
 
 def test_the_factors_differ_between_headings(few, tank):
