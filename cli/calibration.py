@@ -60,6 +60,13 @@ def round_options(*, generations: str = "", budget: str = "") -> Callable[[Comma
             help="Let the maximum-likelihood estimate join the first population.",
         ),
         click.option(
+            "--champion",
+            type=click.Choice(["score", "likely"]),
+            default="score",
+            show_default=True,
+            help="Who is handed on: the best by its score, or the estimate if its score allows.",
+        ),
+        click.option(
             "--baselines", is_flag=True, help="Score random search and the last model too."
         ),
         seed_option("Seed of the random numbers.  [default: the trial's]"),
@@ -91,6 +98,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         runs=options["runs"],
         steps=options["steps"],
         optimiser=options["optimiser"],
+        champion=options["champion"],
     )
     chosen = CalibrateOptions(
         settings=settings,
@@ -110,6 +118,10 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
 def _check_together(options: Mapping[str, Any]) -> None:
     if options["generations"] is not None and options["budget_s"] is not None:
         raise click.UsageError("A round ends after --generations or with its --budget: give one.")
+    if options["champion"] == "likely" and not options["seed_likelihood"]:
+        raise click.UsageError(
+            "--champion likely is the estimate, which --no-seed-likelihood omits."
+        )
     if options["window"] is None:
         for name in ("held_out", "output"):
             if options[name] is not None:

@@ -11,7 +11,7 @@ from .durations import seconds
 from .options import Command
 
 _PRESENT = (
-    "real_time", "no_video", "duration_s", "generations", "budget_s", "robot", "seed",
+    "real_time", "no_video", "duration_s", "generations", "champion", "budget_s", "robot", "seed",
     "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
 )  # fmt: skip
 
@@ -63,6 +63,11 @@ _OPTIONS = (
         "--duration", "duration_s", type=seconds, metavar="TIME", help="How long.  [default: 10min]"
     ),
     click.option("--generations", type=click.IntRange(min=0), help="Of a round.  [default: 30]"),
+    click.option(
+        "--champion",
+        type=click.Choice(["score", "likely"]),
+        help="Which model of a round drives the robot.  [default: likely]",
+    ),
     click.option(
         "--swims",
         "robot",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,10 +58,9 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
 
 
 def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -> Path:
-    from zfcal.calibrate.task import Settings
     from zfcal.online.closed_loop import closed_loop
     from zfcal.online.virtual_fish import FishOptions
-    from zfcal.online.virtual_trial import LoopOptions
+    from zfcal.online.virtual_trial import LOOP_SETTINGS, LoopOptions
     from zfcal.units import M_PER_MM
 
     given = {name: value for name, value in asked.items() if value is not None}
@@ -78,7 +78,10 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
         **loop,
         video=not asked["no_video"],
         fish=FishOptions(**fish),
-        settings=Settings(generations=given.get("generations", 30)),
+        settings=dataclasses.replace(
+            LOOP_SETTINGS,
+            **{name: given[name] for name in ("generations", "champion") if name in given},
+        ),
     )
     if asked["real_time"]:
         from zfcal.online.live_loop import live_loop

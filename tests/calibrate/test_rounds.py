@@ -47,6 +47,36 @@ def test_nobody_good_is_lost_on_the_way(task, small, truth):
     assert (conclude(task, small, wider).genes == truth).all()
 
 
+def test_the_likely_one_is_handed_on_where_its_score_allows(task, small, truth):
+    """The true model, though ten others of the search score better on the window by luck."""
+    guided = replace(task, guests=truth[None])
+    likely = calibrate_window(guided, replace(small, champion="likely"))
+    by_score = calibrate_window(guided, small)
+    assert (likely.genes == truth).all()
+    assert likely.is_likely
+    assert likely.intervals.within_ceiling
+    assert task.confirmation(small).scores(truth[None]).S[0] == likely.scores.S
+    assert not by_score.is_likely
+    assert by_score.scores.S >= likely.scores.S
+
+
+def test_an_estimate_that_scores_less_than_its_own_windows_is_none(task, small, truth):
+    """A wrong one is no champion: the best by its score is, as without it."""
+    guided = replace(task, guests=1.0 - truth[None])
+    asked = calibrate_window(guided, replace(small, champion="likely"))
+    by_score = calibrate_window(guided, small)
+    assert not asked.is_likely
+    assert (asked.genes == by_score.genes).all()
+    assert asked.ceiling == by_score.ceiling
+
+
+def test_without_an_estimate_the_score_decides(task, small, result):
+    """Where there are no tracks, say."""
+    asked = calibrate_window(task, replace(small, champion="likely"))
+    assert (asked.genes == result.genes).all()
+    assert not asked.is_likely
+
+
 @dataclass(frozen=True)
 class Noting:
     """A group that notes the seeds of each simulation by its number of steps."""

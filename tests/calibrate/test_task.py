@@ -23,6 +23,7 @@ from zfcal.errors import InputError
         ({"long_s": math.nan}, "long_s must be a positive time in seconds, got nan"),
         ({"window_s": 0.0}, "window_s must be a positive time in seconds, got 0.0"),
         ({"optimiser": "cma"}, "optimiser must be 'zfcal' or 'deap', got 'cma'"),
+        ({"champion": "best"}, "champion must be 'score' or 'likely', got 'best'"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(change, message):
@@ -78,3 +79,18 @@ def test_work_by_hand(task):
     assert task.work(n_genomes=60, n_runs=1, n_steps=3000) == 30 * 3300
     assert task.work(n_genomes=61, n_runs=1, n_steps=3000) == 31 * 3300
     assert task.closing_work(Settings()) == 50 * 9300 + 100 * 900
+
+
+def test_an_estimate_that_may_be_the_champion_is_work_at_the_end(task, truth):
+    """10 / 2 shifts more of its long runs, and 200 / 2 of its windows; without one, none."""
+    likely, plain = Settings(champion="likely"), Settings()
+    guided = replace(task, guests=truth[None])
+    assert guided.closing_work(likely) == task.closing_work(plain) + 5 * 9300 + 100 * 900
+    assert task.closing_work(likely) == guided.closing_work(plain) == task.closing_work(plain)
+
+
+def test_lineages_of_before_stay_what_they_were():
+    """A champion by its score goes without saying; another one is said."""
+    assert "champion" not in Settings().said
+    assert Settings(champion="likely").said["champion"] == "likely"
+    assert Settings(runs=3).said["runs"] == 3

@@ -8,11 +8,13 @@ import pytest
 def test_a_closed_loop_ends_with_a_report(zfcal, tmp_path):
     """Its options reach the fish; the page and all figures are told as paths."""
     words = ("--closed-loop", "--no-video", "--duration", "5s", "--swims", "fixed", "--seed", 7)
+    words += ("--champion", "score")
     done = zfcal("demo", tmp_path / "loop", *words, "--noise-mm", 0.2, "--wariness", 0, "-q")
     assert done.code == 0, done.err
     said = json.loads((tmp_path / "loop" / "trial" / "closed-loop.json").read_text())
     assert said["seed"] == 7
     assert said["options"]["robot"] == "fixed"
+    assert said["options"]["champion"] == "score"
     assert said["options"]["fish_noise_m"] == pytest.approx(0.0002)
     assert said["options"]["fish_wariness"] == 0
     assert str(tmp_path / "loop" / "trial" / "report" / "index.html") in done.lines

@@ -169,6 +169,8 @@ def test_what_fails_is_said_and_tried_again(watching, live):
         (["--stages", "calibrate", "--control", "."], "--control belongs to analyse"),
         (["--stages", "calibrate", "--overhead", "0"], "--overhead belongs to track"),
         (["--budget", "20s", "--generations", "3"], "give one"),
+        (["--champion", "likely", "--no-seed-likelihood"], "--champion likely is the estimate"),
+        (["--stages", "analyse", "--champion", "likely"], "--champion belongs to calibrate"),
         (["--once", "--until-idle", "3s"], "give one"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.lineage import read_lineage
-from zfcal.artifacts.models import read_model_for, read_result
+from zfcal.artifacts.models import read_model, read_model_for, read_result
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.model.simulate import simulate_tracks
 from zfcal.online.analyse import AnalyseOptions, analyse
@@ -98,6 +98,31 @@ def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full)
     inputs = read_lineage(model).inputs
     assert {"tracks/000060.parquet", "tracks/000120.parquet"} <= set(inputs)
     assert "tracks/000000.parquet" not in inputs
+
+
+def test_the_estimate_itself_is_handed_on_where_that_is_asked_for(make_trial, in_full):
+    """The model file has its parameters, says so, and is made anew for it."""
+    root = make_trial()
+    swim(root)
+    analyse(root, AnalyseOptions(), say_nothing)
+    settings = replace(in_full.settings, champion="likely", n_windows=40)
+    likely = replace(in_full, settings=settings)
+
+    calibrate(root, likely, say_nothing)
+
+    model = root / "models" / "000180.toml"
+    result = read_result(model)
+    assert result["champion"] == "likely"
+    told = result["likelihood"]["parameters"]
+    for zone in read_model(model).zones:
+        assert zone.kappa_0 == pytest.approx(told[f"{zone.name}.kappa_0"]["value"])
+        assert zone.alpha == pytest.approx(told[f"{zone.name}.alpha"]["value"])
+    assert read_lineage(model).options["champion"] == "likely"
+
+    calibrate(root, replace(in_full, settings=replace(settings, champion="score")), say_nothing)
+
+    assert read_result(model)["champion"] == "score"
+    assert "champion" not in read_lineage(model).options
 
 
 def test_the_papers_way_reads_no_tracks(make_trial, quick):

@@ -18,7 +18,7 @@ from zfcal.calibrate.ceiling import measure_ceiling, window_noise
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import State
 from zfcal.calibrate.history import Generation
-from zfcal.calibrate.intervals import Intervals, parameter_intervals
+from zfcal.calibrate.intervals import Intervals, acceptance_threshold, parameter_intervals
 from zfcal.calibrate.objective import Purpose, express
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.search import Progress, Watch, search
@@ -38,6 +38,8 @@ class RoundResult:
         The model that is handed on, its gamma rows scaled to a maximum of one.
     genes : ndarray, shape (gene,)
         The same as a genome, gamma as it was bred.
+    is_likely
+        Whether it is the maximum-likelihood estimate, and not the best of the search.
     scores
         Its similarities with the window, by long simulations with new seeds.
     optimiser_score
@@ -58,6 +60,7 @@ class RoundResult:
 
     champion: Parameters
     genes: Floats
+    is_likely: bool
     scores: Scores
     optimiser_score: float
     ceiling: Ceiling
@@ -136,10 +139,12 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
 
     The ten best of all that the search evaluated are simulated anew; the best by
     that simulation is the champion, and its S there is the one that is reported.
+    Where the likelier one is asked for, the estimate is the champion if the window scores
+    no less against it than its own windows do: 120 s of fish then cannot tell it from the
+    truth, while the best of many scores fits what happened by chance.
     """
-    best = best_distinct(progress.genes, progress.scores, settings.n_confirmed)
-    confirmed = confirm(task.confirmation(settings), best)
-    ceiling = ceiling_of(task, settings, confirmed)
+    likely = _likely(task, settings)
+    confirmed, ceiling = likely or _best(task, settings, progress)
     intervals = parameter_intervals(
         confirmed.genes,
         (progress.genes, progress.scores),
@@ -150,6 +155,7 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
     return RoundResult(
         champion=express(confirmed.genes, task.simulator.template),
         genes=confirmed.genes,
+        is_likely=likely is not None,
         scores=confirmed.scores,
         optimiser_score=float(np.nan_to_num(progress.scores, nan=0.0).max()),
         ceiling=ceiling,
@@ -159,6 +165,22 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
         world_changed=progress.world_changed,
         n_renewed=progress.n_renewed,
     )
+
+
+def _best(task: Task, settings: Settings, progress: Progress) -> tuple[Confirmed, Ceiling]:
+    best = best_distinct(progress.genes, progress.scores, settings.n_confirmed)
+    confirmed = confirm(task.confirmation(settings), best)
+    return confirmed, ceiling_of(task, settings, confirmed)
+
+
+def _likely(task: Task, settings: Settings) -> tuple[Confirmed, Ceiling] | None:
+    """Return the estimate; None where it is not asked for, or its score speaks against it."""
+    if settings.champion != "likely" or task.guests is None:
+        return None
+    confirmed = confirm(task.confirmation(settings), np.atleast_2d(task.guests)[:1])
+    ceiling = ceiling_of(task, settings, confirmed)
+    _, within_ceiling = acceptance_threshold(confirmed.scores.S, ceiling)
+    return (confirmed, ceiling) if within_ceiling else None
 
 
 def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:

@@ -6,8 +6,8 @@ Plain data and what follows from it. The search is in ``search``, the round in `
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,9 @@ class Settings:
         Simulations of an evaluation and their length.
     optimiser
         ``zfcal``, or ``deap`` for DEAP's own operators.
+    champion
+        ``score``: the best of those that are simulated anew. ``likely``: the first guest, the
+        maximum-likelihood estimate, unless its score says that it misses something.
     n_confirmed
         So many of the best are simulated anew, and the best of these is champion.
     long_runs, long_s
@@ -58,6 +61,7 @@ class Settings:
     runs: int = 1
     steps: int = 3000
     optimiser: Literal["zfcal", "deap"] = "zfcal"
+    champion: Literal["score", "likely"] = "score"
     n_confirmed: int = 10
     long_runs: int = 10
     long_s: float = 1800.0
@@ -82,6 +86,16 @@ class Settings:
                 )
         if self.optimiser not in {"zfcal", "deap"}:
             raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
+        if self.champion not in {"score", "likely"}:
+            raise InputError(f"champion must be 'score' or 'likely', got {self.champion!r}.")
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """Return what a lineage says of them; a champion by its score goes without saying."""
+        options = asdict(self)
+        if self.champion == "score":
+            del options["champion"]
+        return options
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,11 +193,12 @@ class Task:
         return float(shifts * (n_steps + self.steps_of(BURN_IN_S)))
 
     def closing_work(self, settings: Settings) -> float:
-        """Return the steps that confirmation and ceiling take each worker."""
-        return self.work(
-            n_genomes=settings.n_confirmed,
-            n_runs=settings.long_runs,
-            n_steps=self.steps_of(settings.long_s),
-        ) + self.work(
-            n_genomes=1, n_runs=settings.n_windows, n_steps=self.steps_of(settings.window_s)
-        )
+        """Return the steps that confirmation and ceiling take each worker, at most."""
+        long, short = self.steps_of(settings.long_s), self.steps_of(settings.window_s)
+
+        def of(n_genomes: int) -> float:
+            confirmed = self.work(n_genomes=n_genomes, n_runs=settings.long_runs, n_steps=long)
+            return confirmed + self.work(n_genomes=1, n_runs=settings.n_windows, n_steps=short)
+
+        likely = settings.champion == "likely" and self.guests is not None
+        return of(settings.n_confirmed) + (of(1) if likely else 0.0)

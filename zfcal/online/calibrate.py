@@ -6,7 +6,6 @@ run over all windows and the online run on the newest one are the same code.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import time
@@ -149,7 +148,7 @@ def calibrate_options(
         "arena": trial.arena,
         "n_fish": trial.n_fish,
         "n_robots": trial.n_robots,
-        **dataclasses.asdict(options.settings),
+        **options.settings.said,
         "generations": generations,
         "baselines": options.baselines,
         "seed_likelihood": options.seed_likelihood,

@@ -6,7 +6,6 @@ the same budget and the same luck: without the effects, with them, and with a pl
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from collections.abc import Mapping
@@ -225,7 +224,7 @@ def _lineage(case: Case, extension: Extension, files: list[Path]) -> Lineage:
         "effects": {name: dict(values) for name, values in extension.effects.items()},
         "placebo": extension.placebo,
         "noise_mm": None if case.options.noise_m is None else 1e3 * case.options.noise_m,
-        **dataclasses.asdict(calibration.settings),
+        **calibration.settings.said,
         "generations": calibration.generations_asked,
         "seed_likelihood": calibration.seed_likelihood,
     }

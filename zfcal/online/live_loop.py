@@ -106,7 +106,7 @@ def _watch_words(experiment: Experiment, budget_s: float, stage: _Tank) -> list[
     stages += ["calibrate"] if options.robot == "calibrated" else []
     words += ["--stages", ",".join(stages), "--until-idle", f"{2 * _END_S / 3:g}s"]
     if options.robot == "calibrated":
-        words += ["--budget", f"{budget_s:g}s"]
+        words += ["--budget", f"{budget_s:g}s", "--champion", options.settings.champion]
     if stage.cameras:
         above, under = (camera.url for camera in stage.cameras)
         words += ["--overhead", above, "--below", under]

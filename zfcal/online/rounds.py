@@ -206,6 +206,7 @@ def result_table(
         "generations": result.generations,
         "evaluations": result.evaluations,
         **score_table(result.scores, result.ceiling),
+        "champion": "likely" if result.is_likely else "score",
         "optimiser_S": _number(result.optimiser_score),
         "hypervolume": [_number(line.hypervolume) for line in result.history],
         "best_S_in_population": _number(last.best_score),

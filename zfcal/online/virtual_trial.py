@@ -45,6 +45,10 @@ _LONGEST_S = 1e6
 RobotKind = Literal["calibrated", "fixed", "random"]
 
 
+LOOP_SETTINGS = Settings(generations=30, champion="likely")
+"""Of rounds whose models drive a robot: the best of many scores on 120 s is luck in parts."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopOptions:
     """A virtual experiment.
@@ -72,7 +76,7 @@ class LoopOptions:
     duration_s: float = 600.0
     robot: RobotKind = "calibrated"
     fish: FishOptions = field(default_factory=FishOptions)
-    settings: Settings = field(default_factory=lambda: Settings(generations=30))
+    settings: Settings = field(default_factory=lambda: LOOP_SETTINGS)
     video: bool = True
     seed: int = 1
     n_workers: int | None = None
@@ -163,6 +167,7 @@ def lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
         "generations": options.settings.generations,
         "population": options.settings.population,
         "steps": options.settings.steps,
+        "champion": options.settings.champion,
     }
     return Lineage(schema=schema, command="demo", options=said, seed=options.seed)
 
