@@ -221,6 +221,54 @@ def test_an_effect_that_the_model_has_already_is_refused(trial, found, options, 
         extend(trial, ExtendOptions(names=("allignment",), calibration=quick), say_nothing)
 
 
+@pytest.mark.parametrize("name", ["allignment", "generic:heading:nothing"])
+def test_an_unknown_name_is_told_before_anything_is_diagnosed(trial, found, quick, name):
+    """A slip of the hand does not cost the minutes that a diagnosis takes."""
+    with pytest.raises(InputError, match=f"no effect '{name}'"):
+        extend(trial, ExtendOptions(names=(name,), calibration=quick), say_nothing)
+    assert not found.asked
+    assert not (trial / "diagnosis").exists()
+
+
+def test_an_effect_in_the_model_is_told_before_anything_is_diagnosed(trial, found, options, quick):
+    """Though its findings are stale, and would be made anew first."""
+    path = extend(trial, options, say_nothing)
+    findings = diagnose(trial, DiagnoseOptions(model=path), say_nothing)
+    path.write_text(path.read_text() + "\n")
+    asked = len(found.asked)
+    again = ExtendOptions(names=("alignment",), findings=findings, calibration=quick)
+    with pytest.raises(InputError, match="has the effect 'alignment' already"):
+        extend(trial, again, say_nothing)
+    assert len(found.asked) == asked
+
+
+def test_findings_may_be_named_by_their_folder(trial, found, options, heard, tmp_path):
+    """None are made in the folder above it: what is missing is the model alone."""
+    folder = tmp_path / "elsewhere"
+    diagnose(trial, DiagnoseOptions(out_dir=folder), say_nothing)
+    dry = Task(dry_run=True)
+    extend(trial, dataclasses.replace(options, findings=folder), heard.append, task=dry)
+    assert [each.path.name for each in of_type(heard, Planned)] == ["extended.toml"]
+
+
+def test_findings_under_another_name_are_refused(trial, found, options):
+    """They would not be read: others would be made beside them."""
+    kept = diagnose(trial, DiagnoseOptions(), say_nothing).rename(trial / "kept.json")
+    with pytest.raises(InputError, match="from a file named findings"):
+        extend(trial, dataclasses.replace(options, findings=kept), say_nothing)
+    assert not (trial / "findings.json").exists()
+
+
+def test_findings_of_another_trial_are_not_written_over(make_trial, trial, found, options):
+    """They would be stale here, and be made anew in their place."""
+    other = make_trial(seconds=300, name="other", seed=9)
+    findings = diagnose(other, DiagnoseOptions(), say_nothing)
+    before = findings.read_bytes()
+    with pytest.raises(InputError, match="belongs to another trial"):
+        extend(trial, dataclasses.replace(options, findings=findings), say_nothing)
+    assert findings.read_bytes() == before
+
+
 def test_an_extended_model_is_extended_beside_itself(trial, found, options, quick):
     """Never over the file that it starts from; the first effect stays as it was fitted."""
     first = extend(trial, options, say_nothing)

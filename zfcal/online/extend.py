@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_result, write_model
+from zfcal.artifacts.settings import find_trial
 from zfcal.diagnose.document import gap_document
 from zfcal.diagnose.findings import Gap, Verdict
 from zfcal.errors import DamagedError, InputError
@@ -43,8 +44,8 @@ class ExtendOptions:
     names
         Effects to add; empty for those that the findings name.
     findings
-        Where these are; None for ``diagnosis/findings.json``, which is made when it is
-        missing or stale.
+        Where these are, the file or its folder; None for ``diagnosis/findings.json``. They are
+        made when they are missing or stale.
     calibration
         Budget, seed and workers of each of the three calibrations.
     output
@@ -94,11 +95,13 @@ def extend(
     """
     task = task or Task()
     with at_work(root, "extend", task):
-        path = options.findings or root / FOLDER / FILE
+        path = _findings_of(root, options.findings)
         asked = _question_of(root, path)
+        case = open_case(root, asked)
+        # Before the diagnosis, which takes minutes.
+        _check_new(case, options.names)
         if not _up_to_date(root, asked, tell, task=task, draw=draw):
             return None
-        case = open_case(root, asked)
         book = Book(opened=case.opened, folder=path.parent, draw=draw)
         document, found = book.read()
         effects = _chosen(case, options, document, tell)
@@ -119,6 +122,37 @@ def extend(
             _tell_gap(book, document, output, tell, task=task)
             tell(Result(value=book.read()[0]))
         return None if task.dry_run else output
+
+
+def _findings_of(root: Path, named: Path | None) -> Path:
+    """Return where the findings are that name the effects, which may be made there anew.
+
+    Raises
+    ------
+    InputError
+        Findings under another name would not be read, those of another trial be written over.
+    """
+    if named is None:
+        return root / FOLDER / FILE
+    path = named / FILE if named.is_dir() else named
+    if path.name != FILE:
+        raise InputError(
+            f"{path}: findings are read from a file named {FILE}.",
+            hint=f"Name the folder in which zfcal diagnose --out wrote its {FILE}.",
+        )
+    if _owner(path) not in (None, root.resolve()):
+        raise InputError(
+            f"{path}: belongs to another trial than {root}.",
+            hint=f"Say which effects to add instead: zfcal extend {root} --effect NAME",
+        )
+    return path
+
+
+def _owner(path: Path) -> Path | None:
+    try:
+        return find_trial(path.resolve().parent)
+    except InputError:
+        return None
 
 
 def _question_of(root: Path, path: Path) -> DiagnoseOptions:
@@ -166,13 +200,7 @@ def _chosen(
     """Return the effects to add with parameters to start from; None where nothing is to be done."""
     found = {effect["name"]: effect for effect in document["effects"]}
     names = options.names or tuple(found)
-    for name in names:
-        find_effect(name)
-        if name in case.parameters.effects:
-            raise InputError(
-                f"{case.model}: the model has the effect {name!r} already.",
-                hint="Leave it out, or take the model without it: zfcal diagnose TRIAL --model.",
-            )
+    _check_new(case, names)
     if not names:
         return _nothing(case, Verdict(document["verdict"]), document, tell)
     return {
@@ -183,6 +211,16 @@ def _chosen(
         }
         for name in names
     }
+
+
+def _check_new(case: Case, names: Iterable[str]) -> None:
+    for name in names:
+        find_effect(name)
+        if name in case.parameters.effects:
+            raise InputError(
+                f"{case.model}: the model has the effect {name!r} already.",
+                hint="Leave it out, or take the model without it: zfcal diagnose TRIAL --model.",
+            )
 
 
 def _nothing(
