@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from zfcal.online.opening import Task
     from zfcal.online.streams import Work
 
+_HINT = "Make it again, or copy it again from where it was made."
+
 
 @click.command("report")
 @takes_trials
@@ -44,6 +46,10 @@ def command(
         roots[found.root] = None
 
     each_trial(out, trials, collect)
+    if len(roots) > 1 and folder is None:
+        raise click.UsageError(
+            f"A report over {len(roots)} trials belongs to none of them: give --out FOLDER."
+        )
     if roots and not out.exit_code:
         task = Task(dry_run=dry_run, force=force)
         out.attempt(lambda: write_page(out, list(roots), folder, task))
@@ -51,15 +57,23 @@ def command(
 
 def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) -> None:
     """Write the report of trials, unless it is up to date."""
-    from zfcal.online.events import Made, Planned, UpToDate
+    from zfcal.online.events import LeftOut, Made, Planned, UpToDate
     from zfcal.online.opening import at_work
-    from zfcal.report.page import PAGE, report_files, report_reason, write_report
+    from zfcal.report.page import (
+        PAGE,
+        report_files,
+        report_left_out,
+        report_reason,
+        write_report,
+    )
 
     with at_work(roots[0], "report", task):
         reason = report_reason(roots, folder) or ("forced" if task.force else None)
         if reason is None:
             for path in report_files(roots, folder):
                 out.tell(UpToDate(path=path))
+            for line in report_left_out(roots, folder):
+                out.tell(LeftOut(path=Path(), problem=line, hint=_HINT))
         elif task.dry_run:
             out.tell(Planned(path=(folder or roots[0] / "report") / PAGE, reason=reason))
         else:

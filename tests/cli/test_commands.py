@@ -157,8 +157,26 @@ def test_a_report_over_several_trials_needs_a_place(zfcal, trial):
     zfcal("analyse", "trial")
     zfcal("init", "other", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
     done = zfcal("report", "trial", "other")
-    assert done.code == 1
+    assert done.code == 2
     assert "--out" in done.err
+
+
+def test_a_report_names_what_is_damaged_each_time(zfcal, trial):
+    """Up to date is not whole: exit 3 of the second run too, until the file is mended."""
+    segment = trial / "tracks" / "000060.parquet"
+    whole = segment.read_bytes()
+    segment.write_bytes(whole[:1000])
+    for says in ("0 up to date", "nothing to do"):
+        done = zfcal("report", "trial")
+        assert done.code == 3
+        assert "tracks/000060.parquet: was cut short" in done.err
+        assert says in done.err
+    document = json.loads(zfcal("report", "trial", "--json").out)
+    assert document["exit_code"] == 3
+    assert len(document["left_out"]) == 1
+    segment.write_bytes(whole)
+    assert zfcal("report", "trial").code == 0
+    assert zfcal("report", "trial").code == 0
 
 
 def test_inspect_shows_text_or_json(zfcal, trial):

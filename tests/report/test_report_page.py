@@ -11,7 +11,7 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError, StorageError
 from zfcal.report import page
-from zfcal.report.page import report_files, report_reason, write_report
+from zfcal.report.page import report_files, report_left_out, report_reason, write_report
 
 pytestmark = pytest.mark.usefixtures("quick_model")
 
@@ -192,6 +192,18 @@ def test_damage_is_heard_of_and_shown(small_trial):
     text = " ".join(read_page(root / "report").text)
     assert "Left out" in text
     assert "tracks/000060.parquet" in text
+    (again,) = report_left_out([root])
+    assert again.startswith(f"{root}: tracks/000060.parquet: ")
+
+
+@quickly
+def test_of_several_trials_the_damaged_one_is_named(small_trial, tmp_path):
+    """Whoever asks again what a report leaves out hears of which trial it is."""
+    roots = [small_trial("one"), small_trial("two")]
+    (roots[1] / "tracks" / "000060.parquet").write_bytes(b"PAR1")
+    write_report(roots, tmp_path / "both")
+    (line,) = report_left_out(roots, tmp_path / "both")
+    assert line.startswith(f"{roots[1]}: ")
 
 
 @quickly

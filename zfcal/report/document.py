@@ -36,13 +36,13 @@ def integration_document(
     del origin["schema"]
     return {
         "schema": SCHEMA,
-        "trials": [_trial(view.name, view.integration) for view in views],
+        "trials": [_trial(view.name, view.integration, view.left_out) for view in views],
         "files": dict(files),
         "lineage": origin,
     }
 
 
-def _trial(name: str, found: Integration) -> dict[str, Any]:
+def _trial(name: str, found: Integration, left_out: Sequence[str]) -> dict[str, Any]:
     robot = {
         "start_s": found.start_s,
         "end_s": found.end_s,
@@ -53,6 +53,7 @@ def _trial(name: str, found: Integration) -> dict[str, Any]:
         "robot_vs_fish": robot if found.robot else None,
         "halves": dict(found.halves) or None,
         "missing": list(found.missing),
+        **({"left_out": list(left_out)} if left_out else {}),
     }
 
 

@@ -129,6 +129,16 @@ def report_files(roots: Sequence[Path], out_dir: Path | None = None) -> list[Pat
     return [place.folder / name for name in ordered]
 
 
+def report_left_out(roots: Sequence[Path], out_dir: Path | None = None) -> list[str]:
+    """Return what a report that is up to date leaves out since it is damaged, a line each."""
+    trials = read_json(_place(roots, out_dir).folder / NUMBERS)["trials"]
+    return [
+        f"{root}: {line}"
+        for root, trial in zip(roots, trials, strict=True)
+        for line in trial.get("left_out", [])
+    ]
+
+
 def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
     if not roots:
         raise InputError("A report needs at least one trial.")
