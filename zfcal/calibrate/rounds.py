@@ -18,7 +18,7 @@ from zfcal.calibrate.ceiling import measure_ceiling, window_noise
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import State
 from zfcal.calibrate.history import Generation
-from zfcal.calibrate.intervals import Intervals, acceptance_threshold, parameter_intervals
+from zfcal.calibrate.intervals import Intervals, parameter_intervals
 from zfcal.calibrate.objective import Purpose, express
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.search import Progress, Watch, search
@@ -139,9 +139,9 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
 
     The ten best of all that the search evaluated are simulated anew; the best by
     that simulation is the champion, and its S there is the one that is reported.
-    Where the likelier one is asked for, the estimate is the champion if the window scores
-    no less against it than its own windows do: 120 s of fish then cannot tell it from the
-    truth, while the best of many scores fits what happened by chance.
+    Where the likely one is asked for, the estimate is the champion if the window scores
+    against it as its own windows do, less one standard deviation of them: the best of many
+    scores fits what happened by chance. Of windows of the true model one in six scores less.
     """
     likely = _likely(task, settings)
     confirmed, ceiling = likely or _best(task, settings, progress)
@@ -179,8 +179,9 @@ def _likely(task: Task, settings: Settings) -> tuple[Confirmed, Ceiling] | None:
         return None
     confirmed = confirm(task.confirmation(settings), np.atleast_2d(task.guests)[:1])
     ceiling = ceiling_of(task, settings, confirmed)
-    _, within_ceiling = acceptance_threshold(confirmed.scores.S, ceiling)
-    return (confirmed, ceiling) if within_ceiling else None
+    mean, _, _ = ceiling.of("S")
+    falls_short = mean - confirmed.scores.S
+    return (confirmed, ceiling) if falls_short <= window_noise(ceiling) else None
 
 
 def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
