@@ -42,7 +42,13 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "e
     show_default=True,
     help="Tick by this computer's clock, or by the times of the poses.",
 )
-@click.option("--duration", "duration_s", type=seconds, metavar="TIME", help="End after so long.")
+@click.option(
+    "--duration",
+    "duration_s",
+    type=seconds,
+    metavar="TIME",
+    help="End after so long; a drive counts from its first pose.",
+)
 @click.option(
     "--publish",
     metavar="cats2://HOST[:PORT]",

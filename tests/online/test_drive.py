@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,27 @@ def test_a_duration_counts_from_the_first_frame(root):
     items = items_of(root)
     assert [pose["frame"] for pose in only(items, "pose")] == list(range(60))
     assert (len(only(items, "target")), len(only(items, "command"))) == (20, 40)
+
+
+def test_it_is_said_that_no_poses_have_come(root):
+    """Once, as a warning, and the drive goes on when they come: its duration begins then."""
+    poses, later, heard = root / "poses", root / "later", []
+    poses.rename(later)
+    timer = threading.Timer(6, lambda: later.rename(poses))
+    timer.start()
+    options = DriveOptions(port="virtual", clock="poses", duration_s=2)
+    assert drive(root, options, heard.append) == "the duration is over"
+    timer.join()
+    waits = [note for note in heard if isinstance(note, Note) and "no poses yet" in note.text]
+    assert [(str(poses) in note.text, note.warning) for note in waits] == [(True, True)]
+    assert only(items_of(root), "command")
+
+
+def test_nobody_waits_where_poses_are(root):
+    """Recorded ones are gone through without a word of waiting."""
+    heard = []
+    run(root, tell=heard.append, seconds=4)
+    assert not [note for note in heard if isinstance(note, Note) and "no poses" in note.text]
 
 
 def test_targets_keep_the_robots_radius_from_the_walls(root):

@@ -44,6 +44,9 @@ _STATUS_S = 0.5
 _SWITCH_S = 0.0005
 _OPENING_S = 3.0
 _ANSWER_S = 2.0
+_WAIT_S = 3.0
+"""Until it is said that no poses have come; a tracker that is started by the same hand is there."""
+
 _END_S = 2.0
 """On the poses' clock: when so long after the last file's end none follows, that was it."""
 
@@ -269,12 +272,14 @@ class _Loop:
         self._tell, self._told_s = tell, 0.0
         self._quiet_since_s = time.monotonic()
         self._asked_s = time.monotonic()
+        self._is_waited_for = False
 
     def run(self) -> str:
         """Go on until it is over, and return why it is."""
         for batch in self._batches():
             self._driver.listen()
             self._greet()
+            self._wait()
             if batch and self._first_s is None:
                 self._check_logs(batch[-1].time_s)
             # On the poses' clock each frame has its own ticks; a live one has the newest frame's.
@@ -375,3 +380,13 @@ class _Loop:
                 says = f"No FishBot {letter} answers; what is sent may be heard by nobody."
                 self._crew.tell(Note(text=says, warning=True))
             self._asked_s = 0.0
+
+    def _wait(self) -> None:
+        """Say once that no poses have come: a duration counts from the first of them."""
+        if self._is_waited_for or self._first_s is not None:
+            return
+        if time.monotonic() - self._quiet_since_s > _WAIT_S:
+            folder = self._opened.trial.root / "poses"
+            says = f"{folder}: no poses yet; waits until zfcal track writes them."
+            self._crew.tell(Note(text=says, warning=True))
+            self._is_waited_for = True
