@@ -1,5 +1,6 @@
 """The page of a diagnosis: what it says, when it is drawn, how a browser shows it."""
 
+import dataclasses
 import html
 import json
 import math
@@ -250,6 +251,27 @@ def test_overviews_do_not_cover_their_texts(make_sheet, covered_texts):
     assert not covered_texts(screened_picture(many[:1], []))
     gap = gap_of(nats_per_step=0.9, S_over_ceiling=-3.0, D=7.0, W=0.5, O=0.1, T=0.2, effect=1.0)
     assert not covered_texts(gap_picture(gap))
+
+
+@pytest.mark.parametrize(
+    ("interval", "says", "figure"),
+    [
+        ((-7.1, 18.6), "anything from -710 to 1860 %", "unknown"),
+        ((0.0, 1.0), "anything from 0 to 100 %", "unknown"),
+        ((0.1, 1.2), "closes 80 % (10 to 120)", "80 %"),
+        ((-0.2, 0.9), "closes 80 % (-20 to 90)", "80 %"),
+    ],
+)
+def test_a_share_that_may_be_none_or_all_is_no_figure(make_sheet, interval, says, figure):
+    """A gap next to nothing is not said to be closed by so many hundred per cent."""
+    gap = [dataclasses.replace(each, interval=interval) for each in gap_of(nats_per_step=0.8)]
+    card = next(
+        each
+        for each in statements(make_sheet(gap=gap).findings)
+        if each.question == "How much better is the model with it?"
+    )
+    assert says in card.answer
+    assert card.figure[0] == figure
 
 
 def test_without_candidates_and_gap_there_are_no_overviews():

@@ -101,6 +101,17 @@ def _of_gap(gap: Sequence[Gap]) -> Iterator[Statement]:
     likelihood = by_name.get("nats_per_step")
     if likelihood is None or math.isnan(likelihood.closed):
         return
+    question = "How much better is the model with it?"
+    low, high = likelihood.interval
+    if low <= 0 and high >= 1:
+        yield Statement(
+            question=question,
+            answer="On minutes that neither fit has seen, adding it closes anything from "
+            f"{100 * low:.0f} to {100 * high:.0f} % of the gap in likelihood, so none or all of "
+            "it: they are too few, or the gap is too small, to say.",
+            figure=("unknown", "share of the gap closed, held out"),
+        )
+        return
     answer = (
         f"On minutes that neither fit has seen, adding it closes "
         f"{100 * likelihood.closed:.0f} %{_shares(likelihood.interval)} of the gap in likelihood"
@@ -108,7 +119,7 @@ def _of_gap(gap: Sequence[Gap]) -> Iterator[Statement]:
     if not math.isnan(likelihood.placebo):
         answer += f"; a wrong effect with as many parameters, {100 * likelihood.placebo:.0f} %"
     yield Statement(
-        question="How much better is the model with it?",
+        question=question,
         answer=f"{answer}.",
         figure=(f"{100 * likelihood.closed:.0f} %", "of the gap closed, held out"),
     )
