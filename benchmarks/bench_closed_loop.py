@@ -26,7 +26,16 @@ from regressions import Ratio, conclude, parser
 from scipy import stats
 
 PLACE = ROOT / "build" / "closed-loop"
-KINDS = ("calibrated", "fixed", "random")
+WORDS = {
+    "calibrated": ("--swims", "calibrated"),
+    "by score": ("--swims", "calibrated", "--champion", "score"),
+    "fixed": ("--swims", "fixed"),
+    "random": ("--swims", "random"),
+}
+"""Options of the demo by kind of robot; *by score* swims by the published choice of a model."""
+
+KINDS = tuple(WORDS)
+KEPT = "found.json"
 SEEDS = 501
 """The first trial's; the loop was made on seeds 1 to 9."""
 
@@ -36,13 +45,13 @@ PUBLISHED = {180: 0.610, 300: 0.827, 360: 0.850}
 
 def run_one(kind: str, seed: int, minutes: int, *, video: bool) -> dict[str, Any]:
     """Run a trial unless it is there, and return what came of it."""
-    name = f"{kind}-{seed}-{minutes}min" + ("-video" if video else "")
-    folder, kept = PLACE / name, PLACE / name / "found.json"
+    folder = _folder(kind, seed, minutes, video=video)
+    kept = folder / KEPT
     if kept.exists():
         found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
         return found
     begin = time.monotonic()
-    words = ["--closed-loop", "--duration", f"{minutes}min", "--swims", kind, "--seed", str(seed)]
+    words = ["--closed-loop", "--duration", f"{minutes}min", *WORDS[kind], "--seed", str(seed)]
     words += [] if video else ["--no-video"]
     try:
         _zfcal("demo", str(folder), *words)
@@ -63,6 +72,11 @@ def run_one(kind: str, seed: int, minutes: int, *, video: bool) -> dict[str, Any
     }
     kept.write_text(json.dumps(found), encoding="utf-8")
     return found
+
+
+def _folder(kind: str, seed: int, minutes: int, *, video: bool) -> Path:
+    name = f"{kind.replace(' ', '-')}-{seed}-{minutes}min"
+    return PLACE / (f"{name}-video" if video else name)
 
 
 def _zfcal(*words: str) -> None:
@@ -94,6 +108,12 @@ def measure_all(options: argparse.Namespace) -> dict[str, Any]:
     """Run all trials, two at a time."""
     PLACE.mkdir(parents=True, exist_ok=True)
     jobs = [(kind, SEEDS + k) for k in range(options.trials) for kind in options.kinds.split(",")]
+    if options.report:
+        jobs = [
+            job
+            for job in jobs
+            if (_folder(*job, options.minutes, video=options.video) / KEPT).exists()
+        ]
     found: dict[str, Any] = {"machine": machine(), "load_before": load(), "trials": []}
     with ThreadPoolExecutor(options.workers) as pool:
         todo = [pool.submit(run_one, *job, options.minutes, video=options.video) for job in jobs]
@@ -126,8 +146,8 @@ def markdown(found: dict[str, Any]) -> str:
     minutes, n = trials[0]["minutes"], len({t["seed"] for t in trials})
     how = "drawn and tracked" if trials[0]["video"] else "tracks with noise, no images"
     said = f"""Made by `benchmarks/bench_closed_loop.py`; numbers in
-        `benchmarks/results/closed_loop.json`. Machine: {found["machine"]}. {n} virtual trials
-        of {minutes} min for each robot ({how}), four fish whose parameters differ from trial
+        `benchmarks/results/closed_loop.json`. Machine: {found["machine"]}. Up to {n} virtual
+        trials of {minutes} min for each robot ({how}), four fish whose parameters differ from trial
         to trial and drift ([closed-loop.md](closed-loop.md)); seeds on which nothing
         was tuned; 30 generations a round."""
     text = [textwrap.fill(" ".join(said.split()), 120)]
@@ -150,9 +170,10 @@ def _robot_table(trials: list[dict[str, Any]], kinds: list[str]) -> str:
             shares.append(value / _ceiling(trials, feature))
         speed = float(np.median([t["times_real_time"] for t in own]))
         span = f"{low / _ceiling(trials, 'S'):.3f} to {high / _ceiling(trials, 'S'):.3f}"
-        rows.append([kind, mean, *shares[:1], span, *shares[1:], speed])
+        rows.append([kind, len(own), mean, *shares[:1], span, *shares[1:], speed])
     head = (
         "robot",
+        "trials",
         "S",
         "S over the ceiling",
         "95 % interval",
@@ -250,6 +271,7 @@ def main() -> None:
     made.add_argument("--minutes", type=int, default=10, help="Length of a trial.")
     made.add_argument("--kinds", default=",".join(KINDS), help="Robots, with commas.")
     made.add_argument("--workers", type=int, default=2, help="Trials at a time.")
+    made.add_argument("--report", action="store_true", help="Take the trials that are done.")
     made.add_argument("--video", action="store_true", help="Draw and track the cameras' images.")
     options = made.parse_args()
     if options.tiny:
