@@ -71,6 +71,19 @@ def test_the_worst_is_what_lies_farthest_below_its_ceiling(make_view, course):
     assert [(feature, zone) for feature, zone, _ in ranked] == [("W", "centre"), ("D", "corridor")]
 
 
+def test_a_zone_in_which_a_perfect_model_may_score_nothing_is_not_accused(make_view, course):
+    """0.00 where the ceiling is 0.01 (0.00 to 0.02): hardly anybody was there."""
+    empty = {(MODEL, "D", "corridor"): course([0.0], ceiling=0.01, half_width=0.01)}
+    seen = {(MODEL, "D", "centre"): course([0.69], ceiling=0.8, half_width=0.2)}
+    view = make_view()
+
+    ranked = worst_features(replace(view, courses=empty | seen))
+
+    assert [(feature, zone) for feature, zone, _ in ranked] == [("D", "centre")]
+    assert not worst_features(replace(view, courses=empty))
+    assert "centre" in answer_to(replace(view, courses=empty | seen), "What differs").answer
+
+
 @pytest.mark.parametrize("feature", ["D", "W", "T"])
 def test_the_worst_says_which_way_it_differs(make_view, course, feature):
     """With the last window's statistics at hand, fish and model are both named."""

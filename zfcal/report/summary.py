@@ -24,6 +24,9 @@ _NOTICED = 0.5
 """A shortfall of less than this share of the way from the ceiling to its interval's low end
 is within what chance does to a perfect model."""
 
+_NOTHING = 0.005
+"""A score that is printed as 0.00 or below it."""
+
 _FEW = 4
 
 _PLACES = {
@@ -178,7 +181,7 @@ def worst_features(view: TrialView) -> list[tuple[str, str | None, Mark]]:
     -------
     list of (feature, zone, mark)
         D, W and T zone by zone, O over all; means over the windows. Scores
-        without a ceiling are left out.
+        without a ceiling are left out, and those that a perfect model may miss altogether.
     """
     keys: list[tuple[str, str | None]] = [
         (feature, zone) for feature in "DWT" for zone in view.arena.zone_names
@@ -347,7 +350,9 @@ def _percent(mark: Mark) -> str:
 def _shortfall(mark: Mark) -> float:
     """Return how far below its ceiling a score lies, in widths of the ceiling's interval.
 
-    A zone that is seldom visited has a wide interval: there a low score means little.
+    A zone that is seldom visited has a wide interval: there a low score means little. NaN
+    where a perfect model may score next to nothing: there it means nothing.
     """
     width = mark.ceiling - mark.low
-    return (mark.ceiling - mark.value) / width if width > 0 else float("nan")
+    says = width > 0 and mark.low >= _NOTHING
+    return (mark.ceiling - mark.value) / width if says else float("nan")
