@@ -10,6 +10,9 @@ from pathlib import Path
 from zfcal.errors import InputError
 
 CONFIG_NAME = "trial.toml"
+LOOP_NAME = "closed-loop.json"
+"""What a virtual closed loop was asked for, written when it has ended."""
+
 _DIGITS = 6
 
 

@@ -239,6 +239,13 @@ def test_files_that_no_command_reads_are_noted(trial):
     assert troubles(trial) == [(NOTE, "notes.txt"), (NOTE, "tracks/60.parquet")]
 
 
+def test_the_record_of_a_closed_loop_is_read(trial):
+    """Who removes it, as a file that nobody reads, has the whole loop made anew."""
+    (trial.root / "closed-loop.json").write_text("{}")
+    assert found_in(trial, "closed-loop.json") == []
+    assert troubles(trial) == []
+
+
 def test_a_wrong_diagnosis_is_an_error(trial):
     """Other programs read it."""
     path = trial.root / "diagnosis" / "findings.json"

@@ -12,7 +12,7 @@ from zfcal.artifacts.models import read_model
 from zfcal.artifacts.pose_files import read_poses
 from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
-from zfcal.errors import InputError
+from zfcal.errors import DamagedError, InputError
 from zfcal.online.closed_loop import closed_loop
 from zfcal.online.events import Note, UpToDate
 from zfcal.online.opening import Task, open_trial
@@ -107,6 +107,18 @@ def test_what_is_whole_is_not_done_again(loop):
     closed_loop(folder, SHORT, heard.append)
     assert before == {p: p.stat().st_mtime_ns for p in (folder / "trial").rglob("*.parquet")}
     assert {type(event) for event in heard if hasattr(event, "path")} == {UpToDate}
+
+
+def test_a_damaged_record_is_named(loop):
+    """A loop that may be whole is not thrown away for it; ``--force`` would."""
+    folder, _ = loop
+    record = folder / "trial" / "closed-loop.json"
+    said = record.read_bytes()
+    record.write_bytes(said[:20])
+    with pytest.raises(DamagedError, match=r"closed-loop\.json: is not valid JSON"):
+        closed_loop(folder, SHORT, lambda _: None)
+    record.write_bytes(said)
+    assert list((folder / "trial" / "tracks").glob("*.parquet"))
 
 
 def test_a_loop_that_was_cut_short_is_begun_anew(tmp_path):

@@ -27,7 +27,7 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import POPULATION, SCORES, STATS, read_table, read_tracks
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError, ZfcalError
-from zfcal.trial import CONFIG_NAME, Trial, second_of
+from zfcal.trial import CONFIG_NAME, LOOP_NAME, Trial, second_of
 from zfcal.units import SEGMENT_S
 
 OK, NOTE, WARNING, ERROR = "ok", "note", "warning", "error"
@@ -204,11 +204,13 @@ def _dot_file(place: _Place, path: Path, name: str) -> Iterator[Finding]:
 
 def _unknown(place: _Place, name: str) -> Iterator[Finding]:
     folder = name.partition("/")[0]
-    named = {place.trial.arena, place.trial.model} if place.trial else set()
+    named = {CONFIG_NAME, LOOP_NAME}
+    if place.trial:
+        named |= {place.trial.arena, place.trial.model}
     if place.trial and place.trial.cameras:
         named |= {path for camera in place.trial.cameras.values() for path in camera.values()}
     is_figure = folder == "cameras" and name.endswith(".png")
-    if name == CONFIG_NAME or name in named or is_figure or folder in {"diagnosis", "report"}:
+    if name in named or is_figure or folder in {"diagnosis", "report"}:
         return
     says = "is no artifact of a trial, and no command reads it"
     if re.fullmatch(r"\d{1,5}\D.*", name.rpartition("/")[2]):

@@ -18,6 +18,7 @@ from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import SCHEMA as MODEL
 from zfcal.artifacts.models import write_model
 from zfcal.artifacts.pose_files import POSES
+from zfcal.artifacts.validation import read_json
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
 from zfcal.online.events import Tell, say_nothing
@@ -31,6 +32,7 @@ from zfcal.online.virtual_fish import FishOptions, VirtualFish
 from zfcal.parameters import Parameters, ZoneParameters, natural
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.tracks import FramePoses
+from zfcal.trial import LOOP_NAME
 
 FPS = 15.0
 ARENA = "two-rooms"
@@ -172,23 +174,18 @@ def lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
     return Lineage(schema=schema, command="demo", options=said, seed=options.seed)
 
 
-_LAST = "closed-loop.json"
-"""In the trial: what was asked for, written when the loop has ended."""
-
-
 def is_whole(experiment: Experiment) -> bool:
     """Return whether this very experiment has ended here."""
-    place = experiment.root / _LAST
+    place = experiment.root / LOOP_NAME
     if not place.is_file():
         return False
-    found = json.loads(place.read_text(encoding="utf-8"))
-    return bool(found == lineage_of_loop(_LAST, experiment.options).as_dict())
+    return bool(read_json(place) == lineage_of_loop(LOOP_NAME, experiment.options).as_dict())
 
 
 def keep(experiment: Experiment) -> None:
     """Write down that the experiment has ended."""
-    text = to_json(lineage_of_loop(_LAST, experiment.options).as_dict())
-    write_text_whole(experiment.root / _LAST, text + "\n")
+    text = to_json(lineage_of_loop(LOOP_NAME, experiment.options).as_dict())
+    write_text_whole(experiment.root / LOOP_NAME, text + "\n")
 
 
 _MADE = ("poses", "tracks", "stats", "scores", "drive")
@@ -196,7 +193,7 @@ _MADE = ("poses", "tracks", "stats", "scores", "drive")
 
 def clear(experiment: Experiment) -> None:
     """Remove what an earlier run left: a robot must not be driven by models of its future."""
-    (experiment.root / _LAST).unlink(missing_ok=True)
+    (experiment.root / LOOP_NAME).unlink(missing_ok=True)
     for opened in (experiment.tank, experiment.trial):
         root = opened.trial.root
         files = [path for name in _MADE for path in (root / name).glob("*")]
