@@ -26,10 +26,13 @@ def laid_out(command: Command) -> Command:
     return command
 
 
-def speaks(command: Command) -> Command:
-    """Give a command its voice: ``out``, and --json, -v, -q, --traceback."""
+def speaks(command: Command, *, as_json: str = "One JSON document instead of paths.") -> Command:
+    """Give a command its voice: ``out``, and --json, -v, -q, --traceback.
 
-    @click.option("--json", "as_json", is_flag=True, help="One JSON document instead of paths.")
+    ``as_json`` is what its help says of --json.
+    """
+
+    @click.option("--json", "as_json", is_flag=True, help=as_json)
     @click.option("-v", "--verbose", count=True, help="Say why each file was made; -vv traces.")
     @click.option("-q", "--quiet", is_flag=True, help="Only errors and files left out.")
     @click.option("--traceback", is_flag=True, expose_value=False, help="Show where a bug arose.")

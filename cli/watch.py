@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ from .tracking import tracking_options
     help="A robot-free trial whose fish are the control; repeat it to pool several.",
 )
 @tracking_options
-@speaks
+@functools.partial(speaks, as_json="A line of JSON for each event instead of paths.")
 def command(out: Output, trial: Path, **options: Any) -> None:
     r"""Run the stages on each new segment until the trial ends.
 

@@ -77,6 +77,14 @@ def test_every_command_stands_in_the_documentation(repository, name):
                     assert f"`{word}" in section, f"{words} {word}"
 
 
+@pytest.mark.parametrize("name", ["watch", "analyse", "drive"])
+def test_help_says_what_json_is(zfcal, name):
+    """Of a watch a line for each event, of all others one document."""
+    said = " ".join(zfcal(name, "--help").out.split())
+    assert ("--json A line of JSON for each event" in said) == (name == "watch")
+    assert ("--json One JSON document" in said) == (name != "watch")
+
+
 def test_help_loads_nothing_heavy():
     """numpy, pandas and the like stay out: what makes a start slow is loaded by commands."""
     code = (
