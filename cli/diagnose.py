@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .durations import span
-from .options import EXISTING, PLACE, makes_artifacts, seed_option, speaks, takes_trials
+from .options import (
+    EXISTING,
+    PLACE,
+    FiniteRange,
+    makes_artifacts,
+    seed_option,
+    speaks,
+    takes_trials,
+)
 from .output import Output
 from .streams import each_trial
 
@@ -29,7 +37,7 @@ if TYPE_CHECKING:
     help="Trials simulated without any effect, to learn what chance does.",
 )
 @click.option("--quick", is_flag=True, help="Take that from theory instead: seconds, less sure.")
-@click.option("--noise-mm", type=click.FloatRange(min=0), help="Position noise, sd per coordinate.")
+@click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate.")
 @click.option("--window", "window_s", type=span, metavar="START:END", help="Only this stretch.")
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .durations import seconds
-from .options import PLACE, speaks
+from .options import PLACE, FiniteRange, speaks
 from .output import Output
 
 _LETTERS = tuple("ABCDEFGHIJ")
@@ -30,7 +30,7 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "e
 )
 @click.option(
     "--radius-mm",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     default=15.0,
     show_default=True,
     help="Targets keep so far from the walls.",

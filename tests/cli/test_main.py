@@ -153,6 +153,22 @@ def test_wrong_usage_ends_with_2_and_names_the_help(zfcal, words):
     assert done.err.splitlines()[-1] == f"hint: See: zfcal {words[0]} --help"
 
 
+@pytest.mark.parametrize("number", ["nan", "inf", "-1"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["diagnose", "t", "--quick", "--noise-mm"],
+        ["drive", "t", "--port", "virtual", "--radius-mm"],
+    ],
+)
+def test_what_is_no_finite_number_is_wrong_usage(zfcal, words, number):
+    """NaN passes every comparison: it would fail far from where it was typed."""
+    done = zfcal(*words, number)
+    assert done.code == 2
+    assert words[-1] in done.err
+    assert ("no finite number" in done.err) == (number != "-1")
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [
