@@ -5,9 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.diagnose.heldout import Steps
+from zfcal.diagnose.heldout import Gains, Steps
 from zfcal.errors import InputError
-from zfcal.online.gap import Draws, draw_blocks, effect_gap, make_gap, shares
+from zfcal.online.gap import (
+    Draws,
+    draw_blocks,
+    effect_gap,
+    likelihood_gap,
+    make_gap,
+    shares,
+)
 from zfcal.online.halves import split
 from zfcal.online.opening import open_trial
 from zfcal.online.stretch import read_stretch
@@ -42,11 +49,11 @@ def test_a_gap_that_may_be_none_has_no_share():
     """Every tenth draw leaves none: neither share nor placebo nor interval."""
     before = np.full(101, 0.5)
     floor = np.where(np.arange(101) % 10 == 5, 0.4, 0.9)
-    found = make_gap("D", before, before + 0.1, floor, before)
+    found = make_gap("D", (before, before + 0.1), floor, before)
     assert math.isnan(found.closed)
     assert math.isnan(found.placebo)
     assert math.isnan(found.interval[0])
-    sure = make_gap("D", before, before + 0.1, np.full(101, 0.9), before)
+    sure = make_gap("D", (before, before + 0.1), np.full(101, 0.9), before)
     assert sure.closed == pytest.approx(0.25)
     assert sure.placebo == 0.0
 
@@ -55,7 +62,7 @@ def test_the_interval_is_that_of_the_draws():
     """Shares from 0 to 1 in even steps: 2.5 and 97.5 %."""
     after = np.concatenate([[0.5], np.linspace(0, 1, 1001)])
     zeros = np.zeros(1002)
-    found = make_gap("D", zeros, after, zeros + 1, zeros)
+    found = make_gap("D", (zeros, after), zeros + 1, zeros)
     assert found.interval == pytest.approx((0.025, 0.975))
 
 
@@ -104,6 +111,30 @@ def test_the_effects_own_statistic_by_hand(halves):
     assert found.floor == pytest.approx(math.sqrt(2 / math.pi) / 3)
     assert found.closed == pytest.approx(1 / (1 - found.floor))
     assert math.isnan(found.placebo)
+
+
+@pytest.mark.parametrize(("expected", "is_gap"), [(0.25, True), (0.2, False)])
+def test_a_gain_of_less_than_two_nats_is_no_gap(halves, expected, is_gap):
+    """Nine steps with 0.25 nats expected of each are 2.25 nats, with 0.2 they are 1.8."""
+    at = np.array([300] * 9)
+    draws = Draws(blocks=np.array([1]), weights=np.ones((3, 1)))
+    base, gain, most = (Steps(at=at, values=np.full(9, by)) for by in (-1.0, 0.1, expected))
+    found = likelihood_gap(halves, draws, [Gains(base=base, gain=gain, expected=most)], [])
+    assert (found.before, found.after) == pytest.approx((-1.0, -0.9))
+    assert found.floor == pytest.approx(-1.0 + expected)
+    assert math.isnan(found.closed) != is_gap
+
+
+def test_an_effect_that_was_not_missed_leaves_no_gap(halves):
+    """Scores whose z is 1.46 before; the 3 of another test is one."""
+    at = np.array([300] * 9)
+    draws = Draws(blocks=np.array([1]), weights=np.ones((3, 1)))
+    before = Steps(at=at, values=np.array([1.0] * 6 + [-0.5, -0.5, -1.0]))
+    after = Steps(at=at, values=np.tile([1, -1, 0], 3))
+    found = effect_gap(halves, draws, (before, after, None))
+    assert found.before == pytest.approx(1.4606 / 3, abs=1e-4)
+    assert math.isnan(found.closed)
+    assert math.isnan(found.interval[0])
 
 
 def test_a_recording_too_short_to_hold_anything_out_is_refused(make_trial):

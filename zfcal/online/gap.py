@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 N_DRAWS = 1000
 _SIDES = (2.5, 97.5)
 _HAS_GAP = 0.975
+_LEAST_Z = 2.0
+"""Standard errors; half the square is the gain in nats. Less cannot be told from nothing."""
+
 FEATURES = ("D", "W", "O", "T")
 
 
@@ -59,20 +62,31 @@ def draw_blocks(halves: Halves, random: np.random.Generator, n: int = N_DRAWS) -
     return Draws(blocks=blocks, weights=np.vstack([np.ones(size), drawn]).astype(np.float64))
 
 
-def make_gap(measure: str, before: Floats, after: Floats, floor: Floats, placebo: Floats) -> Gap:
+def make_gap(
+    measure: str,
+    values: tuple[Floats, Floats],
+    floor: Floats,
+    placebo: Floats,
+    *,
+    is_gap: bool = True,
+) -> Gap:
     """Return an entry of a gap.
 
     Parameters
     ----------
     measure
         Its name.
-    before, after, floor, placebo : ndarray, shape (1 + draw,)
-        As measured, and as drawn anew; NaN where there is none. Where 2.5 % of the draws or
-        more leave no gap, there may be none to be closed: the share is NaN then.
+    values : tuple of ndarray, shape (1 + draw,)
+        Before and after, as measured, and as drawn anew; NaN where there is none.
+    floor, placebo : ndarray, shape (1 + draw,)
+        Where 2.5 % of the draws or more leave no gap to the floor, there may be none to be
+        closed: the share is NaN then.
+    is_gap
+        Whether what lies between before and floor, as measured, is more than nothing.
     """
-    side = -1.0 if measure == "effect" else 1.0
+    side, (before, after) = -1.0 if measure == "effect" else 1.0, values
     closed = shares(before, after, floor, side)
-    if not (closed[1:] == closed[1:]).mean() >= _HAS_GAP:
+    if not (is_gap and (closed[1:] == closed[1:]).mean() >= _HAS_GAP):
         closed, placebo = np.full_like(closed, np.nan), np.full_like(closed, np.nan)
     return Gap(
         measure=measure,
@@ -128,7 +142,14 @@ def likelihood_gap(
     wrong = np.full(len(before), np.nan)
     if placebo:
         wrong = _sum([_mean(halves, draws, each.gain) for each in placebo])
-    return make_gap("nats_per_step", before, before + gain, before + expected, before + wrong)
+    nats = float(_sum([_sums(halves, draws, each.expected)[0] for each in gains])[0])
+    return make_gap(
+        "nats_per_step",
+        (before, before + gain),
+        before + expected,
+        before + wrong,
+        is_gap=nats >= _LEAST_Z**2 / 2,
+    )
 
 
 def _sum(parts: Sequence[Floats]) -> Floats:
@@ -136,8 +157,13 @@ def _sum(parts: Sequence[Floats]) -> Floats:
 
 
 def _mean(halves: Halves, draws: Draws, steps: Steps) -> Floats:
+    sums, counts = _sums(halves, draws, steps)
+    return sums / np.maximum(counts, 1.0)
+
+
+def _sums(halves: Halves, draws: Draws, steps: Steps) -> tuple[Floats, Floats]:
     sums, counts = steps.by_block(halves.block, len(halves.learnt))
-    return draws.sums(sums) / np.maximum(draws.sums(counts), 1.0)
+    return draws.sums(sums), draws.sums(counts)
 
 
 def effect_gap(halves: Halves, draws: Draws, statistics: tuple[Steps, Steps, Steps | None]) -> Gap:
@@ -157,7 +183,9 @@ def effect_gap(halves: Halves, draws: Draws, statistics: tuple[Steps, Steps, Ste
     before = statistics[0]
     _, counts = before.by_block(halves.block, len(halves.learnt))
     floor = math.sqrt(2 / math.pi) / np.sqrt(np.maximum(draws.sums(counts), 1.0))
-    return make_gap("effect", values[0], values[1], floor, values[2])
+    z = float(values[0][0] * math.sqrt(draws.sums(counts)[0]))
+    pair = (values[0], values[1])
+    return make_gap("effect", pair, floor, values[2], is_gap=z >= _LEAST_Z)
 
 
 def _size(halves: Halves, draws: Draws, steps: Steps) -> Floats:
@@ -206,10 +234,10 @@ def feature_gaps(
     )
     n = len(draws.weights)
     over = [each.of("S", n) / each.top("S", n) for each in (before, after, placebo)]
-    made = [make_gap("S_over_ceiling", over[0], over[1], np.ones(n), over[2])]
+    made = [make_gap("S_over_ceiling", (over[0], over[1]), np.ones(n), over[2])]
     for name in FEATURES:
         ours = [each.of(name, n) for each in (before, after, placebo)]
-        made.append(make_gap(name, ours[0], ours[1], after.top(name, n), ours[2]))
+        made.append(make_gap(name, (ours[0], ours[1]), after.top(name, n), ours[2]))
     return made
 
 
