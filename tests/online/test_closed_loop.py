@@ -100,13 +100,23 @@ def test_the_same_seed_gives_the_same_trial(loop, tmp_path):
 
 
 def test_what_is_whole_is_not_done_again(loop):
-    """The second run finds all up to date; with other options it begins anew."""
+    """The second run finds all up to date."""
     folder, _ = loop
     before = {p: p.stat().st_mtime_ns for p in (folder / "trial").rglob("*.parquet")}
     heard = []
     closed_loop(folder, SHORT, heard.append)
     assert before == {p: p.stat().st_mtime_ns for p in (folder / "trial").rglob("*.parquet")}
     assert {type(event) for event in heard if hasattr(event, "path")} == {UpToDate}
+
+
+def test_another_experiment_is_not_lost(loop):
+    """Where one has ended another one is refused, by what differs; --force begins anew."""
+    folder, _ = loop
+    before = {p: p.read_bytes() for p in (folder / "trial").rglob("*.parquet")}
+    other = dataclasses.replace(SHORT, fish=FishOptions(wariness=0.0))
+    with pytest.raises(InputError, match=r"its fish_wariness is 0\.3, asked for 0\.0"):
+        closed_loop(folder, other, lambda _: None)
+    assert {p: p.read_bytes() for p in (folder / "trial").rglob("*.parquet")} == before
 
 
 def test_a_damaged_record_is_named(loop):

@@ -175,11 +175,30 @@ def lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
 
 
 def is_whole(experiment: Experiment) -> bool:
-    """Return whether this very experiment has ended here."""
+    """Return whether this very experiment has ended here.
+
+    Raises
+    ------
+    InputError
+        Another one has, which is not to be lost.
+    DamagedError
+        What says so is damaged.
+    """
     place = experiment.root / LOOP_NAME
     if not place.is_file():
         return False
-    return bool(read_json(place) == lineage_of_loop(LOOP_NAME, experiment.options).as_dict())
+    said = read_json(place).get("options")
+    asked = lineage_of_loop(LOOP_NAME, experiment.options).options
+    there: dict[str, JSON] = said if isinstance(said, dict) else {}
+    other = [name for name, value in asked.items() if there.get(name) != value]
+    if other:
+        name = other[0]
+        raise InputError(
+            f"{experiment.root}: holds another experiment: its {name} is "
+            f"{there.get(name, 'not known')}, asked for {asked[name]}.",
+            hint="Take another directory, or begin anew with --force.",
+        )
+    return True
 
 
 def keep(experiment: Experiment) -> None:
