@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from zfcal.online.opening import Task
     from zfcal.online.streams import Work
 
+_OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
 _HINT = "Make it again, or copy it again from where it was made."
 
 
 @click.command("report")
 @takes_trials
-@click.option("-o", "--out", "folder", type=PLACE, help="Where it goes.  [default: TRIAL/report]")
+@click.option("-o", "--out", "folder", type=PLACE, help=_OUT)
 @makes_artifacts
 @speaks
 def command(
@@ -36,6 +37,7 @@ def command(
     \b
     Example:
         zfcal report trial
+        zfcal report trial*/
         zfcal report day1 day2 day3 --out together
     """
     from zfcal.online.opening import Task
@@ -47,9 +49,7 @@ def command(
 
     each_trial(out, trials, collect)
     if len(roots) > 1 and folder is None:
-        raise click.UsageError(
-            f"A report over {len(roots)} trials belongs to none of them: give --out FOLDER."
-        )
+        folder = Path("report")
     if roots and not out.exit_code:
         task = Task(dry_run=dry_run, force=force)
         out.attempt(lambda: write_page(out, list(roots), folder, task))

@@ -152,13 +152,15 @@ def test_report_writes_a_page_once(zfcal, trial):
     )
 
 
-def test_a_report_over_several_trials_needs_a_place(zfcal, trial):
-    """It belongs to none of them."""
+def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
+    """It belongs to none of them: it goes where the command was called."""
     zfcal("analyse", "trial")
     zfcal("init", "other", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
     done = zfcal("report", "trial", "other")
-    assert done.code == 2
-    assert "--out" in done.err
+    assert done.code == 0, done.err
+    assert "report/index.html" in done.lines
+    assert (trial.parent / "report" / "intervals.csv").exists()
+    assert not (trial / "report").exists()
 
 
 def test_a_report_names_what_is_damaged_each_time(zfcal, trial):
