@@ -77,6 +77,18 @@ def test_a_trial_that_goes_and_comes_is_no_error(listening):
     assert has_hint(hints, 2 * RESCAN_S)
 
 
+@needs_watchfiles
+def test_what_came_before_it_listened_again_is_a_hint(listening):
+    """A trial that comes back brings its news with it."""
+    root, hints = listening()
+    settle(hints)
+    away = root.rename(root.with_name("away"))
+    settle(hints)
+    (away / "tracks" / "000120.parquet").write_bytes(b"x")
+    away.rename(root)
+    assert has_hint(hints, 2 * RESCAN_S)
+
+
 def test_without_notifications_it_looks_more_often(listening):
     """And no thread runs."""
     root, hints = listening(polls=True)

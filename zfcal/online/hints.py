@@ -81,13 +81,14 @@ class Hints:
     def _run(self) -> None:
         while not self._stop.is_set():
             places = _places(self._root)
+            # Of what came before the watching, too.
+            self._give()
             try:
                 for _ in self._changes(places):
                     self._give()
             except (OSError, RuntimeError):
                 # A folder has just gone, or there are too many watches: the rescans are enough.
                 pass
-            self._give()
             self._stop.wait(0.0 if places and places != _places(self._root) else RESCAN_S)
 
     def _changes(self, places: dict[str, tuple[int, int]]) -> Iterator[None]:
