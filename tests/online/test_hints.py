@@ -41,6 +41,14 @@ def settle(hints):
         pass
 
 
+def taken_away(root, hints):
+    """Return where a trial is that was there, and went away."""
+    settle(hints)
+    away = root.rename(root.with_name("away"))
+    settle(hints)
+    return away
+
+
 @needs_watchfiles
 def test_a_new_file_is_a_hint_at_once_and_a_dot_file_none(listening):
     """Much sooner than the next look; what nobody reads wakes nobody."""
@@ -68,9 +76,7 @@ def test_folders_that_appear_or_are_replaced_are_watched(listening):
 def test_a_trial_that_goes_and_comes_is_no_error(listening):
     """The thread lives on, and hears of what comes later."""
     root, hints = listening()
-    settle(hints)
-    away = root.rename(root.with_name("away"))
-    settle(hints)
+    away = taken_away(root, hints)
     away.rename(root)
     settle(hints)
     (root / "tracks" / "000120.parquet").write_bytes(b"x")
@@ -81,9 +87,7 @@ def test_a_trial_that_goes_and_comes_is_no_error(listening):
 def test_what_came_before_it_listened_again_is_a_hint(listening):
     """A trial that comes back brings its news with it."""
     root, hints = listening()
-    settle(hints)
-    away = root.rename(root.with_name("away"))
-    settle(hints)
+    away = taken_away(root, hints)
     (away / "tracks" / "000120.parquet").write_bytes(b"x")
     away.rename(root)
     assert has_hint(hints, 2 * RESCAN_S)
