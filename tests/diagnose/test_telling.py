@@ -35,6 +35,33 @@ def test_an_interval_of_a_shape_is_not_that_of_the_strength(candidate):
     assert "interval" not in text
 
 
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("turning-memory", {"strength": 4.0}),
+        ("turning-memory", {"strength": -3.99}),
+        ("alignment", {"weight": 50.0}),
+    ],
+)
+def test_a_strength_at_the_end_of_its_range_is_told(candidate, name, values):
+    """The fit went as far as it may: the number is a bound and no estimate."""
+    assert "the end of its range" in says(candidate(name), values, {})
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("turning-memory", {"strength": 3.9}),
+        ("turning-memory", {"strength": 0.0}),
+        ("alignment", {"weight": 0.0}),
+        ("reaction-delay", {"share": 1.0, "delay_s": 0.4}),
+    ],
+)
+def test_an_end_that_nature_sets_is_none(candidate, name, values):
+    """All attention is all there is, and nothing is nothing."""
+    assert "range" not in says(candidate(name), values, {}).split("Fitted")[1]
+
+
 @pytest.mark.parametrize("effect", all_effects(), ids=lambda effect: effect.name)
 def test_every_effect_can_be_told(candidate, effect):
     """One sentence at least for either sign that it can have, and the sentences differ."""

@@ -152,6 +152,13 @@ def test_tables_hold_every_number(make_sheet):
     assert "gap-numbers" not in {table.name for table in tables(make_sheet())}
 
 
+def test_a_recording_that_nobody_makes_is_not_counted_in_minutes(make_sheet):
+    """Fish of one speed would show a burst after years: that is no advice."""
+    asked = [Screened(name="freezing", z=0.1, p=1.0, minutes_needed=2.5e8)]
+    by_name = {table.name: table for table in tables(make_sheet(screened=tuple(asked)))}
+    assert by_name["candidates"].rows[0][3] == "over 10,080"
+
+
 def test_page_and_pictures_are_written_and_found_again(make_sheet, tmp_path, undrawn):
     """The page says which findings it shows, and holds nothing from elsewhere."""
     sheet = make_sheet(gap=gap_of(nats_per_step=0.8), names=("alignment", "generic:heading:wall"))

@@ -5,6 +5,9 @@ from __future__ import annotations
 from zfcal.diagnose.candidates import Candidate
 from zfcal.model.effects.base import EffectParameter
 
+_AT_ITS_END = 0.01
+"""Share of a range within which a strength is at its end: the fit went as far as it may."""
+
 
 def says(
     candidate: Candidate, values: dict[str, float], interval: dict[str, tuple[float, float]]
@@ -32,4 +35,17 @@ def _size(
     if strength.name in interval:
         low, high = interval[strength.name]
         text += f" (95 % interval {low:.3g} to {high:.3g})"
-    return f"{text}. {strength.says}"
+    return f"{text}. {strength.says}{_at_an_end(strength, value)}"
+
+
+def _at_an_end(strength: EffectParameter, value: float) -> str:
+    """Return what to make of a strength at an end of its range that nature does not set."""
+    low, high = strength.low, strength.high
+    natural = (0.0, 1.0) if (low, high) == (0.0, 1.0) else (0.0,)
+    near = _AT_ITS_END * (high - low)
+    if not any(abs(value - end) <= near for end in (low, high) if end not in natural):
+        return ""
+    return (
+        f" This is the end of its range, {low:g} to {high:g}: the data may ask for more than that, "
+        "or for another form."
+    )

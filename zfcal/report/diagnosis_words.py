@@ -15,6 +15,9 @@ _NONE = "–"
 _MOST_OPEN = 12
 """A longer table is folded."""
 
+_A_WEEK_MIN = 7 * 24 * 60
+"""Nobody records for longer: the recording cannot show it at all."""
+
 
 def verdict_sentence(findings: Findings) -> str:
     """Return what a diagnosis comes to, in one sentence."""
@@ -146,7 +149,7 @@ def _of_chance(findings: Findings) -> Iterator[Statement]:
         soonest = min(waiting, key=lambda each: each.minutes_needed or 0.0)
         said.append(
             f"Asking needs a longer recording for {_listed([each.name for each in waiting])}: "
-            f"at least {soonest.minutes_needed:.0f} min for {soonest.name}."
+            f"at least {_needed(soonest.minutes_needed)} min for {soonest.name}."
         )
     lacking = [f"{each.name} ({each.lacks})" for each in untestable if each.lacks]
     if lacking:
@@ -156,6 +159,12 @@ def _of_chance(findings: Findings) -> Iterator[Statement]:
 
 def _number(value: float, digits: int = 3) -> str:
     return _NONE if math.isnan(value) else f"{value:.{digits}g}"
+
+
+def _needed(minutes: float | None) -> str:
+    if minutes is None:
+        return _NONE
+    return f"{minutes:.0f}" if minutes < _A_WEEK_MIN else f"over {_A_WEEK_MIN:,}"
 
 
 def _folded(n: int, what: str) -> str:
@@ -196,7 +205,7 @@ def _screened_table(findings: Findings) -> Table:
             each.name,
             _number(each.z, 2),
             _number(each.p, 2),
-            _NONE if each.minutes_needed is None else f"{each.minutes_needed:.0f}",
+            _needed(each.minutes_needed),
             each.lacks or _NONE,
         ]
         for each in ordered
