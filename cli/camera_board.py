@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from .camera_options import aim_of, numbers, place_options
-from .options import EXISTING, PLACE, makes_artifacts, speaks
+from .options import EXISTING, PLACE, FiniteRange, makes_artifacts, speaks
 from .output import Output
 
 Command = Callable[..., None]
@@ -47,7 +47,10 @@ def board_options(command: Command) -> Command:
                 help="Inner corners, such as 9x6 for 10 by 7 squares.",
             ),
             click.option(
-                "--square-mm", type=float, required=True, help="Side of a square, in millimetres."
+                "--square-mm",
+                type=FiniteRange(min=0, min_open=True),
+                required=True,
+                help="Side of a square, in millimetres.",
             ),
             click.option("--charuco", is_flag=True, help="The white squares hold markers."),
         )

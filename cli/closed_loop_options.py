@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .durations import seconds
-from .options import Command
+from .options import Command, FiniteRange
 
 _PRESENT = (
     "real_time", "no_video", "duration_s", "generations", "champion", "budget_s", "robot", "seed",
@@ -76,12 +76,26 @@ _OPTIONS = (
     ),
     click.option("--seed", type=click.IntRange(min=0), help="Of everything.  [default: 1]"),
     click.option(
-        "--wariness", type=float, help="Log of the attention that the robot loses.  [default: 0.3]"
+        "--wariness",
+        type=FiniteRange(-3, 5),
+        help="Log of the attention that the robot loses.  [default: 0.3]",
     ),
-    click.option("--between-sd", type=float, help="How trials differ, sd of logs.  [default: 0.2]"),
     click.option(
-        "--drift-sd", type=float, help="How parameters drift, sd of logs.  [default: 0.1]"
+        "--between-sd",
+        type=FiniteRange(min=0),
+        help="How trials differ, sd of logs.  [default: 0.2]",
     ),
-    click.option("--drift-s", type=float, help="Correlation time of the drift.  [default: 600]"),
-    click.option("--noise-mm", type=float, help="Position noise of the tracker.  [default: 0.4]"),
+    click.option(
+        "--drift-sd",
+        type=FiniteRange(min=0),
+        help="How parameters drift, sd of logs.  [default: 0.1]",
+    ),
+    click.option(
+        "--drift-s",
+        type=FiniteRange(min=0, min_open=True),
+        help="Correlation time of the drift.  [default: 600]",
+    ),
+    click.option(
+        "--noise-mm", type=FiniteRange(min=0), help="Position noise of the tracker.  [default: 0.4]"
+    ),
 )

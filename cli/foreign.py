@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import Command
+from .options import Command, FiniteRange
 
 # Written out, since the library that knows them is heavy; a test compares the two.
 FORMATS = (
@@ -53,13 +53,19 @@ def _body_axis(text: str) -> tuple[str, str]:
 
 
 _OPTIONS: tuple[Callable[[Command], Command], ...] = (
-    click.option("--fps", type=float, help="Frame rate; must be that of trial.toml."),
-    click.option("--mm-per-px", type=float, help="Scale of a file in pixels."),
+    click.option(
+        "--fps",
+        type=FiniteRange(min=0, min_open=True),
+        help="Frame rate; must be that of trial.toml.",
+    ),
+    click.option(
+        "--mm-per-px", type=FiniteRange(min=0, min_open=True), help="Scale of a file in pixels."
+    ),
     click.option(
         "--origin", type=_pair, metavar="X,Y", help="Point of the file that becomes (0, 0)."
     ),
     click.option("--flip-y", is_flag=True, help="y counts downwards in the file: turn it up."),
-    click.option("--noise-mm", type=float, help="Position noise, sd per coordinate."),
+    click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate."),
     click.option("--robots", type=_names, metavar="NAME,...", help="Agents that are robots."),
     click.option(
         "--columns", type=_columns, metavar="OURS=THEIRS,...", help="Names of a CSV's columns."
@@ -68,7 +74,9 @@ _OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.option("--body-axis", type=_body_axis, metavar="BACK,FRONT", help="Gives the heading."),
     click.option("--box", type=click.Choice(["corner", "centre"]), help="What x, y of MOT are."),
     click.option("--first-frame", type=int, help="Number of the first frame in the file."),
-    click.option("--min-confidence", type=float, help="Positions below it count as missing."),
+    click.option(
+        "--min-confidence", type=FiniteRange(min=0), help="Positions below it count as missing."
+    ),
 )
 
 

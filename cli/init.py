@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from .options import PLACE, arena_options, count_robots, makes_artifacts, seed_option, speaks
+from .options import (
+    PLACE,
+    FiniteRange,
+    arena_options,
+    count_robots,
+    makes_artifacts,
+    seed_option,
+    speaks,
+)
 from .output import Output
 
 
@@ -14,9 +22,17 @@ from .output import Output
 @click.argument("trial", type=PLACE)
 @arena_options
 @click.option(
-    "--fps", type=float, default=15.0, show_default=True, help="Frame rate of the tracks."
+    "--fps",
+    type=FiniteRange(min=0, min_open=True),
+    default=15.0,
+    show_default=True,
+    help="Frame rate of the tracks.",
 )
-@click.option("--dt-s", type=float, help="The model's step; default: frames nearest to 0.2 s.")
+@click.option(
+    "--dt-s",
+    type=FiniteRange(min=0, min_open=True),
+    help="The model's step; default: frames nearest to 0.2 s.",
+)
 @seed_option("All random numbers of the trial derive from it.  [default: 0]")
 @click.option("--source", default="", help="Where the data come from, in words.")
 @makes_artifacts

@@ -92,8 +92,16 @@ def arena_options(command: Command) -> Command:
                 metavar="NAME|FILE",
                 help="An arena by name, or a GeoJSON file in metres.",
             ),
-            click.option("--radius-m", type=float, help="Radius of a circular arena, in metres."),
-            click.option("--side-m", type=float, help="Side of an open-square arena, in metres."),
+            click.option(
+                "--radius-m",
+                type=FiniteRange(min=0, min_open=True),
+                help="Radius of a circular arena, in metres.",
+            ),
+            click.option(
+                "--side-m",
+                type=FiniteRange(min=0, min_open=True),
+                help="Side of an open-square arena, in metres.",
+            ),
             click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Number of fish."),
             click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
             click.option(
@@ -131,7 +139,9 @@ def new_trial_options(command: Command) -> Command:
             click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Its fish."),
             click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
             click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Its robots."),
-            click.option("--fps", type=float, help="Its frame rate, in hertz."),
+            click.option(
+                "--fps", type=FiniteRange(min=0, min_open=True), help="Its frame rate, in hertz."
+            ),
         )
     ):
         decorated = option(decorated)

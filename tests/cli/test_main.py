@@ -159,6 +159,10 @@ def test_wrong_usage_ends_with_2_and_names_the_help(zfcal, words):
     [
         ["diagnose", "t", "--quick", "--noise-mm"],
         ["drive", "t", "--port", "virtual", "--radius-mm"],
+        ["init", "t", "--fish", "3", "--side-m"],
+        ["init", "t", "--fish", "3", "--fps"],
+        ["import", "t.csv", "t", "--mm-per-px"],
+        ["demo", "t", "--closed-loop", "--drift-s"],
     ],
 )
 def test_what_is_no_finite_number_is_wrong_usage(zfcal, words, number):
