@@ -59,7 +59,8 @@ format: install  ## Format the code
 bench: .venv/.benched  ## Measure what the documentation states; report what became worse
 	@for script in $(filter-out %/bench_diagnosis.py,$(wildcard benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
 
-# Takes a day; what is done stays in build/bench-diagnosis. BENCH_OPTIONS="--quick --minutes 60", for example.
+# Takes a day; what is done stays in build/bench-diagnosis, and with --write among the results, from which any
+# machine goes on. BENCH_OPTIONS="--quick --minutes 60", for example.
 bench-diagnosis: install  ## Hide effects in trials and count how often the diagnosis is right
 	$(BIN)/python benchmarks/bench_diagnosis.py --workers $(WORKERS) $(BENCH_OPTIONS)
 

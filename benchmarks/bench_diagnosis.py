@@ -2,7 +2,8 @@
 
 Trials that are done stay in ``build/bench-diagnosis``, a line each; a second run does what is
 missing, or what was done by other code. The summary goes to ``build/benchmarks``, with
-``--write`` to ``benchmarks/results`` and ``docs``.
+``--write`` to ``benchmarks/results`` and ``docs``: with every trial, from which a run on another
+machine goes on.
 
     .venv/bin/python benchmarks/bench_diagnosis.py --workers 2
     .venv/bin/python benchmarks/bench_diagnosis.py --quick --minutes 60
@@ -29,10 +30,11 @@ import diagnosis_ledger as ledger
 import diagnosis_summary
 import diagnosis_trial
 from diagnosis_plan import EXTEND, SECTIONS, TIME, Job, Scale, plan
-from measuring import ROOT, machine
+from measuring import RESULTS, ROOT, machine
 from regressions import Places, parser, places
 
 BUILD = ROOT / "build" / "bench-diagnosis"
+PACKED = "diagnosis-trials.jsonl.gz"
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -47,14 +49,19 @@ class Desk:
         One ledger for each section.
     marks
         Fingerprint of the code of each section.
+    packed
+        Trials of all sections that were made elsewhere.
     """
 
     folder: Path
     marks: dict[str, str]
+    packed: Sequence[ledger.Row] = ()
 
     def rows(self, section: str) -> dict[str, ledger.Row]:
         """Return the rows of a section that the present code has made, by key."""
-        return ledger.current(ledger.read(self.folder / f"{section}.jsonl"), self.marks)
+        made = [row for row in self.packed if row["section"] == section]
+        made += ledger.read(self.folder / f"{section}.jsonl")
+        return ledger.current(made, self.marks)
 
     def n_stale(self, section: str) -> int:
         """Return how many rows of a section other code has made."""
@@ -196,7 +203,11 @@ def main() -> None:
 
     scale = Scale(**{each.name: getattr(options, each.name) for each in fields(Scale)})
     jobs = plan(scale, LISTED, UNLISTED, quick=options.quick)
-    desk = Desk(folder=options.build, marks=diagnosis_trial.marks(SECTIONS))
+    desk = Desk(
+        folder=options.build,
+        marks=diagnosis_trial.marks(SECTIONS),
+        packed=ledger.read(RESULTS / PACKED),
+    )
     deadline_s = time.monotonic() + 60 * options.minutes
     todo = [] if options.report else missing(jobs, desk, options.sections)
     alone = [job for job in todo if job.section == TIME]
@@ -204,8 +215,10 @@ def main() -> None:
     for part, workers in ((alone, 1), (together, options.workers)):
         if part:
             work(part, desk, workers=workers, deadline_s=deadline_s)
-    full = plan(Scale(), LISTED, UNLISTED, quick=options.quick)
-    publish(summary(desk, full), places(options))
+    full, place = plan(Scale(), LISTED, UNLISTED, quick=options.quick), places(options)
+    publish(summary(desk, full), place)
+    made = [row for section in desk.marks for row in desk.rows(section).values()]
+    ledger.pack(place.results / PACKED, made)
     if stale := sum(map(desk.n_stale, SECTIONS)):
         print(f"{stale} trials were made by other code and do not count.", file=sys.stderr)
 

@@ -7,6 +7,7 @@ stopped goes on, and one after a change of the code begins again.
 from __future__ import annotations
 
 import ast
+import gzip
 import hashlib
 import json
 import os
@@ -70,7 +71,7 @@ def _is_text(node: ast.AST) -> bool:
 
 
 def read(path: Path) -> list[Row]:
-    """Return the rows of a ledger; a last line that a kill has torn is left out.
+    """Return the rows of a ledger, packed or not; a last line that a kill has torn is left out.
 
     Raises
     ------
@@ -79,7 +80,9 @@ def read(path: Path) -> list[Row]:
     """
     if not path.exists():
         return []
-    lines = path.read_text(encoding="utf-8").split("\n")
+    data = path.read_bytes()
+    text = gzip.decompress(data) if path.suffix == ".gz" else data
+    lines = text.decode().split("\n")
     rows = []
     for number, line in enumerate(lines):
         try:
@@ -99,6 +102,13 @@ def append(path: Path, row: Row) -> None:
         file.write(json.dumps(row) + "\n")
         file.flush()
         os.fsync(file.fileno())
+
+
+def pack(path: Path, rows: Iterable[Row]) -> None:
+    """Write rows as one packed ledger; the same rows give the same bytes."""
+    lines = sorted(json.dumps(row, sort_keys=True) for row in rows)
+    text = "".join(f"{line}\n" for line in lines)
+    path.write_bytes(gzip.compress(text.encode(), mtime=0))
 
 
 def _cut_torn(path: Path) -> None:

@@ -248,6 +248,33 @@ def test_a_second_run_does_what_is_missing_or_has_failed(bench, planned, tmp_pat
     assert desk.n_stale("listed") == 1
 
 
+def test_a_run_goes_on_from_trials_that_were_made_elsewhere(bench, ledger, tmp_path):
+    """Those of the present code count; what is made here goes before."""
+    made = [
+        {"section": "listed", "key": "a", "code": "new", "verdict": "named"},
+        {"section": "listed", "key": "b", "code": "old", "verdict": "named"},
+        {"section": "nulls", "key": "c", "code": "new", "verdict": "no-effect"},
+        {"section": "listed", "key": "d", "code": "new", "verdict": "error"},
+    ]
+    ledger.pack(tmp_path / "there.jsonl.gz", made)
+    marks = {"listed": "new", "nulls": "new"}
+    packed = ledger.read(tmp_path / "there.jsonl.gz")
+    desk = bench.Desk(folder=tmp_path / "here", marks=marks, packed=packed)
+    desk.keep("listed", {"key": "d", "verdict": "tie"})
+
+    found = desk.rows("listed")
+    assert {key: row["verdict"] for key, row in found.items()} == {"a": "named", "d": "tie"}
+    assert set(desk.rows("nulls")) == {"c"}
+
+
+def test_the_same_trials_are_packed_to_the_same_bytes(ledger, tmp_path):
+    """Whatever their order and the time of day."""
+    made = [{"key": "a", "n": 1}, {"n": 2, "key": "b"}]
+    ledger.pack(tmp_path / "one.gz", made)
+    ledger.pack(tmp_path / "other.gz", [{"key": "b", "n": 2}, made[0]])
+    assert (tmp_path / "one.gz").read_bytes() == (tmp_path / "other.gz").read_bytes()
+
+
 def test_a_section_that_cannot_be_run_says_what_it_needs(bench, planned, monkeypatch, tmp_path):
     """And is left out of what is missing."""
     trial = sys.modules["diagnosis_trial"]
