@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from .streams import STDIN
 
 if TYPE_CHECKING:
     from zfcal.online.diagnose import DiagnoseOptions
+    from zfcal.online.events import Event
     from zfcal.online.opening import Task
 
 
@@ -52,8 +54,26 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 
 
 def diagnose_one(out: Output, root: Path, chosen: DiagnoseOptions, task: Task) -> None:
-    """Diagnose one trial and draw its page."""
+    """Diagnose one trial, draw its page, and say in words what it comes to."""
     from zfcal.online.diagnose import diagnose
     from zfcal.report import diagnosis_page
 
-    diagnose(root, chosen, out.tell, task=task, draw=diagnosis_page)
+    tell = functools.partial(tell_and_warn, out, root, in_words=True)
+    diagnose(root, chosen, tell, task=task, draw=diagnosis_page)
+
+
+def tell_and_warn(out: Output, root: Path, event: Event, *, in_words: bool = False) -> None:
+    """Pass an event on; warn of findings that are not to be trusted, and say their verdict."""
+    from zfcal.diagnose.document import read_document
+    from zfcal.online.events import Note, Result
+    from zfcal.report.diagnosis_words import fired_control, verdict_sentence
+
+    out.tell(event)
+    if not isinstance(event, Result):
+        return
+    findings = read_document(event.value)
+    if says := fired_control(findings):
+        out.tell(Note(text=f"{root}: {says}", warning=True))
+    # The document of several trials holds their verdicts, and all that is said.
+    if in_words and (out.bare or not out.as_json):
+        out.note(f"{root}: {verdict_sentence(findings)}.")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .diagnosis import tell_and_warn
 from .output import Output
 from .streams import STDIN
 
@@ -62,4 +64,5 @@ def extend_one(out: Output, root: Path, chosen: ExtendOptions, task: Task) -> No
     from zfcal.online.extend import extend
     from zfcal.report import diagnosis_page
 
-    extend(root, chosen, out.tell, task=task, draw=diagnosis_page)
+    tell = functools.partial(tell_and_warn, out, root)
+    extend(root, chosen, tell, task=task, draw=diagnosis_page)

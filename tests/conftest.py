@@ -177,8 +177,11 @@ def make_diagnosis():
             Screened(name="alignment", z=14.2, p=1e-12, shape={"kappa": 12.0}),
             Screened(name="group-cohesion", z=-3.1, p=0.2),
             Screened(name="turning-bias", z=0.4, p=0.9),
-            Screened(name="boldness", z=math.nan, p=math.nan, minutes_needed=45.0),
-            Screened(name="robot-avoidance", z=math.nan, p=math.nan, lacks="a robot"),
+            Screened(
+                name="leader-following", z=math.nan, p=1.0, lacks="tracks of 60 s under one id"
+            ),
+            Screened(name="robot-avoidance", z=math.nan, p=1.0, lacks="a robot"),
+            Screened(name="boldness", z=0.4, p=1.0, minutes_needed=45.0),
         )
         where = (
             Located(

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from zfcal.artifacts.validation import check
+from zfcal.diagnose.findings import Note
 from zfcal.online.diagnose import KnownNoise
 
 
@@ -56,6 +57,38 @@ def test_json_is_the_document_itself(zfcal, trial, answered):
         document = json.loads(found.out)
         check(document, "findings", "stdout")
         assert document == json.loads((trial / "diagnosis" / "findings.json").read_text())
+
+
+def test_the_verdict_in_words_goes_to_the_person(zfcal, trial, answered):
+    """Once, also when all is up to date; not with -q, and never among the paths."""
+    for _ in range(2):
+        found = zfcal("diagnose", "trial")
+        assert found.err.count("trial: The model lacks alignment.") == 1
+        assert "lacks" not in found.out
+    assert "lacks" not in zfcal("diagnose", "trial", "-q").err
+    assert "lacks" not in zfcal("diagnose", "trial", "--force", "--dry-run").err
+    assert "trial: The model lacks alignment." in zfcal("diagnose", "trial", "--json").err
+
+
+def test_the_document_of_several_trials_has_no_second_verdict(zfcal, trial, answered):
+    """It stands in the findings of each."""
+    found = zfcal("diagnose", "trial", "trial", "--json")
+    assert "lacks" not in json.dumps(json.loads(found.out)["messages"])
+
+
+@pytest.mark.parametrize("command", ["diagnose", "extend"])
+def test_a_control_that_fires_is_a_warning(
+    zfcal, trial, answered, monkeypatch, make_diagnosis, command
+):
+    """Extending does not go on in silence either."""
+    note = Note(name="controls", says="NEGATIVE CONTROL FIRES: a shuffled turn. Do not trust it.")
+    monkeypatch.setattr(
+        "zfcal.online.diagnose._engine",
+        lambda question, _: make_diagnosis(question.arena, question.model, names=(), notes=(note,)),
+    )
+    found = zfcal(command, "trial")
+    assert f"warning: trial: {note.says}" in found.err
+    assert "CONTROL" not in found.out
 
 
 def test_json_of_a_failure_says_what_is_wrong(zfcal, trial, answered):

@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from zfcal.diagnose import case
 from zfcal.diagnose.document import Sheet, findings_document, gap_document, read_document
-from zfcal.diagnose.findings import Gap, Screened, Verdict
+from zfcal.diagnose.findings import Gap, Note, Screened, Verdict
 from zfcal.parameters import natural
-from zfcal.report import diagnosis_page, theme
+from zfcal.report import diagnosis_page, diagnosis_words, theme
 from zfcal.report.diagnosis_figures import finding_picture, shown_places, slug
 from zfcal.report.diagnosis_overview import gap_picture, screened_picture
 from zfcal.report.diagnosis_words import statements, tables, verdict_sentence
@@ -130,6 +131,102 @@ def test_a_tie_names_all_that_it_may_be(make_sheet):
     assert "cannot be told from group-cohesion" in statements(findings)[0].answer
 
 
+@pytest.mark.parametrize(
+    ("ties", "says"),
+    [
+        (
+            [("b",), (), ("e", "f")],
+            (
+                "either a or b, which this recording cannot tell apart, c and either d or e or f, "
+                "which this recording cannot tell apart"
+            ),
+        ),
+        ([("b",), ()], "either a or b, which this recording cannot tell apart, and c"),
+        ([(), ("d",)], "a and either c or d, which this recording cannot tell apart"),
+    ],
+)
+def test_a_tie_does_not_hide_the_other_effects(make_sheet, ties, says):
+    """Each effect is named, with what it cannot be told from."""
+    effect = make_sheet().findings.effects[0]
+    effects = tuple(
+        replace(effect, name=name, ties=tied) for name, tied in zip("acd", ties, strict=False)
+    )
+    verdict = Verdict.TIE if ties[0] else Verdict.NAMED
+    findings = replace(make_sheet().findings, verdict=verdict, effects=effects)
+    assert verdict_sentence(findings) == f"The model lacks {says}"
+
+
+def noted(make_sheet, names=("alignment",), **values):
+    """Return findings with these numbers in their notes, such as ``omnibus={"p": 0.1}``."""
+    notes = tuple(Note(name=name, says="Says.", values=each) for name, each in values.items())
+    return make_sheet(names=names, notes=notes).findings
+
+
+def card(findings, question):
+    """Return the card with a question; None without it."""
+    return next((each for each in statements(findings) if each.question == question), None)
+
+
+FULL, QUICK = {"replicates": 39.0}, {"replicates": 6.0}
+SHARP, NOISY = {"noise_m": 1e-5}, {"noise_m": 5e-4}
+
+
+@pytest.mark.parametrize(
+    ("p", "null", "noise", "says"),
+    [
+        (0.2, FULL, NOISY, "With it in the model, nothing is left that the ranks of headings"),
+        (0.2, FULL, {}, "(by chance alone in 20 % of recordings)"),
+        (1e-5, FULL, NOISY, "model and fish still disagree (by chance alone in less than 0.01 %"),
+        (1e-3, {"replicates": 0.0}, SHARP, "nothing is left"),
+        (9e-4, {"replicates": 0.0}, SHARP, "its fitted size is then that of our form"),
+        (0.2, QUICK, NOISY, "without --quick"),
+        (1e-5, QUICK, {}, "A quick look cannot tell"),
+        (1e-5, {}, NOISY, "A quick look cannot tell"),
+    ],
+)
+def test_whether_the_model_with_the_effect_still_fails(make_sheet, p, null, noise, says):
+    """By the omnibus test where it was held against something, right after the effects."""
+    findings = noted(make_sheet, omnibus={"z": 3.0, "p": p}, null=null, noise=noise)
+    assert statements(findings)[1] == card(findings, "Is anything left?")
+    assert says in card(findings, "Is anything left?").answer
+
+
+def test_what_is_left_beside_several_effects_or_none(make_sheet):
+    """They are several there; without an effect the verdict says it already."""
+    values = {"omnibus": {"z": 9.0, "p": 1e-9}, "null": FULL}
+    both = card(noted(make_sheet, names=("a", "b"), **values), "Is anything left?")
+    assert both.answer.startswith("Yes: with them in the model")
+    assert "another effect is beside them" in both.answer
+    assert card(noted(make_sheet, names=(), **values), "Is anything left?") is None
+    unknown = noted(make_sheet, omnibus={"z": math.nan, "p": math.nan}, null=FULL)
+    assert card(unknown, "Is anything left?") is None
+
+
+def test_a_quick_look_is_told_by_what_makes_it_one():
+    """The page does not import the engine, which takes seconds, for three numbers."""
+    assert diagnosis_words.QUICK_REPLICATES == case.QUICK_REPLICATES
+    assert diagnosis_words.SHARP_M == case._SHARP_M
+    assert diagnosis_words.UNLIKE == case._UNEXPLAINED
+
+
+def test_a_control_that_fires_is_the_first_card(make_sheet):
+    """With the engine's words; controls that are silent have none."""
+    says = "NEGATIVE CONTROL FIRES: a shuffled turn. Do not trust this diagnosis."
+    fired = make_sheet(notes=(Note(name="controls", says=says, values={"z": 9.0}),)).findings
+    first = statements(fired)[0]
+    assert first.question == "Warning"
+    assert first.answer.startswith(says)
+    silent = "Negative controls are silent, as they must be."
+    findings = make_sheet(notes=(Note(name="controls", says=silent, values={}),)).findings
+    assert card(findings, "Warning") is None
+
+
+def test_the_engine_says_that_a_control_fires_in_the_words_that_are_looked_for(repository):
+    """It would be silent on the page otherwise."""
+    engine = (repository / "zfcal" / "diagnose" / "diagnose.py").read_text(encoding="utf-8")
+    assert f'"{diagnosis_words.FIRES}: ' in engine
+
+
 def test_cards_say_what_is_missing_how_much_and_what_else_was_asked(make_sheet):
     """The gap's card names the placebo."""
     cards = statements(make_sheet(gap=gap_of(nats_per_step=0.8)).findings)
@@ -137,8 +234,50 @@ def test_cards_say_what_is_missing_how_much_and_what_else_was_asked(make_sheet):
     assert "less than 0.01 %" in cards[0].answer
     assert "80 % (70 to 90)" in cards[1].answer
     assert "a wrong effect with as many parameters, 2 %" in cards[1].answer
-    assert "at least 45 min for boldness" in cards[2].answer
+    assert "a diagnosis chooses its effects on all" in cards[1].answer
+    assert "4 candidates were asked for" in cards[2].answer
     assert "robot-avoidance (a robot)" in cards[2].answer
+
+
+def test_the_card_of_the_gap_says_what_was_added(make_sheet):
+    """It need not be what was found: anything can be added by its name."""
+    says = "Added: turning-bias. Wrong effect for comparison: boldness."
+    notes = (Note(name="extended", says=says, values={}),)
+    findings = make_sheet(gap=gap_of(nats_per_step=0.8), notes=notes).findings
+    found = card(findings, "How much better is the model with what was added?")
+    assert found.answer.startswith(f"{says} On minutes that neither fit has seen, what was added")
+    assert "80 % (70 to 90)" in found.answer
+
+
+def test_what_was_fitted_and_what_was_calibrated_is_said(make_sheet):
+    """Two of the measures are of the models before they were calibrated."""
+    gap = gap_of(nats_per_step=0.8)
+    (table,) = (each for each in tables(make_sheet(gap=gap)) if each.name == "gap-numbers")
+    assert "as fitted, before they are calibrated" in table.note
+    assert "as fitted; the other rows are of the same three after" in gap_picture(gap).note
+
+
+def test_what_a_recording_is_too_short_for_is_not_called_not_missing(make_sheet):
+    """However loud; the effect that needs least says how many minutes would do."""
+    asked = (
+        Screened(name="alignment", z=14.2, p=1e-12),
+        Screened(name="boldness", z=2.4, p=0.9, minutes_needed=145.0),
+        Screened(name="fatigue", z=0.1, p=1.0, minutes_needed=45.0),
+        Screened(name="crowding", z=-1.4, p=1.0),
+    )
+    answer = card(make_sheet(screened=asked).findings, "What else was asked?").answer
+    assert "Of those not missing the loudest is crowding, z = -1.4." in answer
+    assert (
+        "This recording is too short to show these where they are faint: boldness and fatigue; "
+        "45 min would do for fatigue."
+    ) in answer
+
+
+def test_an_effect_that_was_found_does_not_wait_for_more_minutes(make_sheet):
+    """Beside another it may have been faint at first."""
+    asked = (Screened(name="alignment", z=1.0, p=0.9, minutes_needed=45.0),)
+    answer = card(make_sheet(screened=asked).findings, "What else was asked?").answer
+    assert "too short" not in answer
 
 
 def test_tables_hold_every_number(make_sheet):
@@ -157,6 +296,8 @@ def test_a_recording_that_nobody_makes_is_not_counted_in_minutes(make_sheet):
     asked = [Screened(name="freezing", z=0.1, p=1.0, minutes_needed=2.5e8)]
     by_name = {table.name: table for table in tables(make_sheet(screened=tuple(asked)))}
     assert by_name["candidates"].rows[0][3] == "over 10,080"
+    answer = card(make_sheet(screened=tuple(asked)).findings, "What else was asked?").answer
+    assert answer.endswith("faint: freezing; a week would not do.")
 
 
 def test_page_and_pictures_are_written_and_found_again(make_sheet, tmp_path, undrawn):
@@ -256,8 +397,52 @@ def test_overviews_do_not_cover_their_texts(make_sheet, covered_texts):
     many = [Screened(name=f"effect-number-{i}", z=3.0 * i - 20, p=0.1) for i in range(30)]
     assert not covered_texts(screened_picture(many, ["effect-number-3"]))
     assert not covered_texts(screened_picture(many[:1], []))
+    waiting = replace(many[1], minutes_needed=45.0)
+    assert not covered_texts(screened_picture([*many, waiting], ["effect-number-3"]))
     gap = gap_of(nats_per_step=0.9, S_over_ceiling=-3.0, D=7.0, W=0.5, O=0.1, T=0.2, effect=1.0)
     assert not covered_texts(gap_picture(gap))
+
+
+def test_a_candidate_that_needs_more_minutes_is_hollow(make_sheet):
+    """It is not said to be not missing; without one the key has no such mark."""
+    asked = [
+        Screened(name="a", z=9.0, p=1e-9),
+        Screened(name="b", z=0.4, p=1.0),
+        Screened(name="c", z=0.2, p=1.0, minutes_needed=45.0),
+    ]
+    picture = screened_picture(asked, ["a"])
+    assert [entry.label for entry in picture.key] == [
+        "missing",
+        "not missing",
+        "too short to say",
+        "within chance",
+    ]
+    with theme.style():
+        points = compose(picture).axes[0].lines[2::2]
+        inside = {line.get_ydata()[0]: line.get_markerfacecolor() for line in points}
+    assert inside == {0: theme.GROUND, 1: theme.MUTED, 2: theme.MODEL}
+    assert "too short to say" not in {entry.label for entry in screened_picture(asked[:2], []).key}
+
+
+@pytest.mark.parametrize(
+    "cue",
+    [
+        "distance to the nearest neighbour (cm)",
+        "distance to the wall (cm)",
+        "speed of the step before (cm/s)",
+        "time (min)",
+    ],
+)
+def test_the_curve_is_called_after_what_it_goes_by(make_sheet, two_rooms, covered_texts, cue):
+    """An effect may respond to something else."""
+    pictured = make_sheet().findings.pictured[0]
+    response = "score of the effect (standard deviations a step)"
+    curve = replace(pictured.curve, cue_name=cue, response_name=response)
+    picture = finding_picture("alignment", 1, replace(pictured, curve=curve), two_rooms)
+    assert picture.panels[2].title == f"By {cue.partition(' (')[0]}"
+    assert not covered_texts(picture)
+    # As on the page, where each panel has a place of its own.
+    assert not covered_texts(replace(picture, panels=picture.panels[2:3], key=()))
 
 
 @pytest.mark.parametrize(
@@ -272,13 +457,9 @@ def test_overviews_do_not_cover_their_texts(make_sheet, covered_texts):
 def test_a_share_that_may_be_none_or_all_is_no_figure(make_sheet, interval, says, figure):
     """A gap next to nothing is not said to be closed by so many hundred per cent."""
     gap = [dataclasses.replace(each, interval=interval) for each in gap_of(nats_per_step=0.8)]
-    card = next(
-        each
-        for each in statements(make_sheet(gap=gap).findings)
-        if each.question == "How much better is the model with it?"
-    )
-    assert says in card.answer
-    assert card.figure[0] == figure
+    found = card(make_sheet(gap=gap).findings, "How much better is the model with it?")
+    assert says in found.answer
+    assert found.figure[0] == figure
 
 
 def test_without_candidates_and_gap_there_are_no_overviews():

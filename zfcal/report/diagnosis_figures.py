@@ -1,4 +1,4 @@
-"""Pictures of one finding: where in the tank, when, in whom, and against what it responds to."""
+"""Pictures of one finding: where in the tank, when, in whom, and by distance, speed or time."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def _curve_panel(curve: Curve) -> Panel | None:
         for expected in (curve.before, curve.after)
     ]
     return Panel(
-        title="What the fish respond to",
+        title=f"By {_without_unit(curve.cue_name)}",
         alt=f"{curve.response_name} against {curve.cue_name}: the model misses what was measured "
         f"by {errors[0]:.3g} without the effect and by {errors[1]:.3g} with it (root mean square).",
         draw=partial(_draw_curve, curve=curve),
@@ -193,6 +193,10 @@ def _draw_curve(axes: Axes, *, curve: Curve) -> None:
     axes.plot(curve.cue, curve.observed, color=MEASURED, ls="none", marker="o", ms=6, zorder=4)
     axes.set(xlabel=_lines(curve.cue_name, 42), ylabel=_lines(curve.response_name, 28))
     axes.xaxis.set_major_locator(MaxNLocator(6))
+
+
+def _without_unit(name: str) -> str:
+    return re.sub(r" \([^()]*\)$", "", name)
 
 
 def _lines(text: str, width: int) -> str:

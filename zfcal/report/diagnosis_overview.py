@@ -18,6 +18,10 @@ _ROW_IN = 0.24
 _RIGHT = 2.0
 """A right model's z is smaller than this nineteen times of twenty."""
 
+_MISSING = Entry(label="missing", colour=theme.MODEL, mark="points", marker="D")
+_NOT_MISSING = Entry(label="not missing", colour=theme.MUTED, mark="points", marker="o")
+_TOO_SHORT = Entry(label="too short to say", colour=theme.MUTED, mark="hollow", marker="o")
+
 MEASURES = {
     "nats_per_step": "likelihood",
     "S_over_ceiling": "score S",
@@ -48,7 +52,7 @@ def screened_picture(screened: Sequence[Screened], found: Collection[str]) -> Pi
     panel = Panel(
         title="How loudly each effect is asked for",
         alt=f"z of {len(asked)} candidates; the largest in size is {best.name} with {best.z:.1f}.",
-        draw=partial(_draw_screened, screened=ordered, found=frozenset(found)),
+        draw=partial(_draw_screened, screened=[(each, _mark(each, found)) for each in ordered]),
         size_in=(max(PANEL_IN[0], 4.6), 0.9 + _ROW_IN * len(ordered)),
     )
     return Picture(
@@ -57,8 +61,9 @@ def screened_picture(screened: Sequence[Screened], found: Collection[str]) -> Pi
         panels=(panel,),
         columns=1,
         key=(
-            Entry(label="missing", colour=theme.MODEL, mark="points", marker="D"),
-            Entry(label="not missing", colour=theme.MUTED, mark="points", marker="o"),
+            _MISSING,
+            _NOT_MISSING,
+            *([_TOO_SHORT] if any(_mark(each, found) is _TOO_SHORT for each in asked) else []),
             Entry(label="within chance", colour=theme.BAND, mark="band"),
         ),
         note="z is the effect's score over its standard error, in the model without any of the "
@@ -67,17 +72,24 @@ def screened_picture(screened: Sequence[Screened], found: Collection[str]) -> Pi
     )
 
 
-def _draw_screened(axes: Axes, *, screened: Sequence[Screened], found: frozenset[str]) -> None:
+def _mark(each: Screened, found: Collection[str]) -> Entry:
+    if each.name in found:
+        return _MISSING
+    return _NOT_MISSING if each.minutes_needed is None else _TOO_SHORT
+
+
+def _draw_screened(axes: Axes, *, screened: Sequence[tuple[Screened, Entry]]) -> None:
     axes.axvspan(-_RIGHT, _RIGHT, color=theme.BAND, alpha=0.3, lw=0)
     axes.axvline(0, color=theme.MUTED, lw=0.8)
-    for row, each in enumerate(screened):
-        missing = each.name in found
-        colour, marker = (theme.MODEL, "D") if missing else (theme.MUTED, "o")
-        axes.plot([0, each.z], [row, row], color=colour, lw=1.2)
-        axes.plot([each.z], [row], color=colour, marker=marker, ms=6, zorder=3)
-    axes.set_yticks(range(len(screened)), [each.name for each in screened])
+    for row, (each, entry) in enumerate(screened):
+        inside = theme.GROUND if entry.mark == "hollow" else entry.colour
+        axes.plot([0, each.z], [row, row], color=entry.colour, lw=1.2)
+        axes.plot(
+            [each.z], [row], color=entry.colour, marker=entry.marker, mfc=inside, ms=6, zorder=3
+        )
+    axes.set_yticks(range(len(screened)), [each.name for each, _ in screened])
     axes.set(xlabel="z", ylim=(-0.7, len(screened) - 0.3))
-    widest = max(3.0, *(abs(each.z) for each in screened))
+    widest = max(3.0, *(abs(each.z) for each, _ in screened))
     axes.set_xlim(-1.1 * widest, 1.1 * widest)
     axes.grid(visible=False, axis="y")
 
@@ -105,8 +117,9 @@ def gap_picture(gap: Sequence[Gap]) -> Picture | None:
             Entry(label="placebo", colour=theme.MUTED, mark="hollow", marker="o"),
         ),
         note="0 % is the model without the effects, 100 % the model with them against itself, "
-        "which nothing can beat but by chance. The placebo is a wrong effect that was fitted and "
-        "calibrated in the same way.",
+        "which nothing can beat but by chance. The placebo is a wrong effect in their place. "
+        "Likelihood and the effect itself are of the three models as fitted; the other rows are "
+        "of the same three after they were calibrated.",
     )
 
 
