@@ -1,5 +1,7 @@
 """Which effects are asked for, and why others are not."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from zfcal.diagnose.candidates import (
     askable,
     candidates_of,
     company_of,
+    in_model,
     is_generic,
     not_forms_of,
 )
@@ -38,6 +41,24 @@ def test_a_candidate_has_its_shape_and_a_strength(candidate):
     }
     assert own.name == "alignment"
     assert own.notable == 20.0
+
+
+def test_a_model_has_its_effects_at_their_shapes(candidate, fish):
+    """What the model file is silent about is as by default."""
+    own = dataclasses.replace(
+        fish,
+        effects={"turning-bias": {"strength": 0.3}, "alignment": {"weight": 5.0, "kappa": 3.0}},
+    )
+    bias, alignment = in_model(own)
+    assert bias == candidate("turning-bias")
+    assert alignment == candidate("alignment", kappa=3.0)
+    assert in_model(fish) == ()
+
+
+def test_a_change_with_the_hour_is_slow(candidate):
+    """What a recording tells of it grows faster than its length."""
+    assert candidate("fatigue").is_slow
+    assert not candidate("crowding").is_slow
 
 
 def test_only_some_strengths_have_a_sign(candidate):

@@ -19,7 +19,8 @@ def added(screen, candidate):
     """Return the step of selection in which a candidate, alone, is added."""
     score = screen.ask(candidate)
     choice = choose([refit(screen, score)], lambda _candidate, _beside: True)
-    return Step(choice=choice, best=Best(score=score, z=score.z, p=1.0), before=screen)
+    best = Best(score=score, z=score.z, p=1.0, information=score.information)
+    return Step(choice=choice, best=best, before=screen)
 
 
 def alone(step):
@@ -109,6 +110,17 @@ def test_effects_are_confirmed_each_beside_those_before_it(screen, candidate):
     assert confirmed[0].holds
     assert (confirmed, note) == confirm(own, steps, n_workers=1)
     assert note == halves_note(own)
+
+
+def test_what_an_effect_of_the_given_model_leaves_over_is_not_confirmed(screen, candidate):
+    """As for an effect added a moment ago: the cohesion of the model reaches less far."""
+    fish = {"group-cohesion": {"weight": 4.0, "full_m": 0.3, "leaning": 1.0}}
+    own = screen(71, fish, minutes=12.0)
+    faded = candidate("group-cohesion", full_m=0.05, leaning=0.0)
+    given = refit(own, own.ask(faded)).screen
+    step = added(given, candidate("interaction-range", range_m=0.15))
+    assert abs(step.best.z) > 8.0
+    assert not alone(step).holds
 
 
 def test_the_halves_of_a_right_model_agree(screen):
@@ -227,7 +239,8 @@ def test_beside_individuals_that_differ_an_effect_must_be_shared(screen, candida
     for before, holds in ((plain, True), (bold, False)):
         step = added(before, bias)
         assert alone(step).holds
-        step = dataclasses.replace(step, best=Best(score=of_one, z=of_one.z, p=0.0))
+        best = Best(score=of_one, z=of_one.z, p=0.0, information=1.0)
+        step = dataclasses.replace(step, best=best)
         assert alone(step).holds == holds
 
 

@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from zfcal.diagnose.case import open_case
 from zfcal.diagnose.confirming import Confirmed
-from zfcal.diagnose.diagnose import _explains, _kept, diagnose
+from zfcal.diagnose.diagnose import _explains, _kept, _omnibus_note, diagnose
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
@@ -120,6 +122,27 @@ def test_the_null_through_the_measurement_does_not_depend_on_workers(ask, record
     assert null.values["replicates"] == 3
 
 
+@pytest.mark.parametrize(("has", "asked"), [((), True), (("burst-and-coast",), False)])
+def test_no_other_form_is_asked_of_what_the_model_has(question, record, fish, has, asked):
+    """A speed that follows the last one in a line says what a power of it says."""
+    own = dataclasses.replace(fish, effects={name: {"exponent": 0.1} for name in has})
+    case = open_case(dataclasses.replace(question(record(3, minutes=1.0, n_fish=2)), model=own))
+    assert ("generic:speed:own-speed" in {each.name for each in case.generic}) == asked
+
+
+@pytest.mark.parametrize(
+    ("effects", "p", "says"),
+    [((), 1e-9, False), (("crowding",), 1e-9, True), (("crowding",), 0.2, False)],
+)
+def test_what_is_left_beside_an_effect_may_be_its_form(question, record, fish, effects, p, says):
+    """Where the ranks are still uneven with it in the model."""
+    model = dataclasses.replace(fish, effects={name: {} for name in effects})
+    final = SimpleNamespace(fitted=SimpleNamespace(parameters=model))
+    asked = question(record(3, minutes=1.0, n_fish=2))
+    note = _omnibus_note(asked, final, Omnibus(p=p, worst="speed", z=6.0))
+    assert ("crowding may have another form" in note.says) == says
+
+
 def test_a_short_recording_is_untestable(ask, record):
     """A minute of two fish: most effects could not show, and minutes are asked for."""
     found = ask(record(3, minutes=1.0, n_fish=2))
@@ -127,6 +150,21 @@ def test_a_short_recording_is_untestable(ask, record):
     needed = [each.minutes_needed for each in found.screened if each.minutes_needed]
     assert needed
     assert min(needed) > 1.0
+
+
+OWN = ("turning-bias", "directional-drift", "fatigue", "place-preference")
+"""Effects that a fish shows wherever the others are."""
+
+
+def test_the_minutes_needed_are_the_same_however_long_the_recording(ask, record):
+    """From one minute and from three; a change with the hour counts by its cube."""
+    short, longer = (
+        {each.name: each.minutes_needed for each in ask(record(3, minutes=m, n_fish=2)).screened}
+        for m in (1.0, 3.0)
+    )
+    for name in OWN:
+        assert 3.0 < longer[name] < 100.0
+        assert 0.6 < short[name] / longer[name] < 1.7
 
 
 def test_one_fish_alone_can_be_asked(ask, record):

@@ -154,6 +154,39 @@ def test_the_model_divides_its_effects_out_of_speeds(screen, candidate, base):
     assert np.array_equal(base.own_speeds, base.scene.moves.speed_m_s)
 
 
+def test_information_is_that_of_the_strength(base, tank):
+    """One over its squared error, for speeds as for headings: so many errors are z.
+
+    A score that rests on few steps counts for less; individuals and rests have no sign.
+    """
+    asked = [each for each in family(base, tank) if each.name not in {"boldness", "freezing"}]
+    for score in ask_all(base, asked, 1):
+        errors = abs(score.strength) * math.sqrt(score.information)
+        assert errors > 0.999 * abs(score.z)
+        if score.candidate.effect.on_speed:
+            assert errors == pytest.approx(abs(score.z), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("burst-and-coast", {}),
+        ("crowding", {}),
+        ("turning-bias", {"along_walls": 0.0}),
+        ("freezing", {"duration_s": 2.0}),
+    ],
+)
+def test_a_faint_effect_shows_as_the_information_of_a_right_model_says(
+    screen, candidate, name, shape
+):
+    """By half to twice so many standard errors: what `minutes_needed` is taken from."""
+    own = candidate(name, **shape)
+    without = screen(61, minutes=8.0).ask(own)
+    expected = own.faint * math.sqrt(without.information)
+    found = screen(62, {name: own.values(own.faint)}, minutes=8.0).ask(own)
+    assert 0.5 * expected < found.z < 2.0 * expected
+
+
 def test_workers_do_not_change_numbers(base, tank):
     """One thread or three: the same z, in the order of the candidates."""
     asked = family(base, tank)[:12]

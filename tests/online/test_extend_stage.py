@@ -92,6 +92,9 @@ def test_the_model_gets_the_effect_and_the_findings_the_gap(trial, found, option
     check(document, "findings", findings)
     assert [entry["measure"] for entry in document["gap"]] == MEASURES
     assert list(document["extended"]) == ["models/extended.toml"]
+    (note,) = (each for each in document["notes"] if each["name"] == "extended")
+    assert "has alignment." in note["says"]
+    assert f"comparison: {result['placebo']}." in note["says"]
     assert [event.value for event in of_type(heard, Result)] == [document]
 
 
@@ -181,6 +184,8 @@ def test_a_named_effect_is_added_whatever_was_found(trial, found, quick, heard):
     options = ExtendOptions(names=("turning-bias",), calibration=quick)
     path = extend(trial, options, heard.append)
     assert set(read_model(path).effects) == {"turning-bias"}
+    notes = read_json(trial / "diagnosis" / "findings.json")["notes"]
+    assert "has turning-bias." in notes[-1]["says"]
     assert read_lineage(path).options["effects"] == {"turning-bias": {}}
 
 

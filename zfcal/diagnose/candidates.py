@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.model.effects import Effect, all_effects
+from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
 from zfcal.model.effects.generic import PREFIX
 from zfcal.model.rooms import find_rooms
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
+
+_FAINT = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +53,16 @@ class Candidate:
         """A strength that one would want to notice."""
         (own,) = (p for p in self.effect.parameters if p.name == self.effect.strength)
         return own.default
+
+    @property
+    def faint(self) -> float:
+        """A quarter of the notable strength; a recording that would not show it is too short."""
+        return _FAINT * self.notable
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it is a change with the hour."""
+        return self.effect.strength == "per_hour"
 
 
 FORMS = {
@@ -148,6 +160,17 @@ def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[s
         else:
             lacks[effect.name] = missing
     return tuple(found), lacks
+
+
+def in_model(model: Parameters) -> tuple[Candidate, ...]:
+    """Return the effects that a model has, at their shapes."""
+    made = []
+    for name, values in model.effects.items():
+        effect = find_effect(name)
+        own = {p.name: values.get(p.name, p.default) for p in effect.parameters}
+        shape = {key: value for key, value in own.items() if key != effect.strength}
+        made.append(Candidate(effect=effect, shape=shape))
+    return tuple(made)
 
 
 def _longest_track_s(scene: Scene) -> float:

@@ -8,7 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from zfcal.diagnose.candidates import Candidate, askable, candidates_of, company_of
+from zfcal.diagnose.candidates import (
+    Candidate,
+    askable,
+    candidates_of,
+    company_of,
+    not_forms_of,
+)
 from zfcal.diagnose.heldout import own_speeds
 from zfcal.diagnose.located import Residuals, residuals
 from zfcal.diagnose.null import Chain, Measurement, check_length
@@ -123,7 +129,7 @@ def open_case(question: Question) -> Case:
         scene=scene,
         screen=Screen(scene=scene, fitted=fitted),
         listed=candidates_of(effects, question.arena, without=own),
-        generic=candidates_of(_generic(scene), question.arena, without=own),
+        generic=not_forms_of(candidates_of(_generic(scene), question.arena), own),
         lacks=lacks,
     )
 

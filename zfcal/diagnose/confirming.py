@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from zfcal.diagnose.candidates import is_generic
+from zfcal.diagnose.candidates import Candidate, in_model, is_generic
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.scores import Score, by_track
@@ -110,7 +110,9 @@ def confirm(
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         made = list(pool.map(lambda each: _half(models[each[0]], each[1]), asked))
         halves_of = {key: (made[2 * n], made[2 * n + 1]) for n, key in enumerate(models)}
-        earlier = [steps[:n] for n in range(len(steps))]
+        added = [step.choice.best.candidate for step in steps]
+        had = in_model(screen.fitted.parameters)
+        earlier = [(*had, *added[:n]) for n in range(len(steps))]
         confirmed = pool.map(
             lambda step, before: _confirmed(step, before, halves_of), steps, earlier
         )
@@ -118,7 +120,7 @@ def confirm(
 
 
 def _confirmed(
-    step: Step, earlier: Sequence[Step], halves_of: Mapping[int, tuple[_Half, _Half]]
+    step: Step, earlier: Sequence[Candidate], halves_of: Mapping[int, tuple[_Half, _Half]]
 ) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
@@ -130,7 +132,7 @@ def _confirmed(
     holds = (
         told.holds
         and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
-        and outlasts(score, step.before, [each.choice.best.candidate for each in earlier])
+        and outlasts(score, step.before, earlier)
     )
     return replace(told, holds=holds, steady=is_steady(score, scene))
 

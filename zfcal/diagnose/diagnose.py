@@ -68,7 +68,7 @@ _QUICK_Z = 2.5
 replicates."""
 
 _NOTICED = 5.0
-"""Standard errors at which an effect of notable strength must stand to be testable."""
+"""Standard errors at which an effect of faint strength must stand to be testable."""
 
 _CONTROL = 4.5
 
@@ -335,9 +335,11 @@ def _screened(case: Case, ranked: Sequence[Best]) -> tuple[Screened, ...]:
 
 
 def _as_screened(best: Best, minutes: float) -> Screened:
-    candidate, score = best.score.candidate, best.score
-    expected = abs(candidate.notable) * math.sqrt(max(score.information, 0.0))
-    needed = minutes * (_NOTICED / max(expected, 1e-3)) ** 2
+    candidate = best.score.candidate
+    expected = abs(candidate.faint) * math.sqrt(max(best.information, 0.0))
+    # Of a change with the hour a recording twice as long tells eight times as much.
+    power = 2 / 3 if candidate.is_slow else 2
+    needed = minutes * (_NOTICED / max(expected, 1e-3)) ** power
     enough = expected >= _NOTICED or best.p < LEVEL
     return Screened(
         name=candidate.name,
@@ -354,16 +356,11 @@ def _where(own: Residuals, rows: Sequence[_Row]) -> tuple[Located, ...]:
 
 
 def _notes(case: Case, rows: Sequence[_Row], final: Screen, judged: _Judged) -> tuple[Note, ...]:
-    omnibus = judged.omnibus
     return (
         _noise_note(case.question),
         judged.halves,
         _controls_note(case, rows, final),
-        Note(
-            name="omnibus",
-            says=f"Ranks of headings and speeds in the final model: largest is {omnibus.worst}.",
-            values={"z": omnibus.z, "p": omnibus.p},
-        ),
+        _omnibus_note(case.question, final, judged.omnibus),
         Note(
             name="null",
             says="Replicates of the fitted model through the measurement."
@@ -372,6 +369,14 @@ def _notes(case: Case, rows: Sequence[_Row], final: Screen, judged: _Judged) -> 
             values={"replicates": float(len(rows))},
         ),
     )
+
+
+def _omnibus_note(question: Question, final: Screen, omnibus: Omnibus) -> Note:
+    text = f"Ranks of headings and speeds in the final model: largest is {omnibus.worst}."
+    effects = " and ".join(final.fitted.parameters.effects)
+    if effects and is_suspicious(question, omnibus):
+        text += f" In these fish {effects} may have another form than in the model."
+    return Note(name="omnibus", says=text, values={"z": omnibus.z, "p": omnibus.p})
 
 
 def _noise_note(question: Question) -> Note:

@@ -15,6 +15,7 @@ effect responds to, within each zone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -353,8 +354,11 @@ class Screen:
         score, squares = summed(candidate, cue * response), float((cue**2).sum())
         # A factor exp(s cue) changes the speed by s cue times its mean.
         unit = float(self.own_speeds[kept].mean()) if kept.any() else 1.0
+        change = max(squares * unit, 1e-300)
         return replace(
-            score, strength=score.strength * score.information / max(squares * unit, 1e-300)
+            score,
+            strength=score.strength * score.information / change,
+            information=change**2 / max(score.information, 1e-300) if squares else 0.0,
         )
 
     @cached_property
@@ -374,11 +378,42 @@ class Screen:
         share = np.bincount(moves.zone, weights=now) / np.maximum(np.bincount(moves.zone), 1)
         expected = np.where(rested, share[moves.zone], 0.0)
         steps = np.where(rested, now, 0.0) - expected
+        count, n_rested = float((rested & now).sum()), float(rested.sum())
+        more = _Freezes.of(candidate, len(moves), self.scene.dt_s)
+        as_rare = float(now.mean()) + more.at_rest / max(len(moves), 1)
+        faint = excess_deviate(count + more.after_rest, as_rare * (n_rested + more.rested))
         return replace(
             summed(candidate, steps),
-            z=excess_deviate(float((rested & now).sum()), float(expected.sum())),
-            strength=float(steps.sum() / max(rested.sum(), 1)),
+            z=excess_deviate(count, float(expected.sum())),
+            strength=float(steps.sum() / max(n_rested, 1.0)),
+            information=(max(faint, 0.0) / candidate.faint) ** 2,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Freezes:
+    """Steps that a faint rate of freezing would add to a recording.
+
+    Parameters
+    ----------
+    at_rest
+        Of them all.
+    rested, after_rest
+        Steps after so many at rest as are asked for, and of these the ones at rest themselves.
+    """
+
+    at_rest: float
+    rested: float
+    after_rest: float
+
+    @classmethod
+    def of(cls, candidate: Candidate, n_moves: int, dt_s: float) -> _Freezes:
+        """Return them for an effect at its shape."""
+        duration_s = candidate.shape["duration_s"]
+        goes_on = math.exp(-dt_s / duration_s)
+        n_freezes = candidate.faint * n_moves * dt_s
+        rested = n_freezes * goes_on ** (rested_steps(candidate) - 1) / (1 - goes_on)
+        return cls(at_rest=n_freezes / (1 - goes_on), rested=rested, after_rest=rested * goes_on)
 
 
 def rested_steps(candidate: Candidate) -> int:

@@ -112,22 +112,29 @@ class Best:
         At that shape.
     z, p
         Standardised, and over the family.
+    information
+        Of the strength, at the shape of which the recording tells most.
     """
 
     score: Score
     z: float
     p: float
+    information: float
 
 
 def best_of(asked: Asked, scores: Sequence[Score]) -> list[Best]:
     """Return each effect at its best shape, the clearest first."""
     z = asked.standardised(scores)
     p = asked.family_p(z)
+    told: dict[str, float] = {}
+    for score in scores:
+        name = score.candidate.name
+        told[name] = max(told.get(name, 0.0), score.information)
     found: dict[str, Best] = {}
     for score, own, chance in zip(scores, z, p, strict=True):
         name = score.candidate.name
         if name not in found or abs(own) > abs(found[name].z):
-            found[name] = Best(score=score, z=float(own), p=float(chance))
+            found[name] = Best(score=score, z=float(own), p=float(chance), information=told[name])
     return sorted(found.values(), key=lambda best: -abs(best.z))
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
-from zfcal.artifacts.models import read_result, write_model
+from zfcal.artifacts.models import read_model, read_result, write_model
 from zfcal.artifacts.settings import find_trial
 from zfcal.diagnose.document import gap_document
 from zfcal.diagnose.findings import Gap, Verdict
@@ -33,6 +33,7 @@ from zfcal.online.stretch import read_stretch
 Effects = Mapping[str, Mapping[str, float]]
 
 _EXTENDED = "extended"
+_NOTE = "extended"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -296,11 +297,19 @@ def _entry(gap: Gap) -> dict[str, JSON]:
     return {key: None if math.isnan(value) else value for key, value in values.items()}
 
 
+def _note(effects: Sequence[str], placebo: str | None) -> dict[str, JSON]:
+    """Return the note that says between which models the gap is."""
+    says = f"The extended model has {' and '.join(effects)}."
+    if placebo is not None:
+        says += f" Wrong effect for comparison: {placebo}."
+    return {"name": _NOTE, "says": says, "values": {}}
+
+
 def _tell_gap(
     book: Book, document: dict[str, Any], output: Path, tell: Tell, *, task: Task
 ) -> None:
     """Put a model's gap into the findings that it came from, and draw their page anew."""
-    root = book.opened.trial.root
+    root, result = book.opened.trial.root, read_result(output)
     gap = [
         Gap(
             measure=measure,
@@ -310,10 +319,12 @@ def _tell_gap(
                 for key in ("before", "after", "floor", "closed", "placebo")
             },
         )
-        for measure, entry in read_result(output).get("gap", {}).items()
+        for measure, entry in result.get("gap", {}).items()
     ]
     about = hash_inputs(root, [output])
-    said = {"gap": gap_document(gap), "extended": about}
+    notes = [note for note in document["notes"] if note["name"] != _NOTE]
+    notes.append(_note(tuple(read_model(output).effects), result.get("placebo")))
+    said = {"gap": gap_document(gap), "extended": about, "notes": notes}
     if {key: document.get(key) for key in said} != said:
         lineage = document.pop("lineage")
         with at_work(root, "diagnose", task):
