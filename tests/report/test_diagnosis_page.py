@@ -300,6 +300,16 @@ def test_a_recording_that_nobody_makes_is_not_counted_in_minutes(make_sheet):
     assert answer.endswith("faint: freezing; a week would not do.")
 
 
+def test_the_two_ends_of_a_gap_differ_in_the_table(make_sheet):
+    """A thousandth of a nat a step is a clear effect."""
+    gap = [
+        dataclasses.replace(each, before=1.04179, after=1.04356)
+        for each in gap_of(nats_per_step=0.7)
+    ]
+    by_name = {table.name: table for table in tables(make_sheet(gap=gap))}
+    assert by_name["gap-numbers"].rows[0][1:3] == ["1.0418", "1.0436"]
+
+
 def test_page_and_pictures_are_written_and_found_again(make_sheet, tmp_path, undrawn):
     """The page says which findings it shows, and holds nothing from elsewhere."""
     sheet = make_sheet(gap=gap_of(nats_per_step=0.8), names=("alignment", "generic:heading:wall"))

@@ -18,6 +18,9 @@ _MOST_OPEN = 12
 _A_WEEK_MIN = 7 * 24 * 60
 """Nobody records for longer: the recording cannot show it at all."""
 
+_DIGITS = 5
+"""Of a gap: what an effect adds to the likelihood of a step is a thousandth of it."""
+
 FIRES = "NEGATIVE CONTROL FIRES"
 """How the note of controls begins where one of them says yes."""
 
@@ -336,7 +339,7 @@ def _gap_table(gap: Sequence[Gap]) -> Table:
     rows = [
         [
             MEASURES[each.measure],
-            *(_number(value) for value in (each.before, each.after, each.floor)),
+            *(_number(value, _DIGITS) for value in (each.before, each.after, each.floor)),
             _NONE if math.isnan(each.closed) else f"{100 * each.closed:.0f} %",
             _shares(each.interval).strip(" ()") or _NONE,
             _NONE if math.isnan(each.placebo) else f"{100 * each.placebo:.0f} %",
