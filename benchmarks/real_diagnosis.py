@@ -7,6 +7,9 @@ Imports each recording as `real_recordings` does, diagnoses it, and writes
     docs/real-diagnosis.md                    its table
 
     .venv/bin/python benchmarks/real_diagnosis.py --data ../shared/data --quick
+    .venv/bin/python benchmarks/real_diagnosis.py --quick --again --only five
+
+With ``--again`` what was found is added to the model, and the recording is diagnosed once more.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from zfcal.errors import ZfcalError
 
 RESULTS = ROOT / "benchmarks" / "results" / "real_diagnosis.json"
 DOCUMENT = ROOT / "docs" / "real-diagnosis.md"
+GENERATIONS = "3"
 CLEAREST = 4
 """So many disagreements of single statistics are told of each recording."""
 
@@ -57,31 +61,83 @@ def diagnose(name: str, data: Path, work: Path, options: tuple[str, ...]) -> dic
         target.write_bytes(picture.read_bytes())
         shrink(target)
     return {
+        "name": recording.name,
         "title": recording.title,
         "said": list(recording.said),
         "verdict": findings["verdict"],
         "minutes": findings["details"]["minutes"],
         "steps": findings["details"]["n_steps"],
-        "effects": [
-            {key: effect[key] for key in ("name", "says", "gain_nats_per_step", "p", "ties")}
-            for effect in findings["effects"]
-        ],
+        "effects": _effects(findings),
         "where": findings["where"][:CLEAREST],
         "notes": {note["name"]: note["says"] for note in findings["notes"]},
         "processor_s": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
     }
 
 
+def diagnose_again(name: str, work: Path, options: tuple[str, ...]) -> dict[str, Any]:
+    """Return what the diagnosis says once the model has the effects that were found.
+
+    Parameters
+    ----------
+    name
+        A key of `recordings.SOURCES` that was diagnosed.
+    work
+        Folder of the trials.
+    options
+        More of ``zfcal diagnose``.
+    """
+    trial = work / name
+    zfcal("extend", trial, "--generations", GENERATIONS)
+    zfcal("diagnose", trial, "--model", trial / "models" / "extended.toml", *options)
+    first, second = (
+        json.loads((trial / "diagnosis" / place / "findings.json").read_text(encoding="utf-8"))
+        for place in (".", "extended")
+    )
+    gap = {entry["measure"]: entry for entry in first["gap"]}["nats_per_step"]
+    return {
+        "verdict": second["verdict"],
+        "effects": _effects(second),
+        "closed": gap["closed"],
+        "placebo": gap["placebo"],
+    }
+
+
+def _effects(findings: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what is kept of the effects of a ``findings.json``."""
+    kept = ("name", "says", "gain_nats_per_step", "p", "ties")
+    return [{key: effect[key] for key in kept} for effect in findings["effects"]]
+
+
+def _named(one: dict[str, Any]) -> str:
+    """Return the effects of a diagnosis with what they gain, or its verdict."""
+    effects = [
+        f"{' or '.join([effect['name'], *effect['ties']])} ({effect['gain_nats_per_step']:.3f})"
+        for effect in one["effects"]
+    ]
+    return "; ".join(effects) or str(one["verdict"])
+
+
+def again_table(found: dict[str, dict[str, Any]]) -> str:
+    """Return a row for each recording that was diagnosed twice."""
+    rows = [
+        [one["title"], _percent(then["closed"]), _percent(then["placebo"]), _named(then)]
+        for one in found.values()
+        if (then := one.get("again"))
+    ]
+    heads = ["recording", "gap closed", "placebo", "then missing (nats per step)"]
+    return table(heads, rows)
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"
+
+
 def found_table(found: dict[str, dict[str, Any]]) -> str:
     """Return a row for each recording: what it lacks, and how much that explains."""
-    rows = []
-    for one in found.values():
-        effects = [
-            f"{' or '.join([effect['name'], *effect['ties']])} ({effect['gain_nats_per_step']:.3f})"
-            for effect in one["effects"]
-        ]
-        told = "; ".join(effects) or one["verdict"]
-        rows.append([one["title"], f"{one['minutes']:.0f} min", str(one["steps"]), told])
+    rows = [
+        [one["title"], f"{one['minutes']:.0f} min", str(one["steps"]), _named(one)]
+        for one in found.values()
+    ]
     return table(["recording", "length", "steps", "missing (nats per step)"], rows)
 
 
@@ -119,14 +175,22 @@ def main() -> int:
     known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
     found = dict(known.get("recordings", {})) if options.only else {}
     for name in options.only or SOURCES:
-        found[name] = diagnose(name, options.data, options.work, more)
+        if not options.again:
+            found[name] = diagnose(name, options.data, options.work, more)
+        else:
+            found[name]["again"] = diagnose_again(found[name]["name"], options.work, more)
         results = {
             "command": f"zfcal diagnose TRIAL {' '.join(more)}".strip(),
             "zfcal": __version__,
         }
         text = json.dumps({**results, "recordings": found}, indent=1, ensure_ascii=False)
         RESULTS.write_text(text + "\n", encoding="utf-8")
-    tables = {"found": found_table(found), "where": where_table(found), "said": said_list(found)}
+    tables = {
+        "found": found_table(found),
+        "again": again_table(found),
+        "where": where_table(found),
+        "said": said_list(found),
+    }
     DOCUMENT.write_text(replaced(DOCUMENT.read_text(encoding="utf-8"), tables), encoding="utf-8")
     print(RESULTS, DOCUMENT, sep="\n")
     return 0
@@ -138,6 +202,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path(data), help="folder of the recordings")
     parser.add_argument("--work", type=Path, default=ROOT / "trials-real", help="folder of trials")
     parser.add_argument("--quick", action="store_true", help="the theory alone as the null")
+    parser.add_argument("--again", action="store_true", help="the second round, of one that was")
     parser.add_argument("--only", choices=SOURCES, nargs="+", help="these; the others stay")
     options = parser.parse_args()
     if not options.data.is_dir():
