@@ -130,6 +130,37 @@ def test_no_other_form_is_asked_of_what_the_model_has(question, record, fish, ha
     assert ("generic:speed:own-speed" in {each.name for each in case.generic}) == asked
 
 
+@pytest.fixture(scope="module")
+def beside_cohesion(question, record, fish):
+    """Return what diagnoses fish with cohesion, by a model whose own cohesion reaches less far."""
+
+    def of(**others):
+        cohesion = {"weight": 4.0, "full_m": 0.3, "leaning": 1.0}
+        faded = {"weight": 4.0, "full_m": 0.05, "leaning": 0.0}
+        model = dataclasses.replace(fish, effects={"group-cohesion": faded})
+        samples = record(71, {"group-cohesion": cohesion, **others}, minutes=12.0)
+        # Without a word of the noise the omnibus test says nothing.
+        asked = question(samples, noise_m=None)
+        return diagnose(dataclasses.replace(asked, model=model), lambda _stage, _done, _all: None)
+
+    return of
+
+
+def test_what_a_given_effect_leaves_over_is_unexplained(beside_cohesion):
+    """An effect stands out, no other one than that of the model: neither named nor nothing."""
+    found = beside_cohesion()
+    assert max(abs(each.z) for each in found.screened if not each.lacks) > 8.0
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert found.effects == ()
+
+
+def test_what_is_there_beside_a_given_effect_is_named(beside_cohesion):
+    """What the given effect leaves over stands out more, and does not hide it."""
+    found = beside_cohesion(**{"turning-bias": {"strength": 0.12}})
+    assert found.screened[0].name != "turning-bias"
+    assert [effect.name for effect in found.effects] == ["turning-bias"]
+
+
 @pytest.mark.parametrize(
     ("effects", "p", "says"),
     [((), 1e-9, False), (("crowding",), 1e-9, True), (("crowding",), 0.2, False)],

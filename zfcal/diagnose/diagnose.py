@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from zfcal.diagnose.candidates import Candidate, not_forms_of
+from zfcal.diagnose.candidates import Candidate, in_model, not_forms_of
 from zfcal.diagnose.case import (
     QUICK_REPLICATES,
     Case,
@@ -132,6 +132,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         rivals=lambda sampled, known, z: _rivals(case, sampled, known, z),
         suspicious=is_suspicious(question, omnibus),
         n_workers=question.n_workers,
+        given=in_model(case.screen.fitted.parameters),
         told=tell,
     )
     selection = selector.select(case.screen, scores)
@@ -285,7 +286,7 @@ def _diagnosis(
     final = steps[-1].choice.best.screen if steps else case.screen
     screened = _screened(case, selection.screened)
     return Diagnosis(
-        verdict=_verdict(effects, screened, suspicious=judged.suspicious),
+        verdict=_verdict(effects, screened, suspicious=judged.suspicious or selection.left_over),
         where=where,
         effects=effects,
         screened=screened,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate, is_generic
 from zfcal.diagnose.heats import Heat, Sampled, ahead, hopeful, run_heats, unbeaten
+from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
@@ -196,11 +197,14 @@ class Selection:
         All effects as they were asked for in the model that was given.
     final
         The model with all of them.
+    left_over
+        Whether an effect stands out that another form of one in the given model would explain.
     """
 
     steps: tuple[Step, ...]
     screened: tuple[Best, ...]
     final: Screen
+    left_over: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -219,6 +223,8 @@ class Selector:
         Whether something is to be explained even if no listed effect answers.
     n_workers
         Threads.
+    given
+        Effects that the model came with: what they leave over is none.
     told
         Hears how far it is.
     """
@@ -227,6 +233,7 @@ class Selector:
     rivals: Callable[[Sampled, set[str], float], list[Best]]
     suspicious: bool
     n_workers: int
+    given: tuple[Candidate, ...] = ()
     told: Told = field(default=lambda _stage, _done, _all: None)
 
     def select(self, screen: Screen, scores: Sequence[Score]) -> Selection:
@@ -240,19 +247,27 @@ class Selector:
             Of the listed candidates in it.
         """
         steps: list[Step] = []
-        ranked = best_of(self.listed, scores)
-        first = tuple(ranked)
+        first = tuple(best_of(self.listed, scores))
+        ranked = others = self._others(screen, first)
         for number in range(_MOST_EFFECTS):
             sampled = Sampled(whole=screen)
             if number:
-                ranked = self._ranked(sampled, steps)
+                ranked = self._others(screen, self._ranked(sampled, steps))
             step = self._step(sampled, ranked, steps)
             if step is None:
                 break
             steps.append(step)
             screen = step.choice.best.screen
             self.told("adding effects", number + 1, _MOST_EFFECTS)
-        return Selection(steps=tuple(steps), screened=first, final=screen)
+        return Selection(
+            steps=tuple(steps), screened=first, final=screen, left_over=len(others) < len(first)
+        )
+
+    def _others(self, screen: Screen, ranked: Sequence[Best]) -> list[Best]:
+        """Return effects without those that the given model's ones leave over."""
+        return [
+            best for best in ranked if best.p >= LEVEL or outlasts(best.score, screen, self.given)
+        ]
 
     def _ranked(self, sampled: Sampled, done: Sequence[Step]) -> list[Best]:
         """Return the listed effects that a model lacks and are worth it, the clearest first."""
@@ -298,7 +313,7 @@ class Selector:
     def _rivals(self, sampled: Sampled, known: set[str], suspects: Sequence[Best]) -> list[Best]:
         """Return the clearest effects beyond the list that are no other form of known ones."""
         least = max([RIVAL_Z, *(_IN_REACH * abs(best.z) for best in suspects)])
-        found = self.rivals(sampled, known, least)
+        found = self._others(sampled.whole, self.rivals(sampled, known, least))
         return _in_reach([best for best in found if abs(best.z) > least])[:RIVALS]
 
     def _refits(self, screen: Screen, heats: Sequence[Heat]) -> list[Refit]:
