@@ -38,10 +38,10 @@ def test_options_of_the_loop_need_the_loop(zfcal, tmp_path, words, flag):
 
 
 def test_impossible_fish_are_one_line(zfcal, tmp_path):
-    """Exit code 1, and nothing is made."""
+    """Wrong usage, and nothing is made."""
     done = zfcal("demo", tmp_path / "loop", "--closed-loop", "--no-video", "--noise-mm", -1)
-    assert done.code == 1
-    assert "noise_m" in done.err
+    assert done.code == 2
+    assert "--noise-mm" in done.err
     assert "Traceback" not in done.err
     assert not (tmp_path / "loop").exists()
 
