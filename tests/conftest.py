@@ -3,6 +3,7 @@
 import importlib.util
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -35,6 +36,9 @@ def pytest_configure(config):
     With an empty cache each worker would otherwise compile the same ones at the same time.
     What fails here fails once more in a test, which says what it is about.
     """
+    # A shell lets what it starts in the background ignore Ctrl-C, and so would what tests start.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("numprocesses", None):
         # For the workers, and what they start: they are side by side already, and threads that
         # wait for a matrix of ten rows take the processor from the other worker.
