@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -136,5 +137,21 @@ lineage = Lineage(schema="zfcal.scores/1", command="analyse")
 write_table(path, make_table("zfcal.scores/1", scores), lineage)
 read_table(path, "zfcal.scores/1")
 sys.exit("pandas" in sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.parquet")], check=True)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts as Linux does")
+def test_reading_a_table_starts_no_thread(tmp_path):
+    """One that is just starting aborts a process that ends: one command in a hundred."""
+    script = """
+import os, sys
+from pathlib import Path
+import pyarrow as pa, pyarrow.parquet as pq
+from zfcal.artifacts.tables import read_parquet
+pq.write_table(pa.table({"x": [1.0]}), sys.argv[1], write_page_checksum=True)
+before = len(os.listdir("/proc/self/task"))
+read_parquet(Path(sys.argv[1]), "")
+sys.exit(len(os.listdir("/proc/self/task")) - before)
 """
     subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.parquet")], check=True)

@@ -158,12 +158,12 @@ def read_parquet(path: Path, hint: str) -> pa.Table:
     """Read any Parquet file, whatever it holds; errors as in `read_table`, with a hint."""
     _check_ends(path, hint)
     try:
-        with path.open("rb") as file:
-            # Not read_table: it loads pyarrow.dataset and with it pandas, a fifth of a second.
-            whole = pq.ParquetFile(file, page_checksum_verification=True)
-            # Threads of pyarrow that read a Python file abort a process now and then as it ends
-            # (apache/arrow issues 34314 and 50482).
-            return whole.read(use_threads=False)
+        # From memory: reading a file itself, pyarrow starts a thread even where it is told not to,
+        # and a process that then ends at once is aborted now and then (apache/arrow issue 34314).
+        source = pa.py_buffer(path.read_bytes())
+        # Not read_table: it loads pyarrow.dataset and with it pandas, a fifth of a second.
+        whole = pq.ParquetFile(source, page_checksum_verification=True)
+        return whole.read(use_threads=False)
     except (pa.ArrowException, OSError, ValueError, KeyError, NotImplementedError) as error:
         raise DamagedError(f"{path}: is damaged ({first_line(error)}).", hint=hint) from error
 

@@ -29,6 +29,8 @@ MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
 
 _NAMES = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 _BROKEN = (OSError, EOFError, zlib.error)
+# What is read without pyarrow's threads: one that is just starting when the process ends aborts it.
+_ALONE_BYTES = 1 << 20
 
 
 def first_lines(path: Path, count: int) -> list[str]:
@@ -128,7 +130,11 @@ def read_table(path: Path, layout: Layout) -> TextTable:
     try:
         table = pa_csv.read_csv(
             str(path),
-            read_options=pa_csv.ReadOptions(skip_rows=layout.n_header, column_names=list(names)),
+            read_options=pa_csv.ReadOptions(
+                skip_rows=layout.n_header,
+                column_names=list(names),
+                use_threads=path.stat().st_size > _ALONE_BYTES,
+            ),
             parse_options=pa_csv.ParseOptions(delimiter=layout.delimiter),
             convert_options=pa_csv.ConvertOptions(
                 column_types=types,
