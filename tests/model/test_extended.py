@@ -451,6 +451,24 @@ def test_effects_come_and_go(model):
     assert bounds_of("alignment", "kappa") == (0.0, 30.0)
 
 
+def test_a_place_is_looked_for_within_the_tank(two_rooms, model):
+    """Fish that drift everywhere are drawn to its edge, not to a place metres away."""
+    x0, y0, x1, y1 = two_rooms.outline.bounds
+    assert bounds_of("place-preference", "x_m", two_rooms) == (x0, x1)
+    assert bounds_of("place-preference", "y_m", two_rooms) == (y0, y1)
+    assert bounds_of("place-preference", "y_m") == (-100.0, 100.0)
+    assert bounds_of("place-preference", "reach_m", two_rooms) == (0.03, 2.0)
+    drift = having(model, {"directional-drift": {"strength": 0.5, "direction_rad": math.pi / 2}})
+    xy_m, _ = simulate_tracks(drift, two_rooms, n_agents=5, n_steps=3000, seed=23)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    place = {"strength": 0.5, "x_m": 0.5, "y_m": 0.9, "reach_m": 1.0}
+    free = tuple(("place-preference", key) for key in place)
+    found = maximise(scene, having(model, {"place-preference": place}), free=free)
+    values = found.parameters.effects["place-preference"]
+    assert x0 <= values["x_m"] <= x1
+    assert values["y_m"] == pytest.approx(y1)
+
+
 def test_units_of_a_fit():
     """Kappa of the base and of the neighbours in units of 30, alpha of 50."""
     assert SCALES.tolist() == [30.0, 30.0, 50.0]

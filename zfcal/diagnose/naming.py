@@ -142,7 +142,7 @@ def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers:
         candidate=candidate,
         screen=Screen(scene=scene, fitted=fitted),
         values=values,
-        interval=_intervals(fitted, free, values),
+        interval=_intervals(fitted, free, values, scene),
         gain=by_sample(scene, scene.turns.at, by_step),
         n_free=max(1, len(free)),
     )
@@ -176,13 +176,13 @@ def some_of(scene: Scene, steps: Moves, share: int) -> NDArray[np.bool_]:
 
 
 def _intervals(
-    fitted: Fitted, free: Free, values: dict[str, float]
+    fitted: Fitted, free: Free, values: dict[str, float], scene: Scene
 ) -> dict[str, tuple[float, float]]:
     first = len(fitted.free) - len(free)
     error = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))[first:]
     found = {}
     for (name, key), half in zip(free, 1.96 * error, strict=True):
-        low, high = bounds_of(name, key)
+        low, high = bounds_of(name, key, scene.arena)
         found[key] = (max(low, values[key] - half), min(high, values[key] + half))
     return found
 

@@ -23,6 +23,7 @@ from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.sides import without_feigned
 from zfcal.diagnose.together import together
 
 Floats = NDArray[np.float64]
@@ -328,7 +329,7 @@ class Selector:
     def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
         if not listed:
             return Choice(best=max(generic, key=lambda each: each.worth), ties=(), considered=())
-        choice = choose(listed, self._stands)
+        choice = choose(without_feigned(listed), self._stands)
         for rival in sorted(generic, key=lambda each: -each.worth):
             ahead = rival.over(choice.best) > _RIVAL_AHEAD
             if ahead and rival.nats > _RIVAL_TIMES * choice.best.nats:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from zfcal.arena import Arena
 from zfcal.model.effects import find_effect
 from zfcal.model.fitted import (
     SCALES,
@@ -45,6 +46,7 @@ _LAPSE = (1e-6, 0.2)
 _DIFFERENCE = 1e-4
 """Of a parameter's range, and at most so much in its unit: places may be 100 m away."""
 _SHRINK = 0.2
+_AXES = {"x_m": 0, "y_m": 1}
 _MOST_ROUNDS = 25
 _ENOUGH_NATS = 0.02
 _RIDGE = 1e-9
@@ -182,7 +184,7 @@ class _Climb:
         """Return the scores of the effects' parameters, in units of their ranges."""
 
         def column(name: str, key: str) -> Floats:
-            low, high = bounds_of(name, key)
+            low, high = bounds_of(name, key, self.scene.arena)
             value = here.parameters.effects[name][key]
             by = _DIFFERENCE * min(high - low, 1.0)
             by = by if value + by <= high else -by
@@ -220,17 +222,17 @@ class _Climb:
         slope = psi.sum(axis=0)
         pushed = np.zeros(len(self.free), dtype=bool)
         for p, (name, key) in enumerate(self.free):
-            low, high = bounds_of(name, key)
+            low, high = bounds_of(name, key, self.scene.arena)
             value = parameters.effects[name][key]
             pushed[p] = (value <= low and slope[p] < 0) or (value >= high and slope[p] > 0)
         return pushed
 
     def _moved(self, parameters: Parameters, by: Floats) -> Parameters:
         for (name, key), change in zip(self.free, by, strict=True):
-            low, high = bounds_of(name, key)
+            low, high = bounds_of(name, key, self.scene.arena)
             here = parameters.effects[name][key]
             value = here + change * (high - low)
-            if low == 0.0:
+            if low == 0.0 and key not in _AXES:
                 # At zero a mixture's slope says nothing: it is approached step by step.
                 value = max(value, _SHRINK * here)
             parameters = with_effect(parameters, name, {key: float(np.clip(value, low, high))})
@@ -241,7 +243,7 @@ class _Climb:
         information = _information(here, psi)
         k = len(self.free)
         whole: Floats = np.asarray(linalg.pinvh(information)) if k else np.zeros((0, 0))
-        ranges = np.array([np.ptp(bounds_of(*pair)) for pair in self.free])
+        ranges = np.array([np.ptp(bounds_of(*pair, self.scene.arena)) for pair in self.free])
         covariance = whole[-k:, -k:] * np.outer(ranges, ranges) if k else whole
         zones = [
             _zone_of(own, zone, here.parameters.zone_names) if turns.enough else zone
@@ -255,10 +257,17 @@ class _Climb:
         )
 
 
-def bounds_of(name: str, key: str) -> tuple[float, float]:
-    """Return the range of an effect's parameter."""
+def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, float]:
+    """Return the range within which an effect's parameter is fitted.
+
+    In an arena a place is looked for within the tank: from one metres away fish would be drawn the
+    same way wherever they are, which is no place but a direction.
+    """
     (found,) = (each for each in find_effect(name).parameters if each.name == key)
-    return found.low, found.high
+    if arena is None or key not in _AXES:
+        return found.low, found.high
+    ends = arena.outline.bounds[_AXES[key] :: 2]
+    return max(found.low, ends[0]), min(found.high, ends[1])
 
 
 def _limits(x: Floats, turns: ZoneTurns) -> tuple[Floats, Floats]:

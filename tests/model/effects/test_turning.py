@@ -65,6 +65,16 @@ def test_a_drift_favours_its_direction(natural_model, two_rooms):
     assert ratios[1] / ratios[0] == pytest.approx(np.exp([1.6, 0.8]), rel=1e-6)
 
 
+@pytest.mark.parametrize(("speed_m_s", "exponent"), [(0.07, 0.6), (0.0175, 2.4), (0.001, 8.0)])
+def test_a_current_carries_slow_fish_more(ask, speed_m_s, exponent):
+    """Along to against at the inverse of the speed: four times as much at a quarter, 4 at most."""
+    asked = ask("directional-drift", {"strength": 0.3, "direction_rad": 1.0, "by_slowness": 1.0})
+    ratio = asked.factor(1.0, speed=speed_m_s) / asked.factor(1.0 + math.pi, speed=speed_m_s)
+    assert ratio == pytest.approx(math.exp(exponent))
+    alike = ask("directional-drift", {"strength": 0.3, "direction_rad": 1.0})
+    assert alike.factor(2.0, speed=speed_m_s) == alike.factor(2.0, speed=0.2)
+
+
 def test_fish_gather_where_they_drift(swim):
     """A drift up takes them to the upper room, one down to the lower; mean height in metres."""
 
