@@ -284,3 +284,15 @@ def test_a_room_in_which_fish_swim_faster_is_one_place(worlds, tank):
     wide = np.array([each.shape["reach_m"] > 0.3 for each in shapes])
     assert z[wide].max() > 8.0
     assert z[~wide].max() < 0.85 * z[wide].max()
+
+
+def test_a_lit_room_is_no_crowding(screen, candidate):
+    """Where fish gather in it they are fast in company; within a field of the tank they are not."""
+    lit = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach_m": 0.35}}
+    own = screen(40, lit)
+    place = candidate("generic:speed:place", x_m=0.22, y_m=0.78, reach_m=0.35)
+    crowding = candidate("crowding", radius_m=0.35)
+    assert own.ask(place).z > 20
+    assert abs(own.ask(crowding).z) < 3
+    shy = screen(40, {"crowding": {"per_neighbour": 0.1, "radius_m": 0.35}})
+    assert shy.ask(crowding).z > 8

@@ -15,6 +15,7 @@ NOWHERE = -1
 _MINUTE_S = 60.0
 _SECTORS = 8
 _PLACES = 4
+N_FIELDS = _PLACES**2
 _NEAR_M = (0.02, 0.04, 0.06, 0.08, 0.12, 0.20, 0.40)
 _LAST_TURN_RAD = (-2.0, -1.0, -0.4, 0.0, 0.4, 1.0, 2.0)
 
@@ -55,7 +56,7 @@ def contexts(scene: Scene, steps: Moves, about: Surroundings) -> dict[str, Ints]
         ),
         "neighbours' speed": np.where(about.company > 0, _fifths(about.pace_m_s), NOWHERE),
         "compass": _sector(np.arctan2(about.heading[:, 1], about.heading[:, 0])),
-        "place": _place(scene, about),
+        "place": field_of(scene, about.x_m, about.y_m),
     }
 
 
@@ -73,11 +74,11 @@ def _fifths(values: Floats) -> Ints:
     return np.where(np.isfinite(values), bins, NOWHERE).astype(np.int64)
 
 
-def _place(scene: Scene, about: Surroundings) -> Ints:
+def field_of(scene: Scene, x_m: Floats, y_m: Floats) -> Ints:
     """Return the field of a 4 by 4 grid over the tank."""
     x0, y0, x1, y1 = scene.arena.outline.bounds
-    column = np.clip((about.x_m - x0) / (x1 - x0) * _PLACES, 0, _PLACES - 1).astype(np.int64)
-    row = np.clip((about.y_m - y0) / (y1 - y0) * _PLACES, 0, _PLACES - 1).astype(np.int64)
+    column = np.clip((x_m - x0) / (x1 - x0) * _PLACES, 0, _PLACES - 1).astype(np.int64)
+    row = np.clip((y_m - y0) / (y1 - y0) * _PLACES, 0, _PLACES - 1).astype(np.int64)
     return row * _PLACES + column
 
 

@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.candidates import Candidate, is_generic
+from zfcal.diagnose.contexts import N_FIELDS, field_of
 from zfcal.diagnose.scores import (
     Score,
     Tables,
@@ -49,7 +50,7 @@ from zfcal.model.kernels.scores import (
     mixture_score,
     social_score,
 )
-from zfcal.model.kernels.world import SPEED, TRAIT, Packed
+from zfcal.model.kernels.world import SPEED, TRAIT, Packed, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
 from zfcal.model.views import (
@@ -340,7 +341,7 @@ class Screen:
         return np.asarray(still)
 
     def _ask_speed(self, candidate: Candidate) -> Score:
-        effect, moves = candidate.effect, self.scene.moves
+        effect = candidate.effect
         if effect.stops:
             return self._ask_rests(candidate)
         probe = replace(
@@ -349,8 +350,9 @@ class Screen:
         )
         factor = self.speed_factor(pack([probe], self.scene.arena))
         cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
-        kept, response = self._response
-        cue = tame(centred(cue, moves.zone, kept))
+        kept, within = self._asked_within(candidate)
+        response = centred(self._tamed_speeds, within, kept)
+        cue = tame(centred(cue, within, kept))
         score, squares = summed(candidate, cue * response), float((cue**2).sum())
         # A factor exp(s cue) changes the speed by s cue times its mean.
         unit = float(self.own_speeds[kept].mean()) if kept.any() else 1.0
@@ -361,14 +363,26 @@ class Screen:
             information=change**2 / max(score.information, 1e-300) if squares else 0.0,
         )
 
-    @cached_property
-    def _response(self) -> tuple[NDArray[np.bool_], Floats]:
-        """Which moves count for effects on speed, and their speeds less the zone's mean."""
-        moves, response = self.scene.moves, self.own_speeds
+    def _asked_within(self, candidate: Candidate) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Return which moves count for an effect on speed, and within what it is asked for.
+
+        A lit room makes fish fast there, and so where many are, if they gather there: effects of
+        the list are asked for within fields of the tank. Those beyond it may be such a place.
+        """
+        moves = self.scene.moves
         stopping = "freezing" in self.fitted.parameters.effects
         kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
-        response = np.minimum(response, np.quantile(response, _FAST_QUANTILE))
-        return kept, centred(response, moves.zone, kept)
+        zone = moves.zone.astype(np.int64)
+        return kept, zone if is_generic(candidate.name) else N_FIELDS * zone + self._field
+
+    @cached_property
+    def _field(self) -> NDArray[np.int64]:
+        moves, states = self.scene.moves, self.scene.states
+        return field_of(self.scene, states[moves.at, X, moves.who], states[moves.at, Y, moves.who])
+
+    @cached_property
+    def _tamed_speeds(self) -> Floats:
+        return np.asarray(np.minimum(self.own_speeds, np.quantile(self.own_speeds, _FAST_QUANTILE)))
 
     def _ask_rests(self, candidate: Candidate) -> Score:
         """Return how many more steps at rest follow on steps at rest than short draws make."""
