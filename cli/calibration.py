@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .durations import seconds
-from .options import Command, seed_option
+from .options import Command, Fours, seed_option
 from .output import Output
 from .streams import STDIN, each_trial, trials_together
 
@@ -38,13 +38,21 @@ def round_options(*, generations: str = "", budget: str = "") -> Callable[[Comma
             help=f"Wall-clock time per round, such as 50s.{budget}",
         ),
         click.option(
-            "--population", type=int, default=60, show_default=True, help="A multiple of four."
+            "--population", type=Fours(), default=60, show_default=True, help="A multiple of four."
         ),
         click.option(
-            "--runs", type=int, default=1, show_default=True, help="Simulations an evaluation."
+            "--runs",
+            type=click.IntRange(min=1),
+            default=1,
+            show_default=True,
+            help="Simulations an evaluation.",
         ),
         click.option(
-            "--steps", type=int, default=3000, show_default=True, help="Steps of each of them."
+            "--steps",
+            type=click.IntRange(min=1),
+            default=3000,
+            show_default=True,
+            help="Steps of each of them.",
         ),
         click.option(
             "--optimiser",

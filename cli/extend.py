@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .durations import seconds
-from .options import EXISTING, PLACE, makes_artifacts, seed_option, speaks, takes_trials
+from .options import (
+    EXISTING,
+    PLACE,
+    Fours,
+    makes_artifacts,
+    seed_option,
+    speaks,
+    takes_trials,
+)
 from .output import Output
 from .streams import each_trial
 
@@ -29,7 +37,9 @@ if TYPE_CHECKING:
 @click.option("--findings", type=EXISTING, help="Take these.  [default: diagnosis/findings.json]")
 @click.option("--generations", type=click.IntRange(min=0), help="Per model.  [default: 15]")
 @click.option("--budget", "budget_s", type=seconds, metavar="TIME", help="Per model, such as 50s.")
-@click.option("--population", type=int, default=60, show_default=True, help="A multiple of four.")
+@click.option(
+    "--population", type=Fours(), default=60, show_default=True, help="A multiple of four."
+)
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
 @click.option("-o", "--out", "output", type=PLACE, help="Model.  [default: models/extended.toml]")

@@ -31,6 +31,21 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class Fours(click.IntRange):
+    """Whole numbers from four on that four divides: two tournaments of two make one pair."""
+
+    def __init__(self) -> None:
+        super().__init__(min=4)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        number = int(super().convert(value, param, ctx))
+        if number % 4:
+            low = number - number % 4
+            self.fail(f"{number} is no multiple of four; take {low} or {low + 4}.", param, ctx)
+        return number
+
+
 def laid_out(command: Command) -> Command:
     """Keep the lines of the example in the help as they are.
 

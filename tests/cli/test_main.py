@@ -173,6 +173,15 @@ def test_what_is_no_finite_number_is_wrong_usage(zfcal, words, number):
     assert ("no finite number" in done.err) == (number != "-1")
 
 
+@pytest.mark.parametrize("command", ["calibrate", "extend", "watch"])
+@pytest.mark.parametrize(("number", "hint"), [("7", "take 4 or 8"), ("0", "x>=4"), ("-4", "x>=4")])
+def test_a_population_of_no_fours_is_wrong_usage(zfcal, command, number, hint):
+    """It is said before a trial is opened, with what would do."""
+    done = zfcal(command, "t", "--population", number)
+    assert done.code == 2
+    assert hint in done.err
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [
