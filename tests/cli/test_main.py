@@ -182,6 +182,14 @@ def test_a_population_of_no_fours_is_wrong_usage(zfcal, command, number, hint):
     assert hint in done.err
 
 
+@pytest.mark.parametrize("option", ["--runs", "--steps"])
+def test_a_search_without_steps_is_wrong_usage(zfcal, option):
+    """None at all cannot be compared with anything."""
+    done = zfcal("calibrate", "t", option, "0")
+    assert done.code == 2
+    assert "x>=1" in done.err
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [

@@ -29,7 +29,7 @@ MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
 
 _NAMES = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 _BROKEN = (OSError, EOFError, zlib.error)
-# What is read without pyarrow's threads: one that is just starting when the process ends aborts it.
+# Parsed without threads of pyarrow: one that is just starting when the process ends aborts it.
 _ALONE_BYTES = 1 << 20
 
 
