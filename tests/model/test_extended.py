@@ -496,6 +496,22 @@ def test_a_place_is_found_to_the_millimetre(two_rooms, model):
     )
 
 
+def test_a_given_place_outside_the_tank_is_fitted_from_where_it_is(two_rooms, model):
+    """Two metres above: everything else is fitted as well, and its place stays or comes nearer."""
+    drift = having(model, {"directional-drift": {"strength": 0.5, "direction_rad": math.pi / 2}})
+    xy_m, _ = simulate_tracks(drift, two_rooms, n_agents=5, n_steps=3000, seed=3)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    place = {"strength": 2.0, "x_m": 0.5, "y_m": 3.0, "reach_m": 2.0}
+    free = tuple(("place-preference", key) for key in place)
+    given = having(model, {"place-preference": place})
+    fitted = maximise(scene, given, free=free)
+    held = maximise(scene, given)
+    assert held.nats > nats_at(scene, [given], start_of(given))[0] + 10
+    assert fitted.nats > held.nats + 10
+    values = fitted.parameters.effects["place-preference"]
+    assert two_rooms.outline.bounds[1] <= values["y_m"] <= 3.0
+
+
 def test_a_parameter_at_its_bound_holds_none_of_the_others_up(two_rooms, model):
     """A place far away acts as a drift where its reach is as large as it can be, and strong."""
     place = {"strength": 1.0, "x_m": 2.4, "y_m": 1.6, "reach_m": 2.0}

@@ -183,6 +183,8 @@ def _intervals(
     found = {}
     for (name, key), half in zip(free, 1.96 * error, strict=True):
         low, high = bounds_of(name, key, scene.arena)
+        # The place of a model that came from elsewhere may lie outside the tank.
+        low, high = min(low, values[key]), max(high, values[key])
         found[key] = (max(low, values[key] - half), min(high, values[key] + half))
     return found
 

@@ -91,7 +91,7 @@ def maximise(
         Threads; the numbers do not depend on them.
     """
     seen = view_of(scene, without_effects(parameters))
-    climb = _Climb(scene=scene, free=free, seen=seen, n_workers=n_workers)
+    climb = _Climb(scene=scene, given=parameters, free=free, seen=seen, n_workers=n_workers)
     x = [values.copy() for values in (start_of(parameters) if start is None else start)]
     here = climb.at(parameters, x)
     psi = None
@@ -118,7 +118,8 @@ def nats_at(
     start
         Per zone, as `zone_scores` takes it.
     """
-    climb = _Climb(scene=scene, free=(), seen=view_of(scene, without_effects(models[0])))
+    seen = view_of(scene, without_effects(models[0]))
+    climb = _Climb(scene=scene, given=models[0], free=(), seen=seen)
     return tuple(float(np.nansum(climb.log_p(model, start))) for model in models)
 
 
@@ -138,9 +139,16 @@ class _Climb:
     """Steps uphill on the likelihood of a scene."""
 
     scene: Scene
+    given: Parameters
     free: Free
     seen: View
     n_workers: int = 1
+
+    def bounds(self, name: str, key: str) -> tuple[float, float]:
+        """Return the range of an effect's parameter, and of what the model came with."""
+        low, high = bounds_of(name, key, self.scene.arena)
+        value = self.given.effects[name][key]
+        return min(low, value), max(high, value)
 
     @cached_property
     def turns(self) -> tuple[ZoneTurns, ...]:
@@ -184,7 +192,7 @@ class _Climb:
         """Return the scores of the effects' parameters, in units of their ranges."""
 
         def column(name: str, key: str) -> Floats:
-            low, high = bounds_of(name, key, self.scene.arena)
+            low, high = self.bounds(name, key)
             value = here.parameters.effects[name][key]
             by = _DIFFERENCE * min(high - low, 1.0)
             by = by if value + by <= high else -by
@@ -222,14 +230,14 @@ class _Climb:
         slope = psi.sum(axis=0)
         pushed = np.zeros(len(self.free), dtype=bool)
         for p, (name, key) in enumerate(self.free):
-            low, high = bounds_of(name, key, self.scene.arena)
+            low, high = self.bounds(name, key)
             value = parameters.effects[name][key]
             pushed[p] = (value <= low and slope[p] < 0) or (value >= high and slope[p] > 0)
         return pushed
 
     def _moved(self, parameters: Parameters, by: Floats) -> Parameters:
         for (name, key), change in zip(self.free, by, strict=True):
-            low, high = bounds_of(name, key, self.scene.arena)
+            low, high = self.bounds(name, key)
             here = parameters.effects[name][key]
             value = here + change * (high - low)
             if low == 0.0 and key not in _AXES:
@@ -243,7 +251,7 @@ class _Climb:
         information = _information(here, psi)
         k = len(self.free)
         whole: Floats = np.asarray(linalg.pinvh(information)) if k else np.zeros((0, 0))
-        ranges = np.array([np.ptp(bounds_of(*pair, self.scene.arena)) for pair in self.free])
+        ranges = np.array([np.ptp(self.bounds(*pair)) for pair in self.free])
         covariance = whole[-k:, -k:] * np.outer(ranges, ranges) if k else whole
         zones = [
             _zone_of(own, zone, here.parameters.zone_names) if turns.enough else zone
@@ -260,8 +268,8 @@ class _Climb:
 def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, float]:
     """Return the range within which an effect's parameter is fitted.
 
-    In an arena a place is looked for within the tank: from one metres away fish would be drawn the
-    same way wherever they are, which is no place but a direction.
+    In an arena a place is looked for within the box round the tank: from one metres away fish would
+    be drawn the same way wherever they are, which is no place but a direction.
     """
     (found,) = (each for each in find_effect(name).parameters if each.name == key)
     if arena is None or key not in _AXES:
