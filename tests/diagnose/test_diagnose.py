@@ -2,14 +2,13 @@
 
 import dataclasses
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.confirming import Confirmed
-from zfcal.diagnose.diagnose import _explains, _kept, _omnibus_note, diagnose
+from zfcal.diagnose.diagnose import _explains, _kept, diagnose
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
@@ -159,19 +158,6 @@ def test_what_is_there_beside_a_given_effect_is_named(beside_cohesion):
     found = beside_cohesion(**{"turning-bias": {"strength": 0.12}})
     assert found.screened[0].name != "turning-bias"
     assert [effect.name for effect in found.effects] == ["turning-bias"]
-
-
-@pytest.mark.parametrize(
-    ("effects", "p", "says"),
-    [((), 1e-9, False), (("crowding",), 1e-9, True), (("crowding",), 0.2, False)],
-)
-def test_what_is_left_beside_an_effect_may_be_its_form(question, record, fish, effects, p, says):
-    """Where the ranks are still uneven with it in the model."""
-    model = dataclasses.replace(fish, effects={name: {} for name in effects})
-    final = SimpleNamespace(fitted=SimpleNamespace(parameters=model))
-    asked = question(record(3, minutes=1.0, n_fish=2))
-    note = _omnibus_note(asked, final, Omnibus(p=p, worst="speed", z=6.0))
-    assert ("crowding may have another form" in note.says) == says
 
 
 def test_a_short_recording_is_untestable(ask, record):

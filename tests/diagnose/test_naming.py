@@ -91,13 +91,24 @@ def test_a_shadow_is_no_tie(suspect):
     assert choose([best, shadow], stands("alignment")).ties == ()
 
 
-def test_whoever_is_much_richer_has_no_shadows(suspect):
+def test_whoever_follows_another_has_no_shadows(suspect, candidate):
     """A place says what a drift says, and more; so a drift that gains as much is a tie."""
-    place = suspect("place-preference", 0.3, n_free=4)
-    drift = suspect("directional-drift", 0.26, scatter=0.5, n_free=2)
-    bias = suspect("turning-bias", 0.26, scatter=0.5, n_free=3)
+
+    def of(name, mean, **values):
+        return suspect(name, mean, n_free=len(free_of(candidate(name))), **values)
+
+    place = of("place-preference", 0.3)
+    drift = of("directional-drift", 0.26, scatter=0.5)
+    assert (place.n_free, drift.n_free) == (4, 3)
     assert choose([place, drift], stands("place-preference")).ties == (drift,)
-    assert choose([place, bias], stands("place-preference")).ties == ()
+
+
+def test_whoever_is_much_richer_has_no_shadows(suspect):
+    """Four parameters beside two and three: with two more an effect bends to nearly any form."""
+    place = suspect("place-preference", 0.3, n_free=4)
+    two, three = (suspect("turning-bias", 0.26, scatter=0.5, n_free=n) for n in (2, 3))
+    assert choose([place, two], stands("place-preference")).ties == (two,)
+    assert choose([place, three], stands("place-preference")).ties == ()
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.speeds import fit_speed, log_density
+from zfcal.diagnose.candidates import candidates_of
+from zfcal.diagnose.confirming import confirm, half_of
+from zfcal.diagnose.null import theory
+from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.selection import Asked, Selector
+from zfcal.diagnose.speeds import fit_speed, held_out_gain, log_density
+from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene
 
@@ -64,6 +69,84 @@ def test_each_zone_has_its_own_law():
     ones = np.ones(1200)
     parts = [log_density(draws[zone == z], ones[zone == z], zone[zone == z]) for z in (1, 2)]
     assert log_density(draws, ones, zone) == pytest.approx(np.concatenate(parts))
+
+
+def test_a_field_has_a_pace_of_its_own():
+    """Twice as fast in one field: as if each draw there were half as large."""
+    rng = np.random.default_rng(3)
+    draws, zone = rng.gamma(2.0, 0.03, 4000), np.ones(4000, dtype=np.int64)
+    field = np.repeat([3, 7], 2000).astype(np.int64)
+    twice, ones = np.where(field == 7, 2.0, 1.0), np.ones(4000)
+    paced = log_density(twice * draws, ones, zone, field=field)
+    known = log_density(twice * draws, twice, zone)
+    assert paced.sum() == pytest.approx(known.sum(), abs=5)
+    assert paced.sum() > log_density(twice * draws, ones, zone).sum() + 100
+    # A factor on all of a field says nothing then.
+    assert log_density(twice * draws, twice, zone, field=field).sum() == pytest.approx(
+        paced.sum(), abs=0.5
+    )
+
+
+def test_a_pace_is_that_of_the_steps_that_are_learnt_from():
+    """Others do not change the law, and a field of which nothing is known is as fast as all."""
+    rng = np.random.default_rng(3)
+    draws, zone = rng.gamma(2.0, 0.03, 3000), np.ones(3000, dtype=np.int64)
+    field = np.repeat([1, 2, 3], 1000).astype(np.int64)
+    learnt, ones = np.arange(3000) < 2000, np.ones(3000)
+    own = log_density(draws, ones, zone, learnt, field)
+    odd = np.where(learnt, draws, 3 * draws)
+    assert log_density(odd, ones, zone, learnt, field)[learnt] == pytest.approx(own[learnt])
+    unknown = log_density(draws, ones, zone, learnt)[~learnt]
+    assert own[~learnt].mean() == pytest.approx(unknown.mean(), abs=0.01)
+
+
+LIT = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach_m": 0.35}}
+
+
+def shy_by(per_neighbour):
+    """Return fish that are slower or faster for each neighbour, in a tank with one lit room."""
+    return LIT | {"crowding": {"per_neighbour": per_neighbour, "radius_m": 0.35}}
+
+
+@pytest.mark.parametrize("per_neighbour", [0.1, -0.1])
+def test_a_lit_room_does_not_change_the_size_of_crowding(screen, candidate, per_neighbour):
+    """Where fish gather in it, company looks faster than it is: within 0.04 all the same."""
+    own = screen(40, shy_by(per_neighbour))
+    found = fit_speed(own, candidate("crowding", radius_m=0.35), per_neighbour / 2)
+    assert found.values["per_neighbour"] == pytest.approx(per_neighbour, abs=0.04)
+    assert found.gain.sum() > 100
+
+
+def test_what_one_half_says_of_crowding_holds_in_the_other(screen, candidate):
+    """In a lit room too: fields that nothing was learnt of say nothing."""
+    own, crowding = screen(40, shy_by(0.1)), candidate("crowding", radius_m=0.35)
+    halves = [half_of(own.scene, own.scene.moves, which) for which in (0, 1)]
+    gains = [held_out_gain(own, crowding, 0.1, learnt) for learnt in halves]
+    unknown = [np.isnan(gain).mean() for gain in gains]
+    assert min(unknown) == 0
+    assert 0 < max(unknown) < 0.2
+    for gain, learnt in zip(gains, halves, strict=True):
+        assert np.nansum(gain[~learnt]) > 30
+
+
+def test_crowding_in_a_lit_room_is_named(screen, tank):
+    """Where across fields the one takes from the other: five times as many nats as it needs."""
+    names = ("crowding", "speed-matching", "fatigue")
+    family = candidates_of(tuple(find_effect(name) for name in names), tank)
+    asked = Asked(candidates=family, held=(), null=theory(0))
+    selector = Selector(listed=asked, rivals=lambda *_: [], suspicious=False, n_workers=2)
+    own = screen(40, shy_by(0.1))
+    steps = selector.select(own, ask_all(own, family, 2)).steps
+    assert [step.choice.best.name for step in steps] == ["crowding"]
+    (told,), _ = confirm(own, steps, n_workers=2)
+    assert told.holds
+    assert told.gain_nats_per_step * len(own.scene.moves) > 100
+
+
+def test_no_steps_have_no_density():
+    """A recording in which nothing moved, say."""
+    none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
+    assert log_density(none, none, whole, field=whole).shape == (0,)
 
 
 @pytest.mark.parametrize("exponent", [0.4, -0.3])

@@ -20,7 +20,7 @@ from zfcal.diagnose.case import (
     open_case,
 )
 from zfcal.diagnose.confirming import Confirmed, confirm
-from zfcal.diagnose.controls import NAMES, ask_controls
+from zfcal.diagnose.controls import ask_controls
 from zfcal.diagnose.findings import (
     Diagnosis,
     EffectFound,
@@ -32,6 +32,7 @@ from zfcal.diagnose.findings import (
 from zfcal.diagnose.heats import Sampled, hopeful
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
 from zfcal.diagnose.naming import ties_of
+from zfcal.diagnose.notes import notes_of
 from zfcal.diagnose.null import (
     Null,
     from_replicates,
@@ -69,8 +70,6 @@ replicates."""
 
 _NOTICED = 5.0
 """Standard errors at which an effect of faint strength must stand to be testable."""
-
-_CONTROL = 4.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -290,7 +289,9 @@ def _diagnosis(
         where=where,
         effects=effects,
         screened=screened,
-        notes=_notes(case, rows, final, judged),
+        notes=notes_of(
+            case.question, final, judged.halves, judged.omnibus, [row.controls for row in rows]
+        ),
         base=case.screen.fitted.parameters,
         extended=final.fitted.parameters,
         minutes=case.scene.duration_s / 60,
@@ -354,48 +355,3 @@ def _as_screened(best: Best, minutes: float) -> Screened:
 def _where(own: Residuals, rows: Sequence[_Row]) -> tuple[Located, ...]:
     nulls = [row.at_large[0] for row in rows if row.at_large]
     return located(own, *centre_and_spread(own, nulls)) if nulls else located(own)
-
-
-def _notes(case: Case, rows: Sequence[_Row], final: Screen, judged: _Judged) -> tuple[Note, ...]:
-    return (
-        _noise_note(case.question),
-        judged.halves,
-        _controls_note(case, rows, final),
-        _omnibus_note(case.question, final, judged.omnibus),
-        Note(
-            name="null",
-            says="Replicates of the fitted model through the measurement."
-            if rows
-            else "The theory alone: tracking noise can pose as a turning memory.",
-            values={"replicates": float(len(rows))},
-        ),
-    )
-
-
-def _omnibus_note(question: Question, final: Screen, omnibus: Omnibus) -> Note:
-    text = f"Ranks of headings and speeds in the final model: largest is {omnibus.worst}."
-    effects = " and ".join(final.fitted.parameters.effects)
-    if effects and is_suspicious(question, omnibus):
-        text += f" In these fish {effects} may have another form than in the model."
-    return Note(name="omnibus", says=text, values={"z": omnibus.z, "p": omnibus.p})
-
-
-def _noise_note(question: Question) -> Note:
-    if question.noise_m is None:
-        text = "The noise of positions is not known; none was assumed."
-        return Note(name="noise", says=text, values={})
-    text = f"Positions err by {1000 * question.noise_m:.2g} mm per coordinate"
-    source = question.noise_source
-    return Note(name="noise", says=f"{text} ({source}).", values={"noise_m": question.noise_m})
-
-
-def _controls_note(case: Case, rows: Sequence[_Row], final: Screen) -> Note:
-    z = ask_controls(final, case.question.seed)
-    drawn = [row.controls for row in rows if row.controls is not None]
-    null = from_replicates(np.array(drawn)) if drawn else theory(len(z))
-    own = null.standardised(z)
-    fired = [name for name, value in zip(NAMES, own, strict=True) if abs(value) > _CONTROL]
-    text = "Negative controls are silent, as they must be."
-    if fired:
-        text = f"NEGATIVE CONTROL FIRES: {', '.join(fired)}. Do not trust this diagnosis."
-    return Note(name="controls", says=text, values=dict(zip(NAMES, map(float, own), strict=True)))

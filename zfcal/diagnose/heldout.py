@@ -10,7 +10,7 @@ itself, which no model can foresee, weighs more than most effects.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from scipy.special import rel_entr
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.fields import is_within_fields
+from zfcal.diagnose.freezes import rested_steps
 from zfcal.diagnose.naming import refit
 from zfcal.diagnose.rests import ChainFit, runs_of
-from zfcal.diagnose.screening import Screen, rested_steps
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import chain_of, log_density
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
@@ -239,34 +241,43 @@ def speed_gains(
         return None
     moves = base.scene.moves
     parts = []
+    field = _field(base, [name for name in names if find_effect(name).on_speed])
     if any(effect.on_speed and not effect.stops for effect in effects):
-        parts.append(_factor_gains(model, base, random))
+        parts.append(_factor_gains(model, base, field, random))
     if any(effect.stops for effect in effects):
         parts.append(_stop_gains(model, trained))
     before = _factor(base)
     return Gains(
-        base=Steps(at=moves.at, values=log_density(moves.speed_m_s, before, moves.zone)),
+        base=Steps(
+            at=moves.at, values=log_density(moves.speed_m_s, before, moves.zone, field=field)
+        ),
         gain=Steps(at=moves.at, values=sum((gain for gain, _ in parts), np.zeros(len(moves)))),
         expected=Steps(at=moves.at, values=sum((e for _, e in parts), np.zeros(len(moves)))),
     )
 
 
+def _field(base: Screen, names: Sequence[str]) -> Ints | None:
+    """Return the field of each move; none where an effect is a place that fields hold apart."""
+    within = all(is_within_fields(candidate_of(name, {})) for name in names)
+    return base.fields if within else None
+
+
 def _factor_gains(
-    model: Screen, base: Screen, random: np.random.Generator
+    model: Screen, base: Screen, field: Ints | None, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Return gains of factors on speed, and what draws of the model itself would gain."""
     moves = base.scene.moves
     ours, theirs = _factor(model), _factor(base)
 
     def gain(speed: Floats) -> Floats:
-        own = log_density(speed, ours, moves.zone)
-        return own - log_density(speed, theirs, moves.zone)
+        own = log_density(speed, ours, moves.zone, field=field)
+        return own - log_density(speed, theirs, moves.zone, field=field)
 
-    expected = np.zeros(len(moves))
+    expected, alike = np.zeros(len(moves)), moves.zone if field is None else field
     for _ in range(_DRAWS):
         drawn = np.empty(len(moves))
-        for number in np.unique(moves.zone):
-            rows = np.flatnonzero(moves.zone == number)
+        for number in np.unique(alike):
+            rows = np.flatnonzero(alike == number)
             drawn[rows] = random.permutation(model.own_speeds[rows])
         expected += gain(drawn * ours) / _DRAWS
     return gain(moves.speed_m_s), expected

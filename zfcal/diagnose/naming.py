@@ -40,7 +40,10 @@ _SURE = 2.0
 """Standard errors by which one suspect must beat another."""
 
 _RICHER = 2
-"""Parameters more: a place with a reach of its own bends to a drift of any form."""
+"""Parameters more, by which a suspect follows whatever form another one has."""
+
+_BENDS_TO = {"place-preference": "directional-drift"}
+"""A place with a reach of its own bends to a drift of any form."""
 
 _OWN_SHARE = 0.5
 """Of what a suspect gains alone, it gains so much beside another if both are there."""
@@ -264,9 +267,9 @@ def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]
             continue
         # It gains as much. If it falls beside the best one, which stands beside it, then
         # it is a shadow; if both fall they say the same, and if both stand neither does all.
-        # One that is so much richer follows whatever form the other has: its standing says nothing.
-        richer = best.n_free - other.n_free >= _RICHER
-        if not richer and standing(best.candidate, other) and not standing(other.candidate, best):
+        # One that follows whatever form the other has stands beside it anyway: that says nothing.
+        follows = best.n_free - other.n_free >= _RICHER or _BENDS_TO.get(best.name) == other.name
+        if not follows and standing(best.candidate, other) and not standing(other.candidate, best):
             continue
         ties.append(other)
     return Choice(best=best, ties=tuple(ties), considered=tuple(order))

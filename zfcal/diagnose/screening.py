@@ -10,12 +10,11 @@ is standard normal for a right model, whatever the dependence along the trajecto
 martingale; Rao 1948, Mathematical Proceedings of the Cambridge Philosophical Society 44:
 50-57; Neyman 1959, C(alpha) tests). Headings are judged given the speed of the step.
 Speeds are judged given the zone, by the covariance of their response with what the
-effect responds to, within each zone.
+effect responds to, within each zone; unless that is a place, within fields of the tank.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -24,15 +23,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.diagnose.candidates import Candidate, is_generic
-from zfcal.diagnose.contexts import N_FIELDS, field_of
+from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.fields import fields_of, is_within_fields
+from zfcal.diagnose.freezes import rest_score, rested_steps
 from zfcal.diagnose.scores import (
     Score,
     Tables,
     basis_of,
     by_track,
     centred,
-    excess_deviate,
     normal_deviate,
     summed,
     tables_of,
@@ -50,7 +49,7 @@ from zfcal.model.kernels.scores import (
     mixture_score,
     social_score,
 )
-from zfcal.model.kernels.world import SPEED, TRAIT, Packed, X, Y
+from zfcal.model.kernels.world import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, cos_of
 from zfcal.model.views import (
@@ -77,9 +76,6 @@ _LATE_SHARE = 0.3
 """Share of a late response that is asked for: all fish that respond late are seldom seen."""
 
 _FAST_QUANTILE = 0.995
-
-_LONG_RESTS_S = (1.0, 2.0)
-"""Rests that last longer are asked for after one step at rest more."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -343,14 +339,18 @@ class Screen:
     def _ask_speed(self, candidate: Candidate) -> Score:
         effect = candidate.effect
         if effect.stops:
-            return self._ask_rests(candidate)
+            rested = self.still_for(rested_steps(candidate))
+            return rest_score(
+                candidate, self.still[0], rested, self.scene.moves.zone, self.scene.dt_s
+            )
         probe = replace(
             without_effects(self.fitted.parameters),
             effects={effect.name: candidate.values(effect.probe)},
         )
         factor = self.speed_factor(pack([probe], self.scene.arena))
         cue = np.log(np.maximum(factor, 1e-9)) / effect.probe
-        kept, within = self._asked_within(candidate)
+        kept, zone = self._swum, self.scene.moves.zone.astype(np.int64)
+        within = self.fields if is_within_fields(candidate) else zone
         response = centred(self._tamed_speeds, within, kept)
         cue = tame(centred(cue, within, kept))
         score, squares = summed(candidate, cue * response), float((cue**2).sum())
@@ -363,77 +363,21 @@ class Screen:
             information=change**2 / max(score.information, 1e-300) if squares else 0.0,
         )
 
-    def _asked_within(self, candidate: Candidate) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Return which moves count for an effect on speed, and within what it is asked for.
-
-        A lit room makes fish fast there, and so where many are, if they gather there: effects of
-        the list are asked for within fields of the tank. Those beyond it may be such a place.
-        """
-        moves = self.scene.moves
+    @cached_property
+    def _swum(self) -> NDArray[np.bool_]:
+        """Return which moves count for effects on speed."""
         stopping = "freezing" in self.fitted.parameters.effects
-        kept = ~(self.still[0] | self.still[1]) if stopping else np.ones(len(moves), bool)
-        zone = moves.zone.astype(np.int64)
-        return kept, zone if is_generic(candidate.name) else N_FIELDS * zone + self._field
+        n = len(self.scene.moves)
+        return ~(self.still[0] | self.still[1]) if stopping else np.ones(n, dtype=bool)
 
     @cached_property
-    def _field(self) -> NDArray[np.int64]:
-        moves, states = self.scene.moves, self.scene.states
-        return field_of(self.scene, states[moves.at, X, moves.who], states[moves.at, Y, moves.who])
+    def fields(self) -> NDArray[np.int64]:
+        """Field of the tank in which each move began, shape (move,)."""
+        return fields_of(self.scene, self._swum)
 
     @cached_property
     def _tamed_speeds(self) -> Floats:
         return np.asarray(np.minimum(self.own_speeds, np.quantile(self.own_speeds, _FAST_QUANTILE)))
-
-    def _ask_rests(self, candidate: Candidate) -> Score:
-        """Return how many more steps at rest follow on steps at rest than short draws make."""
-        moves, now = self.scene.moves, self.still[0]
-        # A short draw looks like a rest of one step: after several of them few are left.
-        rested = self.still_for(rested_steps(candidate))
-        share = np.bincount(moves.zone, weights=now) / np.maximum(np.bincount(moves.zone), 1)
-        expected = np.where(rested, share[moves.zone], 0.0)
-        steps = np.where(rested, now, 0.0) - expected
-        count, n_rested = float((rested & now).sum()), float(rested.sum())
-        more = _Freezes.of(candidate, len(moves), self.scene.dt_s)
-        as_rare = float(now.mean()) + more.at_rest / max(len(moves), 1)
-        faint = excess_deviate(count + more.after_rest, as_rare * (n_rested + more.rested))
-        return replace(
-            summed(candidate, steps),
-            z=excess_deviate(count, float(expected.sum())),
-            strength=float(steps.sum() / max(n_rested, 1.0)),
-            information=(max(faint, 0.0) / candidate.faint) ** 2,
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Freezes:
-    """Steps that a faint rate of freezing would add to a recording.
-
-    Parameters
-    ----------
-    at_rest
-        Of them all.
-    rested, after_rest
-        Steps after so many at rest as are asked for, and of these the ones at rest themselves.
-    """
-
-    at_rest: float
-    rested: float
-    after_rest: float
-
-    @classmethod
-    def of(cls, candidate: Candidate, n_moves: int, dt_s: float) -> _Freezes:
-        """Return them for an effect at its shape."""
-        duration_s = candidate.shape["duration_s"]
-        goes_on = math.exp(-dt_s / duration_s)
-        n_freezes = candidate.faint * n_moves * dt_s
-        rested = n_freezes * goes_on ** (rested_steps(candidate) - 1) / (1 - goes_on)
-        return cls(at_rest=n_freezes / (1 - goes_on), rested=rested, after_rest=rested * goes_on)
-
-
-def rested_steps(candidate: Candidate) -> int:
-    """Return after how many steps at rest it is asked whether one more follows."""
-    duration_s = candidate.shape.get("duration_s", 0.0)
-    return 1 + sum(duration_s > limit_s for limit_s in _LONG_RESTS_S)
 
 
 def ask_all(screen: Screen, candidates: Sequence[Candidate], n_workers: int) -> list[Score]:

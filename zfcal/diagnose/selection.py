@@ -23,7 +23,7 @@ from zfcal.diagnose.naming import Choice, Refit, choose, refit
 from zfcal.diagnose.null import UNLIKE, Null
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.sides import without_feigned
+from zfcal.diagnose.sides import directions, feigned, with_direction
 from zfcal.diagnose.together import together
 
 Floats = NDArray[np.float64]
@@ -167,6 +167,20 @@ def _least_beside(first: Refit | None, further: Refit) -> float:
     return _GENERIC_SHARE * first.nats if guessed or is_generic(further.name) else 0.0
 
 
+def _is_clearer(rival: Refit, listed: Refit) -> bool:
+    """Return whether an effect beyond the list explains so much more than a listed one."""
+    return rival.over(listed) > _RIVAL_AHEAD and rival.nats > _RIVAL_TIMES * listed.nats
+
+
+def _is_guessed(listed: Refit, guesses: Sequence[Refit]) -> bool:
+    """Return whether one beyond the list explains more than what would be named.
+
+    Where it gains too little to be named itself it is what an effect before it leaves over, and
+    so is a listed one that explains less of the same.
+    """
+    return not is_generic(listed.name) and any(_is_clearer(each, listed) for each in guesses)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
     """One effect that was added.
@@ -249,20 +263,20 @@ class Selector:
         """
         steps: list[Step] = []
         first = tuple(best_of(self.listed, scores))
-        ranked = others = self._others(screen, first)
+        ranked = self._others(screen, first)
+        left_over = len(ranked) < len(first)
         for number in range(_MOST_EFFECTS):
             sampled = Sampled(whole=screen)
             if number:
                 ranked = self._others(screen, self._ranked(sampled, steps))
-            step = self._step(sampled, ranked, steps)
+            step, aside = self._step(sampled, ranked, steps)
             if step is None:
+                left_over = left_over or (aside and not number)
                 break
             steps.append(step)
             screen = step.choice.best.screen
             self.told("adding effects", number + 1, _MOST_EFFECTS)
-        return Selection(
-            steps=tuple(steps), screened=first, final=screen, left_over=len(others) < len(first)
-        )
+        return Selection(steps=tuple(steps), screened=first, final=screen, left_over=left_over)
 
     def _others(self, screen: Screen, ranked: Sequence[Best]) -> list[Best]:
         """Return effects without those that the given model's ones leave over."""
@@ -277,22 +291,29 @@ class Selector:
         open_ = hopeful(sampled, open_, least_z(_least(done)), self.n_workers)
         return best_of(self.listed, ask_all(sampled.whole, open_, self.n_workers))
 
-    def _step(self, sampled: Sampled, ranked: Sequence[Best], done: Sequence[Step]) -> Step | None:
+    def _step(
+        self, sampled: Sampled, ranked: Sequence[Best], done: Sequence[Step]
+    ) -> tuple[Step | None, bool]:
+        """Return what is added, and whether something that gains enough was put aside."""
         taken = {step.choice.best.name for step in done}
         suspects = _in_reach([best for best in ranked if best.p < LEVEL])[:_SUSPECTS]
         first = done[0].choice.best if done else None
         least = _least(done)
         heats, rivals = self._entered(sampled, suspects, taken, least)
         others = run_heats(sampled, [best.score for best in rivals], self.n_workers)
-        made = self._refits(sampled.whole, [*unbeaten(heats), *ahead(others, heats)])
+        listed = with_direction(unbeaten(heats), heats)
+        made = self._refits(sampled.whole, [*listed, *ahead(others, heats)])
         worth = [each for each in made if each.nats > max(least, _least_beside(first, each))]
-        listed = [each for each in worth if not is_generic(each.name)]
-        generic = [each for each in worth if is_generic(each.name)]
-        if not listed and not generic:
-            return None
-        choice = self._choose(listed, generic)
+        aside = [each for each in feigned(made, sampled.whole) if each in worth]
+        if aside:
+            worth += directions(made, worth)
+        choice = self._choose(worth, aside)
+        guesses = [each for each in made if is_generic(each.name) and each not in worth]
+        if choice is None or _is_guessed(choice.best, guesses):
+            return None, bool(aside)
         by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
-        return Step(choice=choice, best=by_name[choice.best.name], before=sampled.whole)
+        step = Step(choice=choice, best=by_name[choice.best.name], before=sampled.whole)
+        return step, bool(aside)
 
     def _entered(
         self, sampled: Sampled, suspects: Sequence[Best], taken: set[str], least: float
@@ -302,7 +323,7 @@ class Selector:
         known = {*taken, *(score.candidate.name for score in scores)}
         if taken:
             ran = run_heats(sampled, scores, self.n_workers)
-            heats = [heat for heat in ran if heat.gains(least)]
+            heats = with_direction([heat for heat in ran if heat.gains(least)], ran)
             return heats, self._rivals(sampled, known, suspects) if heats else []
         worth = bool(suspects) or self.suspicious
         return together(
@@ -326,14 +347,16 @@ class Selector:
         with ThreadPoolExecutor(n_workers) as pool:
             return list(pool.map(made, heats))
 
-    def _choose(self, listed: Sequence[Refit], generic: Sequence[Refit]) -> Choice:
-        if not listed:
-            return Choice(best=max(generic, key=lambda each: each.worth), ties=(), considered=())
-        choice = choose(without_feigned(listed), self._stands)
+    def _choose(self, worth: Sequence[Refit], aside: Sequence[Refit]) -> Choice | None:
+        """Return which it is of those that are worth it; those aside only must be beaten."""
+        generic = [each for each in worth if is_generic(each.name)]
+        listed = [each for each in worth if not is_generic(each.name) and each not in aside]
+        choice = choose(listed, self._stands) if listed else None
+        beaten = aside if choice is None else (choice.best, *aside)
         for rival in sorted(generic, key=lambda each: -each.worth):
-            ahead = rival.over(choice.best) > _RIVAL_AHEAD
-            if ahead and rival.nats > _RIVAL_TIMES * choice.best.nats:
-                return Choice(best=rival, ties=(), considered=choice.considered)
+            if all(_is_clearer(rival, each) for each in beaten):
+                considered = () if choice is None else choice.considered
+                return Choice(best=rival, ties=(), considered=considered)
         return choice
 
     def _stands(self, candidate: Candidate, beside: Refit) -> bool:

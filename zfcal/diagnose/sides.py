@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from zfcal.diagnose.heats import Heat
 from zfcal.diagnose.naming import Refit
+from zfcal.diagnose.screening import Screen
+from zfcal.model.extended import maximise
 from zfcal.model.kernels.world import X, Y
 
 _PLACE, _DIRECTION = "place-preference", "directional-drift"
@@ -44,21 +48,59 @@ def one_sided(refit: Refit) -> float:
     return float(np.hypot(*mean))
 
 
-def without_feigned(refits: Sequence[Refit]) -> list[Refit]:
-    """Return suspects without a place that is as well a direction.
+def feigned(refits: Sequence[Refit], before: Screen) -> list[Refit]:
+    """Return the suspects that are a place and as well a direction.
 
     A place that is near the edge of where fish were, or reaches far, bends to any direction whose
-    strength is not the same all over the tank, and so gains more than the direction itself.
+    strength is not the same all over the tank, and so gains more than the direction itself. Where
+    the model has the direction already, such a place must gain so much more beside it.
 
     Parameters
     ----------
     refits
         Each in the model by itself.
+    before
+        The model without any of them.
     """
-    gained = {each.name: each.nats for each in refits}
-    needed = _CLEARLY * gained.get(_DIRECTION, 0.0)
-    return [
-        each
-        for each in refits
-        if each.name != _PLACE or each.nats > needed or one_sided(each) < _ONE_SIDE
-    ]
+    sided = [each for each in refits if each.name == _PLACE and one_sided(each) >= _ONE_SIDE]
+    if not sided:
+        return []
+    if _DIRECTION in before.fitted.parameters.effects:
+        needed = (_CLEARLY - 1.0) * _gained(before)
+    else:
+        needed = _CLEARLY * max((e.nats for e in refits if e.name == _DIRECTION), default=0.0)
+    return [each for each in sided if each.nats <= needed]
+
+
+def _gained(screen: Screen) -> float:
+    """Return what the direction that is in a model gains there, in nats."""
+    fitted, model = screen.fitted, screen.fitted.parameters
+    rest = {name: values for name, values in model.effects.items() if name != _DIRECTION}
+    free = tuple(pair for pair in fitted.free if pair[0] != _DIRECTION)
+    without = maximise(screen.scene, replace(model, effects=rest), free=free, start=fitted.x)
+    return fitted.nats - without.nats - (len(fitted.free) - len(free))
+
+
+def directions(refits: Sequence[Refit], without: Sequence[Refit]) -> list[Refit]:
+    """Return the directions among suspects, but for those among some others.
+
+    Where a place is put aside for one, a direction is worth what the place is.
+    """
+    return [each for each in refits if each.name == _DIRECTION and each not in without]
+
+
+def with_direction(kept: Sequence[Heat], heats: Sequence[Heat]) -> list[Heat]:
+    """Return heats, and the direction's whatever it gained if a place on one side is among them.
+
+    Parameters
+    ----------
+    kept
+        Those that may still win.
+    heats
+        All of them.
+    """
+    names = {heat.score.candidate.name for heat in kept}
+    places = [heat.first for heat in kept if heat.score.candidate.name == _PLACE]
+    if _DIRECTION in names or not any(p is not None and one_sided(p) >= _ONE_SIDE for p in places):
+        return list(kept)
+    return [*kept, *(heat for heat in heats if heat.score.candidate.name == _DIRECTION)]

@@ -7,8 +7,11 @@ as far as it differs between draws,
     log f(v | c) = log f0(v / factor) - log factor
 
 where f0 is a histogram of the zone with the weight of a few draws spread over its bins,
-taken from those very draws. Freezing is a chain of two states instead: see
-`zfcal.diagnose.rests`.
+taken from those very draws. How strong an effect is, and whether it holds on minutes that it
+was not fitted to, is told within fields of the tank (`zfcal.diagnose.fields`), each with a pace
+of its own. What it gains beside other effects is told without as well: places are among these.
+
+Freezing is a chain of two states instead: see `zfcal.diagnose.rests`.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.fields import is_known, is_within_fields
 from zfcal.diagnose.rests import ChainFit, Runs, fit_chain, runs_of
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import bounds_of, without_effects
@@ -34,6 +38,7 @@ _SPARE, _MOST_BINS = 2, 200
 """Bins beyond the fastest speed: draws without a factor may be faster than any speed."""
 
 _SMOOTH = 0.5
+_FAST_QUANTILE = 0.995
 _DIFFERENCE = 1e-3
 _RAREST = 1e-6
 """Chance per step below which fish never stop."""
@@ -50,7 +55,8 @@ class SpeedFit:
     interval
         95 % interval of the strength.
     gain : ndarray, shape (move,)
-        Log likelihood that it adds to each step, in nats.
+        Log likelihood that it adds to each step, in nats: within fields, or across them at the size
+        that is most likely there, whichever is more.
     """
 
     values: dict[str, float]
@@ -63,6 +69,7 @@ def log_density(
     factor: Floats,
     zone: NDArray[np.int64],
     learnt: NDArray[np.bool_] | None = None,
+    field: NDArray[np.int64] | None = None,
 ) -> Floats:
     """Return the log density of speeds, each zone's law taken from the same draws.
 
@@ -73,6 +80,8 @@ def log_density(
     zone : ndarray of int64, shape (step,)
     learnt : ndarray of bool, shape (step,)
         Draws that the laws are taken from; all by default.
+    field : ndarray of int64, shape (step,)
+        Parts of the zones that each have a pace of their own; none by default.
 
     Returns
     -------
@@ -80,11 +89,28 @@ def log_density(
         In nats, per m/s.
     """
     known = np.ones(len(speed), dtype=bool) if learnt is None else learnt
+    if field is not None and len(field):
+        factor = factor * _pace(speed / factor, zone, known, field)
     log_p = np.empty_like(speed)
     for number in np.unique(zone):
         rows = zone == number
         log_p[rows] = _in_zone(speed[rows], factor[rows], known[rows])
     return log_p
+
+
+def _pace(
+    draws: Floats, zone: NDArray[np.int64], known: NDArray[np.bool_], field: NDArray[np.int64]
+) -> Floats:
+    """Return how much faster fish are in each draw's field than in its zone, by the known draws.
+
+    One draw of the zone's mean is added to each field, which may hold next to nothing.
+    """
+    usual = draws[known] if known.any() else draws
+    tamed = np.where(known, np.minimum(draws, np.quantile(usual, _FAST_QUANTILE)), 0.0)
+    means = np.bincount(zone, tamed) / np.maximum(np.bincount(zone, known), 1.0)
+    relative = tamed / np.maximum(means, 1e-9)[zone]
+    paces = (np.bincount(field, relative) + 1) / (np.bincount(field, known) + 1)
+    return np.asarray(paces[field])
 
 
 def _in_zone(speed: Floats, factor: Floats, known: NDArray[np.bool_]) -> Floats:
@@ -134,7 +160,7 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     if candidate.effect.stops:
         return _fit_stops(screen, candidate)
     all_ = np.ones(len(screen.scene.moves), dtype=bool)
-    likelihood = _Likelihood(screen=screen, candidate=candidate, learnt=all_)
+    likelihood = _Likelihood.of(screen, candidate, all_)
     low, high = bounds_of(candidate.name, candidate.effect.strength)
     best = likelihood.maximum(start)
     by = max(0.05 * abs(best), 1e-3 * (high - low))
@@ -142,10 +168,15 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     here, up, down = (float(likelihood.log_p(middle + d * by).sum()) for d in (0, 1, -1))
     curvature = (2 * here - up - down) / by**2
     half = 1.96 / math.sqrt(curvature) if curvature > 0 else math.inf
+    gains = [likelihood.log_p(best) - likelihood.without()]
+    if likelihood.field is not None:
+        # Beside suspects that say where fish are fast it counts that this one may say so as well.
+        across = replace(likelihood, field=None)
+        gains.append(across.log_p(across.maximum(best)) - across.without())
     return SpeedFit(
         values=candidate.values(best),
         interval=(max(low, best - half), min(high, best + half)),
-        gain=likelihood.log_p(best) - likelihood.without(),
+        gain=max(gains, key=lambda gain: float(gain.sum())),
     )
 
 
@@ -163,14 +194,21 @@ def held_out_gain(
     start
         A strength to start from.
     learnt : ndarray of bool, shape (move,)
-        Steps that the strength and the laws of the zones are taken from.
+        Steps that the strength, the laws of the zones and the paces of fields are taken from.
+
+    Returns
+    -------
+    ndarray, shape (move,)
+        In nats; NaN in fields of which too few steps are learnt from.
     """
     if candidate.effect.stops:
         runs = runs_of(screen)
         found = chain_of(runs, candidate, screen.scene.dt_s, learnt)
         return runs.log_chance(found.chain) - runs.log_chance(found.alike)
-    likelihood = _Likelihood(screen=screen, candidate=candidate, learnt=learnt)
-    return likelihood.log_p(likelihood.maximum(start)) - likelihood.without()
+    likelihood = _Likelihood.of(screen, candidate, learnt)
+    gain = likelihood.log_p(likelihood.maximum(start)) - likelihood.without()
+    field = likelihood.field
+    return gain if field is None else np.where(is_known(field, learnt), gain, np.nan)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,16 +218,26 @@ class _Likelihood:
     screen: Screen
     candidate: Candidate
     learnt: NDArray[np.bool_]
+    field: NDArray[np.int64] | None
+
+    @classmethod
+    def of(cls, screen: Screen, candidate: Candidate, learnt: NDArray[np.bool_]) -> _Likelihood:
+        """Return them within fields, unless the effect is a place."""
+        field = screen.fields if is_within_fields(candidate) else None
+        return cls(screen=screen, candidate=candidate, learnt=learnt, field=field)
 
     def without(self) -> Floats:
-        moves = self.screen.scene.moves
-        return log_density(moves.speed_m_s, self.screen.model_factor, moves.zone, self.learnt)
+        return self._at(self.screen.model_factor)
 
     def log_p(self, strength: float) -> Floats:
-        screen, moves = self.screen, self.screen.scene.moves
+        screen = self.screen
         model = _alone(screen, self.candidate.values(strength))
         factor = screen.speed_factor(pack([model(self.candidate.name)], screen.scene.arena))
-        return log_density(moves.speed_m_s, screen.model_factor * factor, moves.zone, self.learnt)
+        return self._at(screen.model_factor * factor)
+
+    def _at(self, factor: Floats) -> Floats:
+        moves = self.screen.scene.moves
+        return log_density(moves.speed_m_s, factor, moves.zone, self.learnt, self.field)
 
     def maximum(self, start: float) -> float:
         """Return the strength that is most likely on the steps that are learnt from."""
