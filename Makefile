@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-plain lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
+.PHONY: help install demo check test test-slow test-plain lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -29,12 +29,15 @@ install: .venv/.installed  ## Build .venv from the lock and put zfcal into it
 demo: install  ## Run the main job on the sample; say where the figures lie
 	$(BIN)/zfcal demo demo-trial
 
-check: lint test-plain test  ## Run everything that must pass before a change lands
+check: lint test-plain test-slow test  ## Run everything that must pass before a change lands
 
 # tests/warming.py compiles the kernels once, before the workers start. Bytecode is kept, whatever the
 # shell says: the tests start some hundred processes, of which each would compile zfcal anew.
-test: install  ## Run the whole test suite
-	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal
+test: install  ## Run the tests that take a moment each
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
+
+test-slow: install  ## Run those that take seconds each: whole loops, kills, faults, recoveries
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal -m slow
 
 # The kernels once more as plain Python: what the compiler hides, such as an index out of bounds.
 test-plain: install  ## Run the model's quick tests without the compiler

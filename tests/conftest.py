@@ -24,6 +24,8 @@ from zfcal.diagnose.findings import (
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
+HALVES = ("", "slow", "not slow")
+
 # The first call of a kernel compiles it, which no deadline allows for.
 settings.register_profile("zfcal", deadline=None)
 settings.register_profile("zfcal-ci", deadline=None, derandomize=True, print_blob=True)
@@ -44,7 +46,8 @@ def pytest_configure(config):
         # wait for a matrix of ten rows take the processor from the other worker.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     option = config.option
-    is_part = option.keyword or option.markexpr or option.collectonly
+    # The slow ones, and the others, are halves of the whole: what make asks for.
+    is_part = option.keyword or option.markexpr not in HALVES or option.collectonly
     is_whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not is_part
     if not is_whole or not config.getoption("numprocesses", None):
         return

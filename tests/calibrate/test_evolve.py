@@ -261,6 +261,7 @@ def rugged_features(genes):
     return np.exp(-4.0 * ridges) * np.exp(-np.square(genes - 0.6).sum(axis=1) / 3.0)[:, None]
 
 
+@pytest.mark.slow
 def test_populations_come_out_as_deaps_do():
     """Best S, median S and both mean diversities after ten generations, over 60 seeds.
 

@@ -118,6 +118,7 @@ def test_simulate_a_model_into_a_new_trial(zfcal, trial):
     assert zfcal("analyse", "other").code == 0
 
 
+@pytest.mark.slow
 def test_a_trial_is_imported_analysed_and_calibrated_without_pandas(tracks_csv, tmp_path):
     """It would take a third of the time of a short round; the second round reads the first."""
     tracks_csv()
@@ -139,6 +140,7 @@ def test_a_trial_is_imported_analysed_and_calibrated_without_pandas(tracks_csv, 
     assert (tmp_path / "trial" / "models" / "000180.toml").exists()
 
 
+@pytest.mark.slow
 def test_report_writes_a_page_once(zfcal, trial):
     """The second time there is nothing to do."""
     zfcal("analyse", "trial")
@@ -163,6 +165,7 @@ def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
     assert not (trial / "report").exists()
 
 
+@pytest.mark.slow
 def test_a_report_names_what_is_damaged_each_time(zfcal, trial):
     """Up to date is not whole: exit 3 of the second run too, until the file is mended."""
     segment = trial / "tracks" / "000060.parquet"

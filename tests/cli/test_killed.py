@@ -75,6 +75,7 @@ def sources(tracks_csv, film, tmp_path):
     (tmp_path / film.name).symlink_to(film)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "words", "seed"),
     [

@@ -48,6 +48,7 @@ def artifacts():
 INIT = "--side-m 1 --fish 3 --robot --fps 5 --seed 1 -q >/dev/null"
 
 
+@pytest.mark.slow
 def test_a_pipeline_ends_in_the_bytes_of_one_command_after_the_other(
     shell, zfcal, tracks_csv, artifacts, tmp_path
 ):
@@ -138,6 +139,7 @@ def test_several_trials_go_through_one_pipe(shell, tracks_csv, tmp_path):
     assert len(done.stdout.split()) == 8
 
 
+@pytest.mark.slow
 def test_a_line_of_cron_works(trial, tmp_path):
     """No terminal, an empty home, an almost empty environment, an absolute path.
 

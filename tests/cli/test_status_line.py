@@ -5,6 +5,8 @@ import os
 import pty
 import subprocess
 
+import pytest
+
 from zfcal.online.watch_events import StageStatus, Status
 from zfcal_cli.status_line import StatusLine, describe
 
@@ -43,6 +45,7 @@ def test_nothing_is_drawn_without_a_terminal(capsys):
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_on_a_terminal_it_is_drawn_and_wiped(command, trial, watching):
     """The lines of the log stand above it; standard output stays paths alone."""
     ours, theirs = pty.openpty()

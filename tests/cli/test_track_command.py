@@ -121,6 +121,7 @@ def test_the_methods_are_those_of_the_tracker():
     assert tracking.METHODS == METHODS
 
 
+@pytest.mark.slow
 def test_a_watch_tracks_analyses_and_calibrates_to_the_end(zfcal, tank, film, watching):
     """It ends with the recording, in the files of one command after the other."""
     source = words(film)[2:]

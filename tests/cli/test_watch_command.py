@@ -30,6 +30,7 @@ def kinds(events, stage=None):
     return [each["event"] for each in events if stage in (None, each.get("stage"))]
 
 
+@pytest.mark.slow
 def test_new_segments_are_analysed_and_calibrated_until_the_recording_ends(watching, live):
     """Each window as its second minute comes; the last part segment says that it is the end."""
     root, bring = live
@@ -51,6 +52,7 @@ def test_new_segments_are_analysed_and_calibrated_until_the_recording_ends(watch
     assert "skipped" not in kinds(watch.events)
 
 
+@pytest.mark.slow
 def test_once_makes_what_offline_commands_make_and_leaves(process, zfcal, trial, watching):
     """The same bytes; run again, it does nothing and lists the same paths.
 
@@ -73,6 +75,7 @@ def test_once_makes_what_offline_commands_make_and_leaves(process, zfcal, trial,
     assert "arrived" in again.err
 
 
+@pytest.mark.slow
 def test_a_second_watch_ends_with_75(process, watching, live):
     """But one that runs another stage of the same trial may work beside it."""
     root, _ = live
@@ -86,6 +89,7 @@ def test_a_second_watch_ends_with_75(process, watching, live):
         assert watch.end() == 143
 
 
+@pytest.mark.slow
 def test_signals_end_it_with_nothing_half_done(process, zfcal, trial, watching):
     """In the middle of a round; run again, it goes on and ends in the bytes of offline commands."""
     slow = ["--generations", "30", *watching.quick[2:]]
@@ -102,6 +106,7 @@ def test_signals_end_it_with_nothing_half_done(process, zfcal, trial, watching):
     assert watching.contents(trial) == watching.contents(other)
 
 
+@pytest.mark.slow
 def test_a_half_written_file_is_named_and_passed_over_until_it_is_whole(watching, live, trial):
     """Without a dot in its name, as a careless copy leaves it."""
     root, bring = live
@@ -120,6 +125,7 @@ def test_a_half_written_file_is_named_and_passed_over_until_it_is_whole(watching
     assert (root / "models" / "000180.toml").exists()
 
 
+@pytest.mark.slow
 def test_one_that_stays_half_written_is_exit_code_3(process, watching, live):
     """All else is done."""
     root, bring = live
@@ -132,6 +138,7 @@ def test_one_that_stays_half_written_is_exit_code_3(process, watching, live):
     assert (root / "models" / "000120.toml").exists()
 
 
+@pytest.mark.slow
 def test_a_trial_that_goes_away_is_waited_for(watching, live):
     """A disk that is mounted again, a folder that was moved by mistake."""
     root, bring = live
@@ -146,6 +153,7 @@ def test_a_trial_that_goes_away_is_waited_for(watching, live):
     assert (root / "models" / "000180.toml").exists()
 
 
+@pytest.mark.slow
 def test_what_fails_is_said_and_tried_again(watching, live):
     """Settings that somebody is editing: a mistake, and its correction."""
     root, bring = live

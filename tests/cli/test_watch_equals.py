@@ -75,6 +75,7 @@ def run_watch(watching, root, bring):
         assert watch.wait() == 0
 
 
+@pytest.mark.slow
 def test_pipe_cron_and_watch_end_in_the_same_bytes(three, command, zfcal, watching):
     """While segments appear one after the other; offline gives that too, as other tests show."""
     (pipe, cron, watched), bring = three
@@ -86,6 +87,7 @@ def test_pipe_cron_and_watch_end_in_the_same_bytes(three, command, zfcal, watchi
     assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.slow
 def test_rounds_of_a_watch_with_a_budget_can_be_repeated(trial, zfcal, watching):
     """Each by the generations that it records, and the statistics that it is about."""
     again = shutil.copytree(trial, trial.parent / "again")

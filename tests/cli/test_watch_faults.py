@@ -110,6 +110,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(place)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_stops_nothing_for_good(recording, undisturbed, watching, small_disk):
     """Said with what to do; when there is room again, it goes on and ends in the same bytes."""
     root = shutil.copytree(recording, small_disk / "trial")
@@ -128,6 +129,7 @@ def test_a_disk_that_is_full_stops_nothing_for_good(recording, undisturbed, watc
     assert watching.contents(root) == undisturbed
 
 
+@pytest.mark.slow
 def test_segments_out_of_order_end_in_the_same_bytes(recording, undisturbed, watching):
     """What came late is put in, and the rounds after it are made again.
 
@@ -147,6 +149,7 @@ def test_segments_out_of_order_end_in_the_same_bytes(recording, undisturbed, wat
     assert watching.contents(recording) == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.apt
 def test_a_clock_that_is_set_by_an_hour_changes_nothing(
     recording, undisturbed, watching, set_clock
@@ -164,6 +167,7 @@ def test_a_clock_that_is_set_by_an_hour_changes_nothing(
     assert max(event["at_s"] for event in watch.events) < 600
 
 
+@pytest.mark.slow
 def test_folders_that_are_moved_away_and_back(recording, undisturbed, watching):
     """The segments vanish for a while; what was made of them stays."""
     with watching.start(recording, *ROUND) as watch:
@@ -177,6 +181,7 @@ def test_folders_that_are_moved_away_and_back(recording, undisturbed, watching):
     assert watching.contents(recording) == undisturbed
 
 
+@pytest.mark.slow
 def test_the_search_gives_way_to_others(recording, watching):
     """Its process has a lower priority than those of tracker, statistics and robot."""
     with watching.start(recording, *ROUND) as watch:
@@ -190,6 +195,7 @@ def test_the_search_gives_way_to_others(recording, watching):
         assert nice["calibrate"] == min(nice["analyse"] + 10, 19)
 
 
+@pytest.mark.slow
 def test_stages_die_with_a_watch_that_is_killed(recording, watching):
     """Their locks are free at once for the watch after it."""
     with watching.start(recording, "--generations", "500", *ROUND[2:]) as watch:
@@ -212,6 +218,7 @@ def is_running(process):
     return words.rpartition(")")[2].split()[0] != "Z"
 
 
+@pytest.mark.slow
 def test_a_stage_that_fails_to_the_last_is_exit_code_1(recording, watching):
     """Without anything new for a while the watch leaves, and says what is wrong."""
     (recording / "models" / "000000.toml").unlink()

@@ -54,6 +54,7 @@ def test_a_short_recording_has_four_blocks(screen):
     assert np.array_equal(half_of(scene, scene.turns, 1), block % 2 == 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["turning-bias", "alignment", "directional-drift", "burst-and-coast", "boldness"]
 )
@@ -72,6 +73,7 @@ def short_screens(record, tank, fish):
     return [Screen(scene=scene, fitted=maximise(scene, fish, rounds=0)) for scene in scenes]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["burst-and-coast", "speed-matching", "crowding", "fatigue"])
 def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(short_screens, candidate, name):
     """One of ten recordings at the most, where one in forty would be chance."""
@@ -98,6 +100,7 @@ def test_an_effect_that_is_there_is_confirmed(screen, candidate, name, values):
     assert told.gain_nats_per_step == pytest.approx(gained / n, rel=0.25)
 
 
+@pytest.mark.slow
 def test_effects_are_confirmed_each_beside_those_before_it(screen, candidate):
     """As one by one, whatever the number of threads: a turn, a speed, and a turn again."""
     own = screen(23, {"turning-bias": {"strength": 0.4}}, minutes=4.0)
@@ -112,6 +115,7 @@ def test_effects_are_confirmed_each_beside_those_before_it(screen, candidate):
     assert note == halves_note(own)
 
 
+@pytest.mark.slow
 def test_what_an_effect_of_the_given_model_leaves_over_is_not_confirmed(screen, candidate):
     """As for an effect added a moment ago: the cohesion of the model reaches less far."""
     fish = {"group-cohesion": {"weight": 4.0, "full_m": 0.3, "leaning": 1.0}}
@@ -228,6 +232,7 @@ def test_what_one_fish_may_have_alone_is_not_asked_of_others(screen, candidate, 
     assert is_shared(score, scene)
 
 
+@pytest.mark.slow
 def test_beside_individuals_that_differ_an_effect_must_be_shared(screen, candidate):
     """A model with boldness asks the other fish as well; a model without it does not."""
     bias = candidate("turning-bias")
@@ -244,6 +249,7 @@ def test_beside_individuals_that_differ_an_effect_must_be_shared(screen, candida
         assert alone(step).holds == holds
 
 
+@pytest.mark.slow
 def test_what_comes_and_goes_is_not_named(screen, candidate):
     """A confirmation says so, whatever the effect gains on held-out steps."""
     own = screen(11)

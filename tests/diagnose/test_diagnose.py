@@ -90,6 +90,7 @@ def test_what_disagrees_is_located(named):
     assert any("turn" in place.statistic for place in named.where)
 
 
+@pytest.mark.slow
 def test_a_right_model_has_nothing_missing(ask, record):
     """No effect, and the model that was fitted as it is; every z is told."""
     found = ask(record(11, minutes=6.0))
@@ -99,6 +100,7 @@ def test_a_right_model_has_nothing_missing(ask, record):
     assert all(abs(each.z) < 4.5 for each in found.screened if not each.lacks)
 
 
+@pytest.mark.slow
 def test_the_null_through_the_measurement_does_not_depend_on_workers(ask, record):
     """Three replicates of three minutes; stages are told in order, and none is left out."""
     told = []
@@ -145,6 +147,7 @@ def beside_cohesion(question, record, fish):
     return of
 
 
+@pytest.mark.slow
 def test_what_a_given_effect_leaves_over_is_unexplained(beside_cohesion):
     """An effect stands out, no other one than that of the model: neither named nor nothing."""
     found = beside_cohesion()
@@ -153,6 +156,7 @@ def test_what_a_given_effect_leaves_over_is_unexplained(beside_cohesion):
     assert found.effects == ()
 
 
+@pytest.mark.slow
 def test_what_is_there_beside_a_given_effect_is_named(beside_cohesion):
     """What the given effect leaves over stands out more, and does not hide it."""
     found = beside_cohesion(**{"turning-bias": {"strength": 0.12}})
@@ -252,6 +256,7 @@ def test_a_constant_speed_is_no_trouble(ask, worlds):
         assert all(math.isfinite(value) for value in effect.strength.values())
 
 
+@pytest.mark.slow
 def test_a_quick_answer_does_not_name_the_trackers_noise(ask, record):
     """Taken for exact, positions that err by 2 mm show an effect; known to err, they do not."""
     exact = record(41, minutes=4.0)
@@ -264,6 +269,7 @@ def test_a_quick_answer_does_not_name_the_trackers_noise(ask, record):
     assert null.values["replicates"] == 6
 
 
+@pytest.mark.slow
 def test_a_clear_effect_is_named_in_spite_of_noise(ask, record):
     """Half a millimetre, and six replicates."""
     exact = record(23, BIAS, minutes=4.0)
@@ -297,12 +303,14 @@ LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}
 """Fish that stay fast, by another form than that of the listed effect."""
 
 
+@pytest.mark.slow
 def test_another_form_of_a_listed_effect_is_called_by_its_name(ask, record):
     """Speed follows the own speed in a straight line, not by a power: that is burst and coast."""
     found = ask(record(61, LINEAR, minutes=6.0))
     assert found.effects[0].name == "burst-and-coast"
 
 
+@pytest.mark.slow
 def test_what_is_small_beside_a_listed_effect_is_no_effect_beyond_the_list(ask, record):
     """Strong handedness, and a little pull to walls: by itself that is said, beside it not."""
     walls = {"generic:heading:wall": {"strength": -0.55}}
@@ -312,6 +320,7 @@ def test_what_is_small_beside_a_listed_effect_is_no_effect_beyond_the_list(ask, 
     assert [each.name for each in both.effects] == ["turning-bias"]
 
 
+@pytest.mark.slow
 def test_beside_what_is_only_a_guess_a_small_listed_effect_is_not_said(ask, record):
     """A strong pull to walls has no mechanism; a little handedness may be left over from it."""
     walls = {"generic:heading:wall": {"strength": -1.2}}
@@ -321,6 +330,7 @@ def test_beside_what_is_only_a_guess_a_small_listed_effect_is_not_said(ask, reco
     assert [each.name for each in both.effects] == ["generic:heading:wall"]
 
 
+@pytest.mark.slow
 def test_speeds_are_another_matter_beside_a_guess_about_headings(ask, record):
     """The same pull to walls, and fish that get slower: both are said."""
     walls = {"generic:heading:wall": {"strength": -1.2}}

@@ -36,6 +36,7 @@ def names(found):
     return [heat.score.candidate.name for heat in found]
 
 
+@pytest.mark.slow
 def test_only_what_cannot_be_the_best_is_left_out(asked, ran):
     """Whoever wins with all steps has won its heat, and the heat was of some use."""
     screen, scores = asked

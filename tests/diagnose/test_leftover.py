@@ -21,6 +21,7 @@ def with_cohesion(screen, candidate):
     return of
 
 
+@pytest.mark.slow
 def test_what_another_form_leaves_over_falls(with_cohesion, candidate):
     """Cohesion in the model reaches less far than that of the fish: far ones seem to count."""
     made = with_cohesion(71, **FADED)
@@ -35,6 +36,7 @@ def test_the_right_form_leaves_nothing_over(with_cohesion, candidate):
     assert abs(made.screen.ask(candidate("interaction-range", range_m=0.15)).z) < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "values"),
     [("turning-bias", {"strength": 0.3}), ("leader-following", {"strength": 1.5})],

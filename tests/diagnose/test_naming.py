@@ -172,6 +172,7 @@ def test_a_refit_finds_the_strength_again(screen, candidate):
     assert abs(made.screen.ask(candidate("turning-bias")).z) < 0.5
 
 
+@pytest.mark.slow
 def test_a_strength_errs_by_what_its_interval_says(screen, candidate):
     """Biases of 0.4 in eight recordings, in their standard errors: without bias, and spread by one.
 
@@ -187,6 +188,7 @@ def test_a_strength_errs_by_what_its_interval_says(screen, candidate):
     assert 1.6 < np.sum(np.square(errors)) < 20.1
 
 
+@pytest.mark.slow
 def test_a_refit_without_an_effect_gains_little(screen, candidate):
     """Twice the gain is chi-square with one degree: below 8 but once in 200."""
     own = screen(11)

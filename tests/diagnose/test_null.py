@@ -125,6 +125,7 @@ def test_noise_and_grain_are_added(gappy, chain_of, tank):
     assert np.nanmax(np.abs(coarse - clean)) <= 0.0025 + 1e-9
 
 
+@pytest.mark.slow
 def test_noise_poses_as_memory_in_theory_and_not_in_the_chain(record, chain_of, candidate):
     """Two millimetres of noise on a right model: far out by theory, usual among replicates.
 

@@ -122,6 +122,7 @@ def omnibus(scene, fitted):
     return judge(statistics(standing_of(scene, fitted), np.random.default_rng(0)))
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_the_base_model(worlds):
     """Six recordings of five minutes: none below p = 0.02, and the mean statistic is about 0."""
     for seed in range(40, 46):

@@ -28,6 +28,7 @@ def rests_on_few_steps(candidate):
     return candidate.name == "freezing" or candidate.shape.get("heading_share") == 0.0
 
 
+@pytest.mark.slow
 def test_scores_of_a_right_model_are_standard_normal(screen, tank):
     """All shapes of all effects that rest on many steps, in five recordings of five minutes.
 

@@ -165,6 +165,7 @@ def test_a_direction_comes_along_with_a_place_on_one_side(suspect):
     assert with_direction([other], [other, direction]) == [other]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("effects", "kept"), [(DRIFT, False), (PLACE, True)])
 def test_a_current_is_no_place(screen, candidate, effects, kept):
     """A current pulls the same way everywhere, whatever place comes near it; a place does not."""

@@ -25,6 +25,7 @@ def traced(screen, candidate):
     return of
 
 
+@pytest.mark.slow
 def test_scores_are_positive_without_the_effect_and_nothing_with_it(traced):
     """In units of their own spread; for an effect to the right as for one to the left."""
     for strength in (0.4, -0.4):

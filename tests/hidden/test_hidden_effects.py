@@ -315,6 +315,7 @@ def standing_out(name, steps, base_steps):
     return sign * (a.mean() - b.mean()) / error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_effect_does_what_it_says(name, base_steps):
     """At the strong preset its statistic stands out by three standard errors."""
@@ -324,6 +325,7 @@ def test_the_effect_does_what_it_says(name, base_steps):
     assert standing_out(name, steps, base_steps) > 3
 
 
+@pytest.mark.slow
 def test_base_fish_show_no_effect(base_steps):
     """No statistic of other base fish differs from the base's by four standard errors."""
     others = Steps(make_trial(Scenario(seed=SEED + 1), oracle=False))

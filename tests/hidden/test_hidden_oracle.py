@@ -74,6 +74,7 @@ def test_the_best_fit_is_the_best():
             values[2] = kept
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["alignment", "burst-and-coast", "turning-memory"])
 def test_more_of_an_effect_is_worth_more_nats(name):
     """Faint, clear and strong stand in this order."""

@@ -159,6 +159,7 @@ def pooled(expected, *others):
     return [np.append(x[~rare], x[rare].sum()) for x in (expected, *others)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CROWDS, ids=lambda name: name.replace(" ", "-"))
 def test_thinned_draws_follow_the_twins_density(name, twin, two_rooms, model):
     """Chi-square over 60 angles with 100,000 draws, at p > 1e-4.
@@ -187,6 +188,7 @@ def test_thinned_draws_follow_the_twins_density(name, twin, two_rooms, model):
     assert far_sr > 0.1 or "far" not in name
 
 
+@pytest.mark.slow
 def test_every_step_of_a_large_group_obeys_the_twins_law(twin, make_natural):
     """The twin's distribution function at 480 headings taken is uniform, given all at time t."""
     model = make_natural(POND)

@@ -98,6 +98,7 @@ def nats_of(x, turns, view):
     return zone_scores(x, turns, view)[0]
 
 
+@pytest.mark.slow
 def test_the_hill_is_that_of_the_base_models_likelihood(walk, scene, two_rooms, model):
     """The base's top is as high here, to 1e-3 nats of some 9,000, and nothing higher is missed.
 
@@ -245,6 +246,7 @@ def test_an_empty_room_by_hand(two_rooms, make_natural):
     assert log_density(scene, model, 3) == pytest.approx(by_hand, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", HOOKS.values(), ids=HOOKS.keys())
 def test_the_density_alone_is_that_with_derivatives(scene, model, effects):
     """Step by step, at other parameters than those that the scene was made with."""
@@ -496,6 +498,7 @@ def test_a_place_is_found_to_the_millimetre(two_rooms, model):
     )
 
 
+@pytest.mark.slow
 def test_a_given_place_outside_the_tank_is_fitted_from_where_it_is(two_rooms, model):
     """Two metres above: everything else is fitted as well, and its place stays or comes nearer."""
     drift = having(model, {"directional-drift": {"strength": 0.5, "direction_rad": math.pi / 2}})

@@ -55,6 +55,7 @@ def _points_near_everything(arena, n=40_000):
     return np.vstack([anywhere, close + rng.uniform(-0.003, 0.003, close.shape)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "circular", "ring", "open-square", "post"])
 def test_the_grid_changes_nothing(name):
     """Zone by grid, zone by exact test and zone by shapely are one, borders included."""

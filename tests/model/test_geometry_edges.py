@@ -98,6 +98,7 @@ def test_a_crack_belongs_to_the_zone_that_the_arena_gives_it(name):
     np.testing.assert_array_equal(zones[:, 0], zones[:, 1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "open-square", "circular", "ring"])
 def test_points_of_whole_millimetres_on_walls_and_borders_are_where_the_arena_has_them(name):
     """Tracks of whole millimetres lie on walls all the time: there the kernel says inside, too."""

@@ -91,6 +91,7 @@ def test_the_score_of_the_truth_is_a_martingale(steps, two_rooms, model):
         assert (np.abs(slopes.sum(axis=0)) <= 4.5 * error + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth(two_rooms, model):
     """Ten minutes of five fish, five seeds: at least 85 % of 95 % intervals hold it.
 
@@ -130,6 +131,7 @@ def test_a_zone_nobody_can_reach_is_not_identified(steps, two_rooms, model):
     assert found.identified["walls.kappa_0"]
 
 
+@pytest.mark.slow
 def test_tracking_errors_go_into_the_lapse(run, two_rooms, model):
     """One position in fifty thrown 4 cm off: kappa stays within 15 %, the lapse rises."""
     xy = run[0].copy()
@@ -145,6 +147,7 @@ def test_tracking_errors_go_into_the_lapse(run, two_rooms, model):
     assert found.lapse["centre"] > 0.02
 
 
+@pytest.mark.slow
 def test_the_estimate_beats_every_neighbour(steps, two_rooms, model):
     """No parameter moved by a tenth makes the recording more likely."""
     found = fit(steps, two_rooms, model)
@@ -181,6 +184,7 @@ def test_missing_and_resting_agents_make_no_steps(run, two_rooms, model):
     assert len(whole) - len(gapped) == len(of_third(whole) & {29, 30, 31})
 
 
+@pytest.mark.slow
 def test_a_recording_of_no_agents_is_refused(two_rooms, model):
     """One clear error, not an empty estimate."""
     empty = samples_of(np.empty((100, 0, 2)))
@@ -191,6 +195,7 @@ def test_a_recording_of_no_agents_is_refused(two_rooms, model):
         fit(steps_of(lost, two_rooms, fov_rad=model.fov_rad), two_rooms, model)
 
 
+@pytest.mark.slow
 def test_the_template_keeps_its_speeds(steps, two_rooms, model):
     """Speeds are measured, not estimated here."""
     found = fit(steps, two_rooms, model).parameters

@@ -84,6 +84,7 @@ def test_turns_follow_the_von_mises_law(kappa):
     _check_law(kappa, _turns(kappa, 200_000, 7))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_turns_under_the_staircase_follow_the_von_mises_law(kappa):
     """The same by tables, with a million draws: notices 0.3 %."""

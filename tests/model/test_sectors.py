@@ -89,6 +89,7 @@ def truth(twin, state, model, arena, theta):
     return sum(weight * twin.von_mises(theta, mu, kappa) for weight, mu, kappa in parts), gain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharpness", [0.0, 1.0, 30.0])
 def test_no_heading_of_a_sector_is_likelier_than_its_bound(
     hard_state, sharpness, twin, two_rooms, restless

@@ -99,6 +99,7 @@ def test_speeds_are_drawn_from_each_zones_histogram(two_rooms, model):
         assert (np.abs(row / row.sum() - expected) < 5 * error + 0.003).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "circular", "ring", "open-square"])
 def test_nobody_leaves_the_tank(name, make_natural):
     """Every recorded position of 10,000 agent-steps is inside."""
@@ -121,6 +122,7 @@ def test_a_step_is_the_speed_along_the_new_heading(two_rooms, model):
     assert along == pytest.approx(length, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_both_samplers_give_the_same_occupation(two_rooms, model):
     """Share of time in the centre over 24 runs each: Welch's test at p > 1e-4.
 

@@ -59,6 +59,7 @@ def recorded(model, arena, *, n_agents, n_steps, seed=5, sampler="exact", burn_i
     return record[..., :2], np.arctan2(record[..., 3], record[..., 2]), record[..., 4]
 
 
+@pytest.mark.slow
 @SAMPLERS
 def test_every_step_of_a_run_obeys_the_twins_law(sampler, twin, make_natural):
     """The twin's distribution function at 3,600 headings taken is uniform, given all at time t.
@@ -93,6 +94,7 @@ def _words_used(state, packed, tank, random, grid):
     return -1
 
 
+@pytest.mark.slow
 def test_a_speed_is_drawn_once_and_redrawn_fifty_times(make_natural):
     """Where no speed leads anywhere: 51 draws of two words each, and none for a heading."""
     model = dataclasses.replace(changed(make_natural(SQUARE), speed_frequency=FAST), dt_s=10.0)

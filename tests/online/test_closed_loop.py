@@ -21,6 +21,8 @@ from zfcal.online.virtual_fish import FishOptions
 from zfcal.online.virtual_trial import LoopOptions, starting_model
 from zfcal.tracks import FISH, ROBOT
 
+pytestmark = pytest.mark.slow
+
 LITTLE = Settings(
     population=8, generations=1, steps=200, n_confirmed=2, long_runs=2, long_s=120.0, n_windows=10
 )

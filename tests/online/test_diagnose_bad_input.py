@@ -56,6 +56,7 @@ def test_a_robot_alone_is_one_clear_error(make_trial):
     assert error.value.hint
 
 
+@pytest.mark.slow
 def test_one_fish_is_asked_for_what_needs_no_neighbour(make_trial):
     """The others lack a neighbour, and say so."""
     document = asked(make_trial(seconds=200, n_fish=1))
@@ -65,6 +66,7 @@ def test_one_fish_is_asked_for_what_needs_no_neighbour(make_trial):
     assert not {"alignment", "crowding"} & {each["name"] for each in document["effects"]}
 
 
+@pytest.mark.slow
 def test_constant_speed_ends_in_an_answer(make_trial):
     """No speed effect is found where all speeds are alike, and no number is infinite."""
     root = make_trial(seconds=130)

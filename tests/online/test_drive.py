@@ -102,6 +102,7 @@ def test_a_duration_counts_from_the_first_frame(root):
     assert (len(only(items, "target")), len(only(items, "command"))) == (20, 40)
 
 
+@pytest.mark.slow
 def test_it_is_said_that_no_poses_have_come(root):
     """Once, as a warning, and the drive goes on when they come: its duration begins then."""
     poses, later, heard = root / "poses", root / "later", []

@@ -170,6 +170,7 @@ def test_silence_stops_the_robot_and_it_goes_on(rig):
     assert [told["steps"] >= 3 for told in missed] == [True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     """And the log is whole, and a replay comes to the same."""
@@ -184,6 +185,7 @@ def test_stop_is_the_last_word_on_a_signal(rig, number, code):
     assert rig.told("ended")[0]["because"] == {143: "SIGTERM", 130: "Ctrl-C"}[code]
 
 
+@pytest.mark.slow
 def test_a_driver_that_is_killed_has_its_last_word_and_goes_on(rig, forks):
     """By SIGKILL, twenty times at random instants, from its start on: the robot stops each time.
 
@@ -256,6 +258,7 @@ def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
     assert replay(rig.root, say_nothing).is_same
 
 
+@pytest.mark.slow
 @pytest.mark.apt
 def test_a_clock_that_is_set_by_an_hour_changes_nothing(rig, set_clock):
     """Forwards and back while it drives: no STOP, no tick left out, no latency of an hour."""
@@ -311,6 +314,7 @@ def analysed(template, tmp_path):
     return root
 
 
+@pytest.mark.slow
 def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     """By `zfcal calibrate` beside it, in real time; a broken model is told and ignored."""
     for folder in ("tracks", "stats"):
@@ -340,6 +344,7 @@ def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     assert "000180.toml" in said
 
 
+@pytest.mark.slow
 def test_what_the_robot_complains_of_is_heard(rig):
     """Obstacle: it turns on the spot for half a second; PowerDown for 3 s: it is stopped."""
     rig.start()
@@ -379,6 +384,7 @@ def start_hanging(rig, method, *, call):
     return rig.drivers[-1]
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_slow_holds_up_the_log_alone(rig):
     """A write takes 1.5 s: not a tick is left out meanwhile, and all of it is written then."""
     driver = start_hanging(rig, "zfcal.online.drive_log.DriveLog._write", call=40)
@@ -394,6 +400,7 @@ def test_a_disk_that_is_slow_holds_up_the_log_alone(rig):
     assert replay(rig.root, say_nothing).is_same
 
 
+@pytest.mark.slow
 def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
     """Its main thread waits for something for 1.5 s: STOP comes in time, from the other thread."""
     driver = start_hanging(rig, "zfcal.online.driving.Driver.tick", call=150)

@@ -124,6 +124,7 @@ def test_a_gap_that_is_gone_is_put_back_without_calibrating(trial, found, option
     assert read_json(trial / "diagnosis" / "findings.json") == before
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_whatever_the_workers(
     make_trial, copy_trial, found, quick, read_all
 ):

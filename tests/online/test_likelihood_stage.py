@@ -100,6 +100,7 @@ def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full)
     assert "tracks/000000.parquet" not in inputs
 
 
+@pytest.mark.slow
 def test_the_estimate_itself_is_handed_on_where_that_is_asked_for(make_trial, in_full):
     """The model file has its parameters, says so, and is made anew for it."""
     root = make_trial()

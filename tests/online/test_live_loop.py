@@ -15,6 +15,8 @@ from zfcal.online.live_loop import live_loop
 from zfcal.online.virtual_trial import LoopOptions
 from zfcal.tracks import ROBOT
 
+pytestmark = pytest.mark.slow
+
 SHORT = LoopOptions(duration_s=6.0, video=False, robot="fixed", seed=5)
 
 

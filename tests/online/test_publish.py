@@ -54,6 +54,7 @@ def said_by(words):
     return done.returncode, done.stderr
 
 
+@pytest.mark.slow
 def test_each_model_reaches_the_rig_within_a_second(root):
     """The newest one at first, and a new one as soon as it appears; exit 0 when it was taken."""
     first = settings_of(read_model(root / "models" / "000000.toml"), ZONES)
@@ -80,6 +81,7 @@ def test_each_model_reaches_the_rig_within_a_second(root):
     assert "has taken 30 settings" in said
 
 
+@pytest.mark.slow
 def test_a_rig_that_is_not_there_is_exit_code_1(root):
     """At the end of --duration; without --publish-zones the trial's own zones count."""
     with older_rig.Rig({}) as rig:

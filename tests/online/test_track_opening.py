@@ -5,6 +5,7 @@ import sys
 
 import cv2
 import numpy as np
+import pytest
 
 from zfcal.online.events import say_nothing
 from zfcal.online.setup import NewTrial, create_trial
@@ -34,6 +35,7 @@ print(compiled)
 """
 
 
+@pytest.mark.slow
 def test_all_is_compiled_before_a_source_is_opened(tmp_path):
     """A camera's images of the time that compiling takes would be lost."""
     film = tmp_path / "film.avi"

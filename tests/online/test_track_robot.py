@@ -106,6 +106,7 @@ def root(tmp_path):
     return tmp_path / "trial"
 
 
+@pytest.mark.slow
 def test_the_robot_is_told_from_the_fish_in_every_frame(root, filmed):
     """One id of its own, its place within 3 mm, its heading within 5 degrees, no flip."""
     track(root, options_of(filmed), say_nothing)
@@ -123,6 +124,7 @@ def test_the_robot_is_told_from_the_fish_in_every_frame(root, filmed):
     assert len(np.unique(fish.agent)) == 2
 
 
+@pytest.mark.slow
 def test_images_outside_the_trial_are_known_by_their_names(root, filmed):
     """`zfcal check` does not look for them in the trial."""
     track(root, options_of(filmed), say_nothing)
@@ -131,6 +133,7 @@ def test_images_outside_the_trial_are_known_by_their_names(root, filmed):
     assert not [found for found in check_trial(root) if "overhead:" in found.says]
 
 
+@pytest.mark.slow
 def test_what_is_drawn_below_does_not_move_the_fish(root, filmed):
     """They are where they were, within a millimetre at the median."""
     track(root, options_of(filmed), say_nothing)
@@ -144,6 +147,7 @@ def test_what_is_drawn_below_does_not_move_the_fish(root, filmed):
     assert np.median(error_m) < 0.001
 
 
+@pytest.mark.slow
 def test_a_robot_without_leds_is_told_in_one_line(root, filmed, heard):
     """Nobody is the robot then; the frames are listed."""
     track(root, options_of(filmed, source=str(filmed / "dark")), heard.append)
@@ -157,6 +161,7 @@ def test_a_robot_without_leds_is_told_in_one_line(root, filmed, heard):
     assert all(agent.kind == FISH for poses in frames for agent in poses.agents)
 
 
+@pytest.mark.slow
 def test_leds_of_another_colour_are_not_seen(root, filmed, heard):
     """They are green: blue is looked for in vain."""
     options = dataclasses.replace(options_of(filmed), leds=LedOptions(hue_deg=240.0))
@@ -179,6 +184,7 @@ def test_both_cameras_are_live_or_none(root, filmed):
         track(root, options_of(filmed, source="0"), say_nothing)
 
 
+@pytest.mark.slow
 def test_fish_are_found_before_the_image_below_is_asked_for(root, filmed, monkeypatch):
     """It arrives meanwhile; while the background is learnt no image below is let go by."""
     calls, at, step = [], Below.at, FishTracker.step

@@ -209,6 +209,7 @@ def test_what_is_missing_comes_back_with_the_same_bytes(
     assert read_all(root) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", [1, 2, 3])
 def test_an_interrupted_run_goes_on_and_ends_in_the_same_bytes(new, film, tracked, read_all, when):
     """Wherever it was: after the first segment, after its poses, after the second segment."""
@@ -277,6 +278,7 @@ def test_images_and_mcap_give_the_tracks_of_the_video(new, film, images, tmp_pat
     assert np.array_equal(video.frame, sequence.frame)
 
 
+@pytest.mark.slow
 def test_a_camera_its_recording_and_a_video_give_the_same_tracks(new, images, streaming, tmp_path):
     """Live over HTTP, then from the images that were recorded: every row, times and all.
 
@@ -307,6 +309,7 @@ def test_a_camera_its_recording_and_a_video_give_the_same_tracks(new, images, st
     assert np.array_equal(np.sort(all_tracks(video).x_m), np.sort(of_live.x_m))
 
 
+@pytest.mark.slow
 def test_a_live_recording_that_was_killed_goes_on(new, images, streaming, heard):
     """On its own clock, with ids of its own, and with the frames of the minute that it was in."""
     root = new(fps=30.0)
@@ -352,6 +355,7 @@ def _around_the_gap(tracks):
     return np.arange(len(tracks)) <= place, np.arange(len(tracks)) > place
 
 
+@pytest.mark.slow
 def test_a_camera_that_goes_away_is_waited_for(new, images, streaming, heard):
     """Its gap is counted, and told in one line."""
     root = new(fps=30.0)

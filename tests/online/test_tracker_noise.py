@@ -17,6 +17,8 @@ from zfcal.vision.seen import TrackerOptions
 from zfcal.vision.swimming import swimming
 from zfcal.vision.tracker import FishTracker, follow
 
+pytestmark = pytest.mark.slow
+
 FPS, STEP = 15.0, 3
 N_FRAMES, N_FISH = 450, 3
 

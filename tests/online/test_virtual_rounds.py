@@ -17,6 +17,8 @@ from zfcal.online.virtual_rounds import RoundsBeside, Windows, do_rounds, rounds
 from zfcal.online.virtual_trial import Experiment, LoopOptions
 from zfcal.online.worker import Worker
 
+pytestmark = pytest.mark.slow
+
 LITTLE = Settings(
     population=8, generations=1, steps=200, n_confirmed=2, long_runs=2, long_s=120.0, n_windows=10
 )

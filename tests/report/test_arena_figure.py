@@ -98,6 +98,7 @@ def test_png_is_whole_and_the_same_every_time(arenas, tmp_path, name):
     assert set(chunks(tmp_path / "a.png")) <= {"IHDR", "pHYs", "IDAT", "IEND"}
 
 
+@pytest.mark.slow
 def test_walls_and_zones_are_where_they_are_in_the_tank(arenas, tmp_path):
     """The wall is dark, the centre has the zone's tint, a hole has none."""
     arena = arenas["ring"]

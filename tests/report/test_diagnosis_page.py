@@ -350,6 +350,7 @@ def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
     assert (tmp_path / "mine.png").exists()
 
 
+@pytest.mark.slow
 def test_the_same_findings_give_the_same_bytes(make_sheet, tmp_path):
     """Pictures and page hold nothing of the day."""
     sheet = make_sheet(gap=gap_of(nats_per_step=0.8))

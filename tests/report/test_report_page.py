@@ -96,6 +96,7 @@ def test_the_page_stands_by_itself(drawn_trial):
     assert "prefers-color-scheme: dark" in text
 
 
+@pytest.mark.slow
 def test_the_same_trial_has_the_same_bytes_wherever_it_lies(drawn_trial, tmp_path, monkeypatch):
     """Made again from another folder, under a relative path: not a byte differs."""
     copy = tmp_path / "elsewhere" / "trial"

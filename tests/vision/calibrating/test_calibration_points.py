@@ -95,6 +95,7 @@ def test_few_points_get_a_simple_lens_and_a_sentence(rig):
     assert 18 - nine.n_parameters >= 4
 
 
+@pytest.mark.slow
 def test_a_plain_pinhole_needs_no_distortion(rig):
     """The simplest model within a standard error of the best is taken: mostly the true one."""
     plain = dataclasses.replace(rig.overhead, distortion=())
