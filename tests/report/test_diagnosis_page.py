@@ -216,6 +216,8 @@ def test_a_control_that_fires_is_the_first_card(make_sheet):
     first = statements(fired)[0]
     assert first.question == "Warning"
     assert first.answer.startswith(says)
+    assert first.warns
+    assert not any(each.warns for each in statements(fired)[1:])
     silent = "Negative controls are silent, as they must be."
     findings = make_sheet(notes=(Note(name="controls", says=silent, values={}),)).findings
     assert card(findings, "Warning") is None
@@ -223,7 +225,7 @@ def test_a_control_that_fires_is_the_first_card(make_sheet):
 
 def test_the_engine_says_that_a_control_fires_in_the_words_that_are_looked_for(repository):
     """It would be silent on the page otherwise."""
-    engine = (repository / "zfcal" / "diagnose" / "diagnose.py").read_text(encoding="utf-8")
+    engine = (repository / "zfcal" / "diagnose" / "notes.py").read_text(encoding="utf-8")
     assert f'"{diagnosis_words.FIRES}: ' in engine
 
 

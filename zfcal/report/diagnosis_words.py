@@ -127,6 +127,7 @@ def _of_controls(findings: Findings) -> Iterator[Statement]:
             answer=f"{says} A control asks for something that no tank has. Where the answer is "
             "yes, the tracks, the noise that is assumed or the model are not what they seem.",
             figure=("Do not trust this page", "a negative control fires"),
+            warns=True,
         )
 
 

@@ -49,11 +49,14 @@ class Statement:
         Sentences.
     figure
         The number that stands out, with its name; empty without one.
+    warns
+        Whether the answer puts all others in doubt.
     """
 
     question: str
     answer: str
     figure: tuple[str, str] = ("", "")
+    warns: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
