@@ -229,6 +229,29 @@ def test_the_engine_says_that_a_control_fires_in_the_words_that_are_looked_for(r
     assert f'"{diagnosis_words.FIRES}: ' in engine
 
 
+@pytest.mark.parametrize(
+    ("strength", "says"),
+    [
+        ({"strength": 0.2, "direction_rad": 1.0}, "goes toward 57° on the map"),
+        ({"strength": 0.2, "direction_rad": -0.5}, "goes toward 331° on the map"),
+        ({"strength": -0.2, "direction_rad": 1.0}, "goes toward 237° on the map"),
+        (
+            {"strength": 0.2, "x_m": 0.113, "y_m": 0.861, "reach_m": 0.25},
+            "The place is at x = 0.11 m, y = 0.86 m, and it reaches 0.25 m.",
+        ),
+        ({"strength": 0.2, "x_m": 0.113, "y_m": 0.861}, "x = 0.11 m, y = 0.86 m."),
+    ],
+)
+def test_a_card_says_which_way_and_where(make_sheet, strength, says):
+    """For whoever stands at the tank; maps have x to the right and y upwards."""
+    findings = make_sheet(names=("alignment",)).findings
+    (effect,) = findings.effects
+    placed = dataclasses.replace(effect, strength=strength)
+    there = dataclasses.replace(findings, effects=(placed,))
+    assert says in statements(there)[0].answer
+    assert "°" not in statements(findings)[0].answer
+
+
 def test_cards_say_what_is_missing_how_much_and_what_else_was_asked(make_sheet):
     """The gap's card names the placebo."""
     cards = statements(make_sheet(gap=gap_of(nats_per_step=0.8)).findings)

@@ -132,7 +132,7 @@ def _of_controls(findings: Findings) -> Iterator[Statement]:
 
 
 def _of_effect(effect: EffectFound, number: int) -> Statement:
-    parts = [effect.says]
+    parts = [effect.says, *_whither(effect.strength)]
     if effect.ties:
         parts.append(f"On this recording it cannot be told from {_listed(effect.ties)}.")
     parts.append(f"By chance alone in {_percent(effect.p)} of recordings.")
@@ -142,6 +142,17 @@ def _of_effect(effect: EffectFound, number: int) -> Statement:
         answer=" ".join(parts),
         figure=(gain, "log likelihood per step that it adds, held out"),
     )
+
+
+def _whither(values: Mapping[str, float]) -> Iterator[str]:
+    """Tell in which direction an effect goes, or where its place is; maps have y upwards."""
+    if "direction_rad" in values:
+        away = values.get("strength", 0.0) < 0.0
+        degrees = round(math.degrees(values["direction_rad"]) + 180 * away) % 360
+        yield f"It goes toward {degrees}° on the map: 0° is to the right, 90° up."
+    if "x_m" in values and "y_m" in values:
+        reach = f", and it reaches {values['reach_m']:.2f} m" if "reach_m" in values else ""
+        yield f"The place is at x = {values['x_m']:.2f} m, y = {values['y_m']:.2f} m{reach}."
 
 
 def _of_rest(findings: Findings) -> Iterator[Statement]:
