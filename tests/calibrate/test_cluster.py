@@ -424,6 +424,7 @@ def test_a_worker_with_an_older_zfcal_is_refused(nobody, worker_of, tmp_path):
         pass
 
 
+@pytest.mark.slow
 def test_a_late_worker_without_zfcal_ends_the_work(local_cluster, worker_of, group, tmp_path):
     """In an error that names it: it does not hang."""
     with local_cluster(1) as made, connect(made.scheduler_address) as cluster:

@@ -273,6 +273,7 @@ def test_populations_come_out_as_deaps_do():
     assert (far_apart(ours, theirs) < 5).all()
 
 
+@pytest.mark.slow
 def test_the_comparison_with_deap_would_notice_a_missing_crossover(monkeypatch):
     """Power: best S and both diversities come out otherwise."""
     theirs = outcomes(evolve_deap)

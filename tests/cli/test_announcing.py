@@ -31,6 +31,7 @@ def start(cache, loudness="loud"):
     return done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_the_first_start_says_once_that_it_compiles_and_the_next_one_nothing(tmp_path):
     """On standard error, beside a document that does not depend on it."""
     (document, told), (again, silence) = start(tmp_path), start(tmp_path)
@@ -41,6 +42,7 @@ def test_the_first_start_says_once_that_it_compiles_and_the_next_one_nothing(tmp
     assert document == again
 
 
+@pytest.mark.slow
 def test_where_nothing_is_kept_every_start_says_so(tmp_path):
     """The cache folder's place is a file."""
     (tmp_path / "file").write_text("")

@@ -5,6 +5,7 @@ import json
 import pytest
 
 
+@pytest.mark.slow
 def test_a_closed_loop_ends_with_a_report(zfcal, tmp_path):
     """Its options reach the fish; the page and all figures are told as paths."""
     words = ("--closed-loop", "--no-video", "--duration", "5s", "--swims", "fixed", "--seed", 7)

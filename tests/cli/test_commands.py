@@ -293,6 +293,7 @@ def test_a_wrong_csv_is_one_line_and_nothing_is_written(zfcal, trial, text, says
     assert sorted(trial.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_said_and_loses_nothing(process, trial):
     """A limit on the size of files stands for the full disk: nothing half-written stays."""
     import resource

@@ -100,6 +100,7 @@ def test_a_pipe_is_worked_on_line_by_line(command, trial):
     assert rest == ["trial/stats/000180.parquet", "trial/scores/000180.parquet"]
 
 
+@pytest.mark.slow
 def test_an_upstream_that_fails_is_seen_by_pipefail_and_does_no_harm(shell, trial):
     """Nothing comes through the pipe: that is said, and is nothing to do."""
     done = shell("set -o pipefail; zfcal import nowhere.csv trial | zfcal analyse -")
@@ -117,6 +118,7 @@ def test_a_line_that_is_no_artifact_is_named_and_the_others_go_on(shell, trial):
     assert "trial/stats/000120.parquet" in done.stdout
 
 
+@pytest.mark.slow
 def test_damage_upstream_comes_through_as_exit_code_3(shell, trial):
     """Of the windows that can be made, models are made."""
     path = trial / "tracks" / "000120.parquet"
@@ -126,6 +128,7 @@ def test_damage_upstream_comes_through_as_exit_code_3(shell, trial):
     assert "trial/models/000120.toml" in done.stdout
 
 
+@pytest.mark.slow
 def test_several_trials_go_through_one_pipe(shell, tracks_csv, tmp_path):
     """Each path says which trial it belongs to."""
     tracks_csv()

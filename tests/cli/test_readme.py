@@ -36,6 +36,7 @@ def test_the_five_commands_run_on_the_samples(zfcal, readme, repository, tmp_pat
     assert (tmp_path / "trial" / "report" / "index.html").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "ring"])
 def test_the_samples_are_sound_trials(zfcal, repository, tmp_path, name):
     """Whole, valid, and they can be analysed."""

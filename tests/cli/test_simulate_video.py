@@ -56,6 +56,7 @@ def test_a_file_of_images_can_be_inspected(zfcal):
     assert look["jpeg_quality"] == 92
 
 
+@pytest.mark.slow
 def test_lossless_images_are_asked_for_by_none(zfcal):
     """A quality of none is no quality at all."""
     zfcal(*WORDS, "--video", "--draw", "jpeg_quality=none")

@@ -42,6 +42,7 @@ def tracked(film, tmp_path_factory):
     return place
 
 
+@pytest.mark.slow
 def test_paths_go_out_and_talk_goes_to_the_other_stream(zfcal, tank, film):
     """Tracks and poses of each minute; the second time they are up to date."""
     names = [
@@ -138,6 +139,7 @@ def test_a_watch_tracks_analyses_and_calibrates_to_the_end(zfcal, tank, film, wa
     assert watching.contents(tank) == watched
 
 
+@pytest.mark.slow
 def test_a_watch_without_a_camera_says_so_and_ends(zfcal, tank):
     """A slip of the pen is not waited for."""
     done = zfcal("watch", "trial", "--overhead", "no-such.avi", "--corners", CORNERS)

@@ -81,6 +81,7 @@ def test_speeds_that_owe_an_effect_nothing_do_not_confirm_it(short_screens, cand
     assert sum(held) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "values"),
     [

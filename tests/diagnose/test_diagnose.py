@@ -195,6 +195,7 @@ def test_one_fish_alone_can_be_asked(ask, record):
     assert {each.name: each.lacks for each in found.screened}["alignment"] == "a neighbour"
 
 
+@pytest.mark.slow
 def test_the_model_keeps_the_effects_that_it_has(record, tank, fish):
     """A bias in the model is fitted along and not asked for again."""
     having = dataclasses.replace(fish, effects={"turning-bias": {"strength": 0.1}})

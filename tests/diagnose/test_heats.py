@@ -48,6 +48,7 @@ def test_only_what_cannot_be_the_best_is_left_out(asked, ran):
     assert len(worth) < len(SUSPECTS)
 
 
+@pytest.mark.slow
 def test_a_recording_without_any_of_them_keeps_them_all(screen, candidate, short):
     """Nobody is five standard errors ahead where there is nothing."""
     nothing = screen(32, minutes=8.0)
@@ -83,6 +84,7 @@ def test_few_steps_are_worth_no_heat(asked):
     assert all(heat.gains(1e9) for heat in ran)
 
 
+@pytest.mark.slow
 def test_a_heat_does_not_depend_on_the_threads(asked, ran):
     """The same fits by one and by two."""
     screen, scores = asked
@@ -91,6 +93,7 @@ def test_a_heat_does_not_depend_on_the_threads(asked, ran):
     assert [heat.first.nats for heat in alone] == [heat.first.nats for heat in ran]
 
 
+@pytest.mark.slow
 def test_a_fit_goes_on_where_its_heat_ended(asked, ran, monkeypatch):
     """It comes to the same maximum as one that looks for its start, and looks for none."""
     screen, scores = asked

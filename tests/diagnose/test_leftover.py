@@ -30,6 +30,7 @@ def test_what_another_form_leaves_over_falls(with_cohesion, candidate):
     assert not outlasts(score, made.screen, [made.candidate])
 
 
+@pytest.mark.slow
 def test_the_right_form_leaves_nothing_over(with_cohesion, candidate):
     """The same recording, and the form that the fish have: nobody asks for a range."""
     made = with_cohesion(71, full_m=0.3, leaning=1.0)
@@ -49,6 +50,7 @@ def test_an_effect_that_is_there_stands(with_cohesion, candidate, name, values):
     assert outlasts(score, made.screen, [made.candidate])
 
 
+@pytest.mark.slow
 def test_it_is_a_matter_of_how_much_stands_not_of_how_much_there_is(with_cohesion, candidate):
     """Twice the score or a tenth of it: the same answer, and never of the sign."""
     made = with_cohesion(71, **FADED)

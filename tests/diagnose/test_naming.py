@@ -206,6 +206,7 @@ def test_a_refit_of_a_speed_leaves_headings_alone(screen, candidate):
     assert made.gain.sum() > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "whole"), [(1.0, 1.0), (0.4, 1.0), (0.4, 0.0)])
 def test_the_share_of_a_late_response_is_found(screen, candidate, share, whole):
     """At the age that was asked for, which is no smooth matter and has no interval."""
@@ -219,6 +220,7 @@ def test_the_share_of_a_late_response_is_found(screen, candidate, share, whole):
     assert made.nats > 20
 
 
+@pytest.mark.slow
 def test_traits_are_those_of_the_individuals(screen, candidate):
     """Mean 0, standard deviation 1, and in the order in which the simulation has them."""
     own = screen(31, {"boldness": {"spread": 0.7}})

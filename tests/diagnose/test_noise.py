@@ -156,6 +156,7 @@ def test_quantiles_of_chi_square_are_those_of_scipy(share, df):
     assert noise._chi2_quantile(share, df) == pytest.approx(stats.chi2.ppf(share, df))
 
 
+@pytest.mark.slow
 def test_a_tracker_starts_without_the_statistics_of_scipy():
     """Their import takes as long as that of all the rest."""
     line = "import sys, zfcal.online.track; print('scipy.stats' in sys.modules)"

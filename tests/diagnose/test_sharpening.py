@@ -41,6 +41,7 @@ def test_the_maker_is_sharper_than_what_was_fitted(blurred, sharp):
     assert sharp.fitted is blurred.fitted
 
 
+@pytest.mark.slow
 def test_its_replicates_are_fitted_as_the_recording_was(blurred, sharp):
     """Inverse concentrations of three replicates: their mean error is less than half of that
     without.

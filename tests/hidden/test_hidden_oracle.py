@@ -117,6 +117,7 @@ def test_a_seed_makes_a_trial_again():
     assert a.truth["effects"].keys() == {"alignment", "fatigue"}
 
 
+@pytest.mark.slow
 def test_fish_never_leave_the_tank():
     """Whatever is hidden, two minutes later everybody is inside."""
     world = world_of(two_rooms())

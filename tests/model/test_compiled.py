@@ -128,6 +128,7 @@ def test_a_folder_that_cannot_be_made_keeps_nothing(tmp_path):
     assert compiled.keeps(tmp_path / "folder" / "kernels")
 
 
+@pytest.mark.slow
 def test_kernels_are_kept_and_a_second_start_is_warm(tmp_path):
     """Cold before the first kernel, warm after it, and in the next process at once."""
     first, second = (report(tmp_path, XDG_CACHE_HOME=str(tmp_path)) for _ in range(2))

@@ -258,6 +258,7 @@ def test_the_density_alone_is_that_with_derivatives(scene, model, effects):
         assert zone_log_p(x, turns, view) == pytest.approx(nats_of(x, turns, view), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_density_is_the_sum_of_its_parts():
     """On all cells and at the heading taken; the columns beside it are left as they are."""
     rng = np.random.default_rng(4)

@@ -122,6 +122,7 @@ def test_intervals_hold_the_truth(two_rooms, model):
     assert np.mean(held) > 0.85
 
 
+@pytest.mark.slow
 def test_a_zone_nobody_can_reach_is_not_identified(steps, two_rooms, model):
     """From the centre no single step leads into the corridor: its attraction stays open."""
     found = fit(steps, two_rooms, model)

@@ -28,6 +28,7 @@ def test_the_density_is_the_twins_state_by_state(hard_state, twin, two_rooms, mo
     assert found == pytest.approx(plain, abs=2e-4 * plain.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["exact", "grid"])
 def test_draws_follow_the_twins_density(hard_state, sampler, twin, two_rooms, model):
     """Chi-square over 60 angles with 100,000 draws, at p > 1e-4.

@@ -34,6 +34,7 @@ json.dump(record.tolist(), sys.stdout)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", [0, 90], ids=["exact", "grid"])
 def test_compiled_and_plain_runs_are_the_same(grid, two_rooms, model):
     """Three agents, 24 steps, either sampler: positions to a nanometre.

@@ -78,6 +78,7 @@ def _check_law(kappa, turns):
     assert stats.kstest(np.arctan2(sine, cosine), law.cdf).pvalue > 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_turns_follow_the_von_mises_law(kappa):
     """Kolmogorov-Smirnov with 200,000 draws: notices a shift of the law by 0.5 %."""

@@ -31,6 +31,7 @@ def cluster(tmp_path_factory):
         yield connected
 
 
+@pytest.mark.slow
 def test_trials_side_by_side_end_in_the_bytes_of_trials_in_turn(
     make_trial, copy_trial, quick, cluster, read_all
 ):

@@ -103,6 +103,7 @@ def test_the_model_draws_the_speeds_that_were_measured(trial, quick, heard):
         assert zone.speed_frequency == pytest.approx(own / own.sum())
 
 
+@pytest.mark.slow
 def test_each_round_starts_from_the_one_before(trial, in_full, heard):
     """Its population is an input of the next, and comes back from the file as it was."""
     calibrate(trial, in_full, heard.append)

@@ -53,6 +53,7 @@ def aligned(root, recording=Recording(), **task):  # noqa: B008 - it is frozen
     return told
 
 
+@pytest.mark.slow
 def test_the_camera_below_sees_the_robot_where_overhead_does(filmed, trial):
     """Two millimetres all over the tank, where it was 36 mm off; the clocks to 30 ms."""
     (result,) = [event.value for event in aligned(trial) if isinstance(event, Result)]
@@ -67,6 +68,7 @@ def test_the_camera_below_sees_the_robot_where_overhead_does(filmed, trial):
     assert any("clocks differ" in note for note in result["notes"])
 
 
+@pytest.mark.slow
 def test_the_trial_uses_it_and_the_calibration_stays(trial):
     """Made again it starts from the same calibration: nothing to do."""
     before = (trial / "cameras" / "below.toml").read_bytes()

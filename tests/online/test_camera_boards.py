@@ -83,6 +83,7 @@ def test_a_folder_of_images_makes_a_lens(shots, tmp_path):
     assert path.stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("camera", "face_down", "degrees"), [(ABOVE, False, 0), (BELOW, True, 35)])
 def test_a_board_in_the_tank_gives_the_pose(shots, tmp_path, camera, face_down, degrees):
     """Face up for the camera above, on its face for the one below; places to a millimetre."""

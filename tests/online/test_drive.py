@@ -143,6 +143,7 @@ def test_a_replay_decides_the_same(root, pattern, free_running):
     assert len(only(items, "command")) == 80
 
 
+@pytest.mark.slow
 def test_driving_anew_makes_the_same_bytes(root):
     """The same poses, model and seed: the same file."""
     run(root)
@@ -171,6 +172,7 @@ def test_random_numbers_belong_to_their_step(root, recorded):
     assert [whole[t["step"]]["x_m"] for t in late] == [t["x_m"] for t in late]
 
 
+@pytest.mark.slow
 def test_another_seed_leads_elsewhere(root):
     """The trial's."""
     first = only(run(root), "target")

@@ -235,6 +235,7 @@ def small_disk(rig):
     subprocess.run(["umount", "-l", str(place)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_keeps_nobody_from_driving(rig, small_disk):
     """It is said; the robot is driven on; with room again the log lacks not a tick."""
     rig.start()
@@ -416,6 +417,7 @@ def test_the_watchdog_stops_the_robot_of_a_driver_that_hangs(rig):
     assert "steps of the model were missed: the driver was held up." in driver.stderr.read()
 
 
+@pytest.mark.slow
 def test_a_second_driver_is_refused_and_a_port_that_is_not_there(
     rig, tmp_path, capsys, monkeypatch
 ):

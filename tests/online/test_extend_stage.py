@@ -140,6 +140,7 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_workers(
     assert read_all(root)["models/extended.toml"] != read_all(other)["models/extended.toml"]
 
 
+@pytest.mark.slow
 def test_a_killed_extension_goes_on_and_ends_in_the_same_bytes(
     trial, copy_trial, found, options, read_all
 ):
@@ -216,6 +217,7 @@ def test_too_little_data_is_an_error_with_the_minutes_needed(trial, found, optio
     assert "12 min would do" in error.value.hint
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_model_has_already_is_refused(trial, found, options, quick):
     """Also one that is unknown."""
     path = extend(trial, options, say_nothing)
@@ -332,6 +334,7 @@ def test_a_single_fish_can_be_extended(make_trial, found, quick):
     assert np.isfinite(gap["W"]["before"])
 
 
+@pytest.mark.slow
 def test_a_budget_ends_each_calibration(trial, found, quick, heard):
     """What was run stands in the file, the budget does not."""
     settings = dataclasses.replace(quick.settings, generations=None)

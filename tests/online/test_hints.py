@@ -72,6 +72,7 @@ def test_folders_that_appear_or_are_replaced_are_watched(listening):
     assert has_hint(hints, RESCAN_S)
 
 
+@pytest.mark.slow
 @needs_watchfiles
 def test_a_trial_that_goes_and_comes_is_no_error(listening):
     """The thread lives on, and hears of what comes later."""

@@ -39,6 +39,7 @@ def test_a_stretch_is_pooled_whatever_its_segments(make_trial, wandering):
     assert np.array_equal(found.distance, wanted.distance)
 
 
+@pytest.mark.slow
 def test_a_model_reaches_its_ceiling_on_its_own_fish(tmp_path, make_trial):
     """On 10 minutes of itself S is within the interval of 200 of its own stretches.
 

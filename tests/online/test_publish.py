@@ -103,6 +103,7 @@ def test_without_the_extra_it_says_what_to_install(root):
     assert "pip install 'zfcal[cats]'" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [

@@ -165,6 +165,7 @@ def test_the_trial_is_sound(tracked):
     assert [f for f in found if f.where not in {"disk", "file system", "clock"}] == []
 
 
+@pytest.mark.slow
 def test_a_minute_is_there_as_soon_as_it_has_passed(new, film):
     """Its tracks are told before the first frame of the minute after is written."""
     root = new()
@@ -374,6 +375,7 @@ def test_a_camera_that_goes_away_is_waited_for(new, images, streaming, heard):
     assert any("missing in" in note for note in notes)
 
 
+@pytest.mark.slow
 def test_a_live_recording_tells_how_long_a_frame_takes(new, images, streaming, heard):
     """From its arrival to its poses being written: a tenth of a period, or so."""
     root = new(fps=15.0)
@@ -386,6 +388,7 @@ def test_a_live_recording_tells_how_long_a_frame_takes(new, images, streaming, h
     assert 0 < numbers["latency_ms"]["median"] < 50
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_where_they_are_asked_for(new, film, tmp_path, heard):
     """A video as long as the tracks; a sheet of the worst frames, if there were any."""
     root = new(n_fish=4)
@@ -417,6 +420,7 @@ def test_a_video_that_was_cut_short_is_tracked_as_far_as_it_goes(new, film, tmp_
     assert 60 < len(np.unique(all_tracks(root).frame)) < 150
 
 
+@pytest.mark.slow
 def test_black_frames_are_told_once_and_listed(new, images, tmp_path, heard):
     """The fish are found again behind them."""
     shown = [image.copy() for image in images[:140]]
@@ -442,6 +446,7 @@ def test_a_video_of_nothing_but_black_has_no_tracks_and_no_traceback(new, tmp_pa
     assert any("no background was learnt" in e.text for e in heard if isinstance(e, Note))
 
 
+@pytest.mark.slow
 def test_images_of_another_size_are_left_out(new, images, tmp_path, heard):
     """Told once, listed, and the others are tracked."""
     folder = tmp_path / "images"

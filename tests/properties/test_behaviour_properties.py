@@ -104,6 +104,7 @@ def test_a_group_is_like_itself_and_like_itself_twice(group):
     assert twice == pytest.approx([1.0] * len(twice), abs=1e-7)
 
 
+@pytest.mark.slow
 @given(group=groups(), seed=st.integers(0, 2**32 - 1))
 def test_the_order_of_the_agents_does_not_matter(group, seed):
     """Agents exchange their columns, or their ids, or both."""
@@ -197,6 +198,7 @@ def test_a_ceiling_stays_within_bounds(group):
     assert all(0.0 <= one.S <= 1.0 or one.n_features == 0 for one in scores)
 
 
+@pytest.mark.slow
 @given(a=groups(), b=groups())
 def test_legacy_scores_are_symmetric_and_within_bounds(a, b):
     """Each is in [0, 1] or null."""

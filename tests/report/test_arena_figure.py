@@ -70,6 +70,7 @@ def test_contours_have_a_round_step(arenas, name, step_m):
     assert contour_step_m(arenas[name]) == step_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_no_text_covers_another_and_all_zones_are_in_the_key(arenas, covered_texts, name):
     """Names that have no room in the tank are left to the key."""
@@ -88,6 +89,7 @@ def test_the_key_tells_share_and_walls(arenas):
     assert labels == ["walls: 26 % of the area, follows walls", "centre: 74 % of the area"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_png_is_whole_and_the_same_every_time(arenas, tmp_path, name):
     """No chunk tells the program, the day or the machine."""

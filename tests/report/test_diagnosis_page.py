@@ -428,6 +428,7 @@ def test_positive_and_negative_scores_have_opposite_colours_of_one_depth(make_sh
     assert image.norm(0.0) == 0.5
 
 
+@pytest.mark.slow
 def test_overviews_do_not_cover_their_texts(make_sheet, covered_texts):
     """With one candidate, with thirty, and with gaps beyond the scale."""
     many = [Screened(name=f"effect-number-{i}", z=3.0 * i - 20, p=0.1) for i in range(30)]
@@ -460,6 +461,7 @@ def test_a_candidate_that_needs_more_minutes_is_hollow(make_sheet):
     assert "too short to say" not in {entry.label for entry in screened_picture(asked[:2], []).key}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "cue",
     [
@@ -518,6 +520,7 @@ def drawn_page(tmp_path_factory, make_sheet):
     return diagnosis_page.write(tmp_path_factory.mktemp("diagnosis"), sheet)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.apt
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])

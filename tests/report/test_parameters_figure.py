@@ -64,6 +64,7 @@ def test_intervals_of_several_rounds_are_those_that_mean_something(rounds_of, tw
     assert drawn == [0, 9, 9]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "circular", "own"])
 @pytest.mark.parametrize("n_rounds", [1, 4, 29])
 def test_no_text_covers_another(arenas, rounds_of, covered_texts, name, n_rounds):

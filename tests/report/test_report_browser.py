@@ -91,6 +91,7 @@ def look(debian, drawn_trial, tmp_path):
     return show
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "columns"), [(1280, 3), (390, 1)])
 def test_the_page_fits_and_can_be_read(look, width, columns, scheme):

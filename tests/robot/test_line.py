@@ -117,6 +117,7 @@ print(went.count(False), line.n_opened, len(went), flush=True)
 """
 
 
+@pytest.mark.slow
 def test_a_driver_that_is_held_up_does_not_lose_its_line():
     """Stopped for longer than a write may take, in the middle of writes, again and again."""
     master, slave = pty.openpty()

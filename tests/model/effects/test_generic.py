@@ -49,6 +49,7 @@ def test_headings_are_weighed_along_the_cue(ask, cue, given, rows, toward, lengt
     assert log_odds(asked, toward + math.pi / 2) == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_wall_is_left_to_the_inside(natural_model, two_rooms):
     """2 cm from the left wall headings to the right gain, whatever the wall's own direction."""
     state = {"xy_m": [(0.071, 0.8)], "heading_rad": [1.0], "speed_m_s": 0.0}

@@ -119,6 +119,7 @@ def test_a_component_joins_the_mixture_with_its_weight(with_effects, two_rooms):
     assert found == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 @SAMPLERS
 def test_headings_are_drawn_from_the_component(sampler, with_effects, two_rooms):
     """Kolmogorov-Smirnov with 100,000 draws: notices 1 % of the weight."""
@@ -161,6 +162,7 @@ def test_a_factor_of_zero_forbids_headings(sampler, with_effects, two_rooms):
     assert np.cos(drawn).min() > 0
 
 
+@pytest.mark.slow
 @SAMPLERS
 def test_a_factor_knows_the_landing_zone(sampler, with_effects, two_rooms):
     """A third of the density where a step ends at the walls: odds of landing there fall to it."""

@@ -120,6 +120,7 @@ def test_a_mirrored_camera_is_told_as_such():
         align_spots(overhead, mirrored)
 
 
+@pytest.mark.slow
 def test_another_recording_does_not_fit():
     """Fish of one, the robot of another: nothing is found rather than anything."""
     overhead, _ = seen(4)

@@ -106,6 +106,7 @@ def test_a_plain_pinhole_needs_no_distortion(rig):
     assert methods.count("pinhole, no distortion") >= 2
 
 
+@pytest.mark.slow
 def test_a_focal_length_that_cannot_be_known_is_said_to_be_so(rig):
     """A plane seen straight on: any focal length will do, and the positions are right."""
     straight = dataclasses.replace(
