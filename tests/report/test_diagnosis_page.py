@@ -18,7 +18,8 @@ from zfcal.parameters import natural
 from zfcal.report import diagnosis_page, diagnosis_words, theme
 from zfcal.report.diagnosis_figures import finding_picture, shown_places, slug
 from zfcal.report.diagnosis_overview import gap_picture, screened_picture
-from zfcal.report.diagnosis_words import statements, tables, verdict_sentence
+from zfcal.report.diagnosis_tables import tables
+from zfcal.report.diagnosis_words import statements, verdict_sentence
 from zfcal.report.panels import compose
 
 OPTIONS = (

@@ -13,7 +13,8 @@ from zfcal.artifacts.lineage import package_version
 from zfcal.diagnose.document import Sheet
 from zfcal.report.diagnosis_figures import finding_picture
 from zfcal.report.diagnosis_overview import gap_picture, screened_picture
-from zfcal.report.diagnosis_words import facts, statements, tables, verdict_sentence
+from zfcal.report.diagnosis_tables import tables
+from zfcal.report.diagnosis_words import facts, statements, verdict_sentence
 from zfcal.report.panels import Picture, write_picture
 from zfcal.report.render import render
 
