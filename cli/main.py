@@ -46,6 +46,9 @@ COMMANDS = {
 EXIT_USAGE = 2
 EXIT_READER_GONE = 141
 _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""What says how many threads a product of matrices takes; read when numpy is loaded."""
+
 _BUG_HINT = "Run it again with --traceback to see where, and report it."
 
 
@@ -134,6 +137,12 @@ def group() -> None:
 
 def main() -> NoReturn:
     """Run the command line and leave with its exit code."""
+    if "OMP_NUM_THREADS" not in os.environ:
+        for name in _BLAS_THREADS:
+            # Commands have threads of their own. Those of a library, which wait in a loop for
+            # the next product of small matrices, take the processor from them: a diagnosis took
+            # twice as long.
+            os.environ.setdefault(name, "1")
     sys.exit(run(sys.argv[1:]))
 
 

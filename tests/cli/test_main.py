@@ -284,3 +284,27 @@ def test_a_stream_that_is_closed_or_full_is_no_bug(command, trial, redirection, 
     assert done.returncode == code, done.stderr
     assert "bug" not in done.stderr
     assert ("standard output: cannot be written" in done.stderr) == (code == 1)
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2"), ({"OMP_NUM_THREADS": "2"}, "None")],
+)
+def test_libraries_have_one_thread_beside_those_of_a_command(asked, expected):
+    """Unless someone asks for more; numpy reads it when it is loaded, so before that."""
+    script = """if True:
+        import os, sys
+        from zfcal_cli.main import main
+        assert "numpy" not in sys.modules
+        sys.argv = ["zfcal", "inspect", "missing.json"]
+        try:
+            main()
+        except SystemExit:
+            print(os.environ.get("OPENBLAS_NUM_THREADS"))
+    """
+    own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env={**own, **asked}, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == expected

@@ -78,11 +78,13 @@ def test_beside_a_direction_in_the_model_a_place_must_gain_half_of_what_it_does(
     """What a current leaves over is no place, whether the current was found or came with it."""
     own = screen(31, DRIFT)
     drift = refit(own, own.ask(candidate("directional-drift")))
-    little, clear = (
-        suspect("place-preference", share * drift.nats, [(0, 0)], **AT) for share in (0.4, 0.6)
-    )
-    assert feigned([little], drift.screen) == [little]
-    assert feigned([clear], drift.screen) == []
+    for points in ([(0, 0)], [(0, 0), (2, 0)]):
+        # Fish that are all on one side of it, and fish all round it.
+        little, clear = (
+            suspect("place-preference", share * drift.nats, points, **AT) for share in (0.4, 0.6)
+        )
+        assert feigned([little], drift.screen) == [little]
+        assert feigned([clear], drift.screen) == []
 
 
 def chosen(worth, aside):

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
+from zfcal.model import blocks
 from zfcal.model.extended import (
     bounds_of,
+    log_p_at,
     maximise,
     nats_at,
     start_of,
@@ -533,11 +535,23 @@ def test_a_parameter_at_its_bound_holds_none_of_the_others_up(two_rooms, model):
     assert both.nats == pytest.approx(alone.nats, abs=0.05)
 
 
-def test_the_fit_does_not_depend_on_the_threads(short_scene, model):
-    """Zones and derivatives are each computed by themselves."""
-    start = having(model, HOOKS["factor"])
-    free = (("turning-bias", "strength"),)
-    one, two = (maximise(short_scene, start, free=free, n_workers=n) for n in (1, 2))
-    assert one.nats == two.nats
-    assert one.parameters == two.parameters
-    np.testing.assert_array_equal(one.effect_scores, two.effect_scores)
+@pytest.mark.parametrize(
+    ("name", "key", "value"),
+    [("wall-persistence", "strength", 0.5), ("turning-bias", "strength", 0.5)],
+)
+def test_the_fit_does_not_depend_on_the_threads(monkeypatch, short_scene, model, name, key, value):
+    """To the last digit, though steps are asked in blocks: factors, and smooth ones."""
+    monkeypatch.setattr(blocks, "_LEAST", 100)
+    start = having(model, {name: {key: value}})
+    one, three = (maximise(short_scene, start, free=((name, key),), n_workers=n) for n in (1, 3))
+    assert one.nats == three.nats
+    assert one.parameters == three.parameters
+    np.testing.assert_array_equal(one.effect_scores, three.effect_scores)
+
+
+def test_a_density_on_other_steps_is_that_of_the_fit(scene, short_scene, model):
+    """Nothing is fitted there, and nothing is differentiated."""
+    fitted = maximise(scene, having(model, HOOKS["factor"]))
+    there = maximise(short_scene, fitted.parameters, start=fitted.x, rounds=0)
+    found = log_p_at(short_scene, fitted.parameters, fitted.x)
+    np.testing.assert_allclose(found, there.log_p, atol=1e-9)

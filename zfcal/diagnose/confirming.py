@@ -24,7 +24,7 @@ from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
 from zfcal.model.effects import find_effect
-from zfcal.model.extended import maximise
+from zfcal.model.extended import log_p_at, maximise
 from zfcal.model.fitted import MIN_STEPS, Fitted
 from zfcal.model.scene import Moves, Scene, thin
 
@@ -223,8 +223,8 @@ def _half(screen: Screen, which: int) -> _Half:
     learnt = maximise(
         parts[which], fitted.parameters, free=fitted.free, start=fitted.x, rounds=_ROUNDS
     )
-    judged = maximise(parts[1 - which], learnt.parameters, start=learnt.x, rounds=0)
-    return _Half(learnt=learnt, log_p=judged.log_p)
+    log_p = log_p_at(parts[1 - which], learnt.parameters, learnt.x)
+    return _Half(learnt=learnt, log_p=log_p)
 
 
 def _held_out(scene: Scene, learnt: tuple[_Half, _Half]) -> Floats:

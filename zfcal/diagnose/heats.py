@@ -133,11 +133,11 @@ def run_heats(sampled: Sampled, scores: Sequence[Score], n_workers: int) -> list
     """
     if sampled.share == 1 or not scores:
         return [Heat(score=score, first=None) for score in scores]
-    part, rows = sampled.part, sampled.rows
+    part, rows, each = sampled.part, sampled.rows, max(1, n_workers // len(scores))
 
     def fitted(score: Score) -> Heat:
         steps = score.steps[rows[score.candidate.effect.on_speed]]
-        first = refit(part, replace(score, steps=steps))
+        first = refit(part, replace(score, steps=steps), n_workers=each)
         return Heat(score=score, first=first, share=sampled.share)
 
     with ThreadPoolExecutor(max(1, n_workers)) as pool:

@@ -382,6 +382,8 @@ class Screen:
 
 def ask_all(screen: Screen, candidates: Sequence[Candidate], n_workers: int) -> list[Score]:
     """Return the scores of candidates, in their order; the numbers do not depend on workers."""
+    if not candidates:
+        return []
     _ = screen.project(np.zeros(len(screen.scene.turns)))
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         return list(pool.map(screen.ask, candidates))

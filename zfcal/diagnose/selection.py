@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate, is_generic
+from zfcal.diagnose.foreseen import Known, unforeseen
 from zfcal.diagnose.heats import Heat, Sampled, ahead, hopeful, run_heats, unbeaten
 from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.naming import Choice, Refit, choose, refit
@@ -48,6 +49,9 @@ own form is a guess. Of headings and speeds one leaves nothing over in the other
 _IN_REACH = 0.5
 """Share of the clearest one's standard errors below which a suspect is not put into the model:
 it would have to gain four times what its score promises."""
+
+_LEAST_Z = 3.0
+"""Standard errors below which none is taken for missing, however few are asked for."""
 
 _STANDS = 3.0
 _RIVAL_AHEAD = 3.0
@@ -262,13 +266,16 @@ class Selector:
             Of the listed candidates in it.
         """
         steps: list[Step] = []
+        known = [Known(score=score, asked=True) for score in scores]
         first = tuple(best_of(self.listed, scores))
         ranked = self._others(screen, first)
         left_over = len(ranked) < len(first)
         for number in range(_MOST_EFFECTS):
             sampled = Sampled(whole=screen)
             if number:
-                ranked = self._others(screen, self._ranked(sampled, steps))
+                known = self._asked_again(sampled, steps, known)
+                asked = [each.score for each in known if each.asked]
+                ranked = self._others(screen, best_of(self.listed, asked))
             step, aside = self._step(sampled, ranked, steps)
             if step is None:
                 left_over = left_over or (aside and not number)
@@ -284,12 +291,35 @@ class Selector:
             best for best in ranked if best.p >= LEVEL or outlasts(best.score, screen, self.given)
         ]
 
-    def _ranked(self, sampled: Sampled, done: Sequence[Step]) -> list[Best]:
-        """Return the listed effects that a model lacks and are worth it, the clearest first."""
-        taken = {step.choice.best.name for step in done}
-        open_ = [each for each in self.listed.candidates if each.name not in taken]
-        open_ = hopeful(sampled, open_, least_z(_least(done)), self.n_workers)
-        return best_of(self.listed, ask_all(sampled.whole, open_, self.n_workers))
+    def _asked_again(
+        self, sampled: Sampled, done: Sequence[Step], known: Sequence[Known]
+    ) -> list[Known]:
+        """Return the listed effects that a model lacks; those asked for that are worth it.
+
+        Parameters
+        ----------
+        sampled
+            The model.
+        done
+            What was added, last of all what it had not when it was asked before.
+        known
+            What was known then.
+        """
+        added, needed = done[-1].best.score, least_z(_least(done))
+        open_ = [each for each in known if each.score.candidate.name != added.candidate.name]
+        told = [each.beside(added) for each in open_]
+        scores = [each.score for each in told]
+        z = np.maximum(np.abs(self.listed.standardised(scores)), [s.clearness for s in scores])
+        open_again = (z > max(needed, _LEAST_Z) - unforeseen(added)) & [not e.asked for e in told]
+        hope = [scores[n].candidate for n in np.flatnonzero(open_again)]
+        hope = hopeful(sampled, hope, needed, self.n_workers)
+        fresh = {id(s.candidate): s for s in ask_all(sampled.whole, hope, self.n_workers)}
+        return [
+            Known(score=fresh[id(each.score.candidate)], asked=True)
+            if id(each.score.candidate) in fresh
+            else each
+            for each in told
+        ]
 
     def _step(
         self, sampled: Sampled, ranked: Sequence[Best], done: Sequence[Step]

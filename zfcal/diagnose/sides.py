@@ -53,7 +53,9 @@ def feigned(refits: Sequence[Refit], before: Screen) -> list[Refit]:
 
     A place that is near the edge of where fish were, or reaches far, bends to any direction whose
     strength is not the same all over the tank, and so gains more than the direction itself. Where
-    the model has the direction already, such a place must gain so much more beside it.
+    the model has the direction already, a place must gain so much more beside it, and so must one
+    that fish are all round: what is weaker in one part of the tank than in another is left over
+    there as a place.
 
     Parameters
     ----------
@@ -62,14 +64,13 @@ def feigned(refits: Sequence[Refit], before: Screen) -> list[Refit]:
     before
         The model without any of them.
     """
-    sided = [each for each in refits if each.name == _PLACE and one_sided(each) >= _ONE_SIDE]
-    if not sided:
-        return []
-    if _DIRECTION in before.fitted.parameters.effects:
+    places = [each for each in refits if each.name == _PLACE]
+    if places and _DIRECTION in before.fitted.parameters.effects:
         needed = (_CLEARLY - 1.0) * _gained(before)
     else:
+        places = [each for each in places if one_sided(each) >= _ONE_SIDE]
         needed = _CLEARLY * max((e.nats for e in refits if e.name == _DIRECTION), default=0.0)
-    return [each for each in sided if each.nats <= needed]
+    return [each for each in places if each.nats <= needed]
 
 
 def _gained(screen: Screen) -> float:

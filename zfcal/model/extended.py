@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +88,7 @@ def maximise(
     n_workers
         Threads; the numbers do not depend on them.
     """
-    seen = view_of(scene, without_effects(parameters))
+    seen = view_of(scene, without_effects(parameters), n_workers=n_workers)
     climb = _Climb(scene=scene, given=parameters, free=free, seen=seen, n_workers=n_workers)
     x = [values.copy() for values in (start_of(parameters) if start is None else start)]
     here = climb.at(parameters, x)
@@ -104,6 +102,20 @@ def maximise(
         if gain < _ENOUGH_NATS:
             break
     return climb.finish(here, climb.differences(here) if psi is None else psi)
+
+
+def log_p_at(scene: Scene, model: Parameters, start: Sequence[Floats]) -> Floats:
+    """Return the log density of each turn under a model; NaN in zones with few turns.
+
+    Parameters
+    ----------
+    model
+        With its effects.
+    start
+        Per zone, as `zone_scores` takes it.
+    """
+    seen = view_of(scene, without_effects(model))
+    return _Climb(scene=scene, given=model, free=(), seen=seen).log_p(model, start)
 
 
 def nats_at(
@@ -156,17 +168,19 @@ class _Climb:
 
     def at(self, parameters: Parameters, x: Sequence[Floats]) -> Fitted:
         """Return everything at a point; the effects' scores are left out."""
-        view = view_of(self.scene, parameters, self.seen)
+        view = view_of(self.scene, parameters, self.seen, n_workers=self.n_workers)
         n = len(self.scene.turns)
         log_p, weight = np.full(n, np.nan), np.ones(n)
 
         def of_zone(own: Floats, turns: ZoneTurns) -> Floats:
             if not turns.enough:
                 return np.zeros((len(turns.rows), own.size))
-            log_p[turns.rows], slope, weight[turns.rows] = zone_scores(own, turns, view)
+            log_p[turns.rows], slope, weight[turns.rows] = zone_scores(
+                own, turns, view, n_workers=self.n_workers
+            )
             return slope
 
-        scores = self._at_once(of_zone, x, self.turns)
+        scores = list(map(of_zone, x, self.turns))
         return Fitted(
             parameters=parameters,
             x=tuple(x),
@@ -179,13 +193,13 @@ class _Climb:
             free=self.free,
         )
 
-    def log_p(self, parameters: Parameters, x: Sequence[Floats]) -> Floats:
+    def log_p(self, parameters: Parameters, x: Sequence[Floats], n_workers: int = 1) -> Floats:
         """Return the log density of each turn at a point; NaN in zones that are not fitted."""
-        view = view_of(self.scene, parameters, self.seen)
+        view = view_of(self.scene, parameters, self.seen, n_workers=n_workers)
         found = np.full(len(self.scene.turns), np.nan)
         for own, turns in zip(x, self.turns, strict=True):
             if turns.enough:
-                found[turns.rows] = zone_log_p(own, turns, view)
+                found[turns.rows] = zone_log_p(own, turns, view, n_workers=n_workers)
         return found
 
     def differences(self, here: Fitted) -> Floats:
@@ -197,18 +211,11 @@ class _Climb:
             by = _DIFFERENCE * min(high - low, 1.0)
             by = by if value + by <= high else -by
             moved = with_effect(here.parameters, name, {key: value + by})
-            there = self.log_p(moved, here.x)
+            there = self.log_p(moved, here.x, self.n_workers)
             return np.asarray(np.nan_to_num(there - here.log_p) / by * (high - low))
 
-        columns = self._at_once(column, *zip(*self.free, strict=True)) if self.free else []
+        columns = [column(*pair) for pair in self.free]
         return np.array(columns).reshape(len(columns), len(here.log_p)).T
-
-    def _at_once(self, asked: Callable[..., Floats], *values: Iterable[Any]) -> list[Floats]:
-        """Return what is asked of the first of all values, of the second, and so on."""
-        if self.n_workers < 2:
-            return list(map(asked, *values))
-        with ThreadPoolExecutor(self.n_workers) as pool:
-            return list(pool.map(asked, *values))
 
     def step(self, here: Fitted, psi: Floats) -> Fitted | None:
         """Return a better point, None if none is found."""

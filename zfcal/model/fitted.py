@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e, i1e
 
+from zfcal.model.blocks import in_blocks
 from zfcal.model.kernels.extended import (
     BASE,
     BASE_SLOPE,
@@ -111,7 +112,9 @@ def constants(kappas: Floats) -> tuple[float, float]:
     return first, second
 
 
-def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats, Floats]:
+def zone_scores(
+    x: Floats, turns: ZoneTurns, view: View, *, n_workers: int = 1
+) -> tuple[Floats, Floats, Floats]:
     """Return log densities of a zone's turns and their scores.
 
     Parameters
@@ -121,6 +124,8 @@ def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats
         gamma of each zone, and the lapse.
     view
         Of all turns of the scene.
+    n_workers
+        Threads; the numbers do not depend on them.
 
     Returns
     -------
@@ -134,12 +139,17 @@ def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats
     own = x[:3] * SCALES
     n, n_zones = len(turns.rows), turns.share.shape[2]
     at_taken, over = np.empty((n, COLUMNS)), np.empty((n, n_zones, COLUMNS))
-    tilt = view.tilt[turns.rows] if len(view.tilt) else view.tilt
-    extended_sums(
-        turns.base_of(view), view.toward[turns.rows], view.angle_sr[turns.rows], turns.taken,
-        turns.share, view.parts[turns.rows], tilt, (own[0], own[1]), constants(own[:2]),
-        at_taken, over,
-    )  # fmt: skip
+    base, scales = turns.base_of(view), constants(own[:2])
+
+    def ask(block: slice) -> None:
+        rows = turns.rows[block]
+        extended_sums(
+            base[block], view.toward[rows], view.angle_sr[rows], turns.taken[block],
+            turns.share[block], view.parts[rows], view.tilt[rows] if len(view.tilt) else view.tilt,
+            (own[0], own[1]), scales, at_taken[block], over[block],
+        )  # fmt: skip
+
+    in_blocks(n, n_workers, ask)
     for column, slope, value in ((BASE, BASE_SLOPE, own[0]), (SOCIAL, SOCIAL_SLOPE, own[1])):
         mean_cosine = i1e(value) / i0e(value)
         at_taken[:, slope] -= mean_cosine * at_taken[:, column]
@@ -161,20 +171,25 @@ def zone_scores(x: Floats, turns: ZoneTurns, view: View) -> tuple[Floats, Floats
     return _with_lapse(log_p, scores, float(x[-1]))
 
 
-def zone_log_p(x: Floats, turns: ZoneTurns, view: View) -> Floats:
+def zone_log_p(x: Floats, turns: ZoneTurns, view: View, *, n_workers: int = 1) -> Floats:
     """Return the first that `zone_scores` does, in less than half of the time."""
     own, gamma = x[:3] * SCALES, np.exp(x[3:-1])
-    n, rows = len(turns.rows), turns.rows
+    n, base = len(turns.rows), turns.base_of(view)
     here, whole = np.empty(n), np.empty(n)
     first, second = constants(own[:2])
-    extended_density(
-        turns.base_of(view), view.toward[rows], view.angle_sr[rows], turns.taken, turns.share,
-        view.parts[rows], view.tilt[rows] if len(view.tilt) else view.tilt, (own[0], own[1]),
-        (first, own[2] * second), gamma, here, whole,
-    )  # fmt: skip
+
+    def ask(block: slice) -> None:
+        rows = turns.rows[block]
+        extended_density(
+            base[block], view.toward[rows], view.angle_sr[rows], turns.taken[block],
+            turns.share[block], view.parts[rows], view.tilt[rows] if len(view.tilt) else view.tilt,
+            (own[0], own[1]), (first, own[2] * second), gamma, here[block], whole[block],
+        )  # fmt: skip
+
+    in_blocks(n, n_workers, ask)
     density = gamma[turns.landing - 1] * here / whole
     if len(view.tilt):
-        density *= np.maximum(view.tilt_taken[rows], 1e-300)
+        density *= np.maximum(view.tilt_taken[turns.rows], 1e-300)
     return np.asarray(np.log((1 - x[-1]) * density + x[-1] * _UNIFORM))
 
 

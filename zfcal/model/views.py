@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.model.blocks import in_blocks
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.kernels.asking import (
     PART,
@@ -64,7 +65,9 @@ class View:
     """What was perceived so many steps late, so that a fit looks but once."""
 
 
-def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> View:
+def view_of(
+    scene: Scene, parameters: Parameters, seen: View | None = None, *, n_workers: int = 1
+) -> View:
     """Return what a model says of a scene's turns, but for the base's parameters.
 
     Parameters
@@ -73,6 +76,8 @@ def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> V
         Its field of view and its effects count.
     seen
         A view of the model without effects, if there is one: sight is taken from it.
+    n_workers
+        Threads; the numbers do not depend on them.
     """
     packed = pack([parameters], scene.arena)
     share, all_late = packed.lates[0, 0], sees_late(packed)
@@ -86,9 +91,9 @@ def view_of(scene: Scene, parameters: Parameters, seen: View | None = None) -> V
     parts = components_of(scene, packed, own)
     form = polynomial_of([find_effect(name) for name in parameters.effects])
     if form is None:
-        tilt, tilt_taken = factors_of(scene, packed, own)
+        tilt, tilt_taken = factors_of(scene, packed, own, n_workers=n_workers)
     else:
-        tilt, tilt_taken = smooth_factors_of(scene, packed, own, form)
+        tilt, tilt_taken = smooth_factors_of(scene, packed, own, form, n_workers=n_workers)
     return View(
         toward=toward,
         angle_sr=angle,
@@ -171,7 +176,12 @@ def components_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
 
 
 def factors_of(
-    scene: Scene, packed: Packed, angle_sr: Floats, probability: Floats | None = None
+    scene: Scene,
+    packed: Packed,
+    angle_sr: Floats,
+    probability: Floats | None = None,
+    *,
+    n_workers: int = 1,
 ) -> tuple[Floats, Floats]:
     """Return the effects' factors on each cell and at the heading taken; empty without.
 
@@ -179,16 +189,23 @@ def factors_of(
     ----------
     probability : ndarray, shape (turn, cell)
         Where it is given, cells that hardly any heading takes have a factor of one.
+    n_workers
+        Threads; the numbers do not depend on them.
     """
     turns = scene.turns
     if not len(packed.factors):
         return np.zeros((0, ANGLES)), np.zeros(0)
     tilt, taken = np.empty((len(turns), ANGLES)), np.empty(len(turns))
-    ask_factors(
-        scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
-        turns.landing, turns.share, np.zeros((0, ANGLES)) if probability is None else probability,
-        tilt, taken,
-    )  # fmt: skip
+    likely = np.zeros((0, ANGLES)) if probability is None else probability
+
+    def ask(own: slice) -> None:
+        ask_factors(
+            scene.states, turns.at[own], turns.who[own], packed, angle_sr[own], turns.taken[own],
+            turns.speed_m_s[own], turns.landing[own], turns.share[own],
+            likely[own] if len(likely) else likely, tilt[own], taken[own],
+        )  # fmt: skip
+
+    in_blocks(len(turns), n_workers, ask)
     return tilt, taken
 
 
@@ -219,9 +236,16 @@ def polynomial_of(effects: Sequence[Effect]) -> Polynomial | None:
 
 
 def harmonics(
-    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial
+    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial, *, n_workers: int = 1
 ) -> tuple[Floats, Floats, Floats]:
     """Return the log of the effects' factors as a polynomial, and at the heading taken.
+
+    Parameters
+    ----------
+    form
+        What the log of their product is.
+    n_workers
+        Threads; the numbers do not depend on them.
 
     Returns
     -------
@@ -231,20 +255,29 @@ def harmonics(
     turns, n = scene.turns, len(scene.turns)
     waves, log_taken = np.empty((n, 1 + 2 * form.degree)), np.empty(n)
     zones = np.empty((n, turns.share.shape[2]))
-    ask_harmonics(
-        scene.states, turns.at, turns.who, packed, angle_sr, turns.taken, turns.speed_m_s,
-        turns.landing, form.by_landing, waves, zones, log_taken,
-    )  # fmt: skip
+
+    def ask(own: slice) -> None:
+        ask_harmonics(
+            scene.states, turns.at[own], turns.who[own], packed, angle_sr[own], turns.taken[own],
+            turns.speed_m_s[own], turns.landing[own], form.by_landing, waves[own], zones[own],
+            log_taken[own],
+        )  # fmt: skip
+
+    in_blocks(n, n_workers, ask)
     return waves, zones, log_taken
 
 
 def smooth_factors_of(
-    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial
+    scene: Scene, packed: Packed, angle_sr: Floats, form: Polynomial, *, n_workers: int = 1
 ) -> tuple[Floats, Floats]:
     """Return what `factors_of` does, of factors that are polynomials in their log."""
     if not len(packed.factors):
         return np.zeros((0, ANGLES)), np.zeros(0)
-    waves, zones, log_taken = harmonics(scene, packed, angle_sr, form)
-    tilt = np.empty((len(scene.turns), ANGLES))
-    harmonic_tilt(waves, zones, scene.turns.share, tilt)
+    waves, zones, log_taken = harmonics(scene, packed, angle_sr, form, n_workers=n_workers)
+    share, tilt = scene.turns.share, np.empty((len(scene.turns), ANGLES))
+
+    def ask(own: slice) -> None:
+        harmonic_tilt(waves[own], zones[own], share[own], tilt[own])
+
+    in_blocks(len(tilt), n_workers, ask)
     return tilt, np.exp(log_taken)
