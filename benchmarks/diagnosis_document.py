@@ -279,7 +279,8 @@ def _time(found: Mapping[str, Any]) -> list[str]:
         rows += [
             [
                 MODES[mode], f"alone, {each['workers']} threads, hiding {each['kind']}", 1,
-                f"{each['wall_s']:.1f}", f"processor {each['cpu_s']:.1f}",
+                f"{each['wall_s']:.1f}",
+                f"processor {each['cpu_s']:.1f}; whole command {each['command_s']:.1f}",
             ]
             for each in told["time"]["alone"]
         ]  # fmt: skip
@@ -288,7 +289,8 @@ def _time(found: Mapping[str, Any]) -> list[str]:
         _prose(
             """Of `zfcal diagnose` on 30 minutes, without making the trial; medians and quartiles
             in seconds, one thread each while others were at work. Targets, on two cores: 60 s with
-            39 replicates, 10 s with `--quick`."""
+            39 replicates, 10 s with `--quick`. The whole command starts Python and draws the
+            page as well."""
         ),
         table(("mode", "clock", "n", "median (s)", "quartiles (s)"), rows),
     ]

@@ -311,7 +311,7 @@ def times(rows: Sequence[Row]) -> dict[str, Any]:
         "cpu_s": quartiles(row["cpu_s"] for row in long),
         "wall_s": quartiles(row["wall_s"] for row in long),
         "alone": [
-            {key: row[key] for key in ("kind", "wall_s", "cpu_s", "workers")}
+            {key: row[key] for key in ("kind", "wall_s", "cpu_s", "command_s", "workers")}
             for row in _of(done, TIME)
         ],
     }

@@ -10,6 +10,7 @@ import importlib
 import importlib.util
 import json
 import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis_ledger import Row, fingerprint, key_of
-from diagnosis_plan import EXTEND, NULLS, VIDEO, Job, scenario
+from diagnosis_plan import EXTEND, NULLS, TIME, VIDEO, Job, scenario
 from measuring import ROOT
 
 from zfcal.errors import ZfcalError
@@ -139,6 +140,8 @@ def _answer(job: Job, nats: dict[str, float] | None, folder: Path) -> Row:
     row |= _diagnosed(root, job)
     if job.section == EXTEND:
         row |= _extended(root)
+    if job.section == TIME:
+        row |= {"command_s": _commanded(root, job)}
     return row
 
 
@@ -187,6 +190,14 @@ def _diagnosed(root: Path, job: Job) -> Row:
     path, wall_s, cpu_s = _timed(lambda: diagnose(root, options, _silent))
     document = json.loads(path.read_text(encoding="utf-8"))
     return {**_said(document), "wall_s": wall_s, "cpu_s": cpu_s}
+
+
+def _commanded(root: Path, job: Job) -> float:
+    """Return the wall-clock time of the command from nothing to its page, in seconds."""
+    program = Path(sys.executable).with_name("zfcal")
+    asked = ["--force", "--quiet", "--workers", str(job.workers), *(["--quick"] * job.quick)]
+    words = [str(program), "diagnose", str(root), *asked]
+    return _timed(lambda: subprocess.run(words, check=True, stdout=subprocess.DEVNULL))[1]
 
 
 def _timed(call: Callable[[], Any]) -> tuple[Any, float, float]:
