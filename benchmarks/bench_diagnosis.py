@@ -26,10 +26,11 @@ from typing import Any
 
 import diagnosis_document
 import diagnosis_figures
+import diagnosis_film
 import diagnosis_ledger as ledger
 import diagnosis_summary
 import diagnosis_trial
-from diagnosis_plan import EXTEND, SECTIONS, TIME, Job, Scale, plan
+from diagnosis_plan import EXTEND, SECTIONS, TIME, VIDEO, Job, Scale, plan
 from measuring import RESULTS, ROOT, machine
 from regressions import Places, parser, places
 
@@ -115,7 +116,8 @@ def work(jobs: Sequence[Job], desk: Desk, *, workers: int, deadline_s: float) ->
         while True:
             for job in _next(todo, workers - len(running), deadline_s):
                 nats = known.get(_oracle_key(job))
-                running[pool.submit(diagnosis_trial.run, job, nats)] = job
+                run = diagnosis_film.run if job.section == VIDEO else diagnosis_trial.run
+                running[pool.submit(run, job, nats)] = job
             if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -205,7 +207,7 @@ def main() -> None:
     jobs = plan(scale, LISTED, UNLISTED, quick=options.quick)
     desk = Desk(
         folder=options.build,
-        marks=diagnosis_trial.marks(SECTIONS),
+        marks={**diagnosis_trial.marks(SECTIONS), VIDEO: diagnosis_film.mark()},
         packed=ledger.read(RESULTS / PACKED),
     )
     deadline_s = time.monotonic() + 60 * options.minutes

@@ -250,7 +250,11 @@ def _gap(found: Mapping[str, Any]) -> list[str]:
 
 def _through_video(found: Mapping[str, Any]) -> list[str]:
     rows = [
-        [trial["kind"], f"{trial['nats']:.0f}", ", ".join(trial["effects"]) or trial["answer"]]
+        [
+            trial["kind"],
+            _DASH if trial["nats"] is None else f"{trial['nats']:.0f}",
+            ", ".join(trial["effects"]) or trial["answer"],
+        ]
         for trial in found["trials"]
         if trial["section"] == VIDEO and trial["error"] is None
     ]

@@ -13,6 +13,7 @@ SCRIPTS = (
     "bench_diagnosis",
     "diagnosis_document",
     "diagnosis_figures",
+    "diagnosis_film",
     "diagnosis_ledger",
     "diagnosis_plan",
     "diagnosis_summary",
@@ -519,6 +520,31 @@ def test_the_oracle_counts_once_whatever_the_mode(planned, worked):
         ("alignment", None),
         ("alignment", {"total": 7.0}),
     ]
+
+
+@pytest.mark.slow
+def test_a_trial_through_video_is_tracked(bench, planned, monkeypatch):
+    """Its positions are the tracker's: they err, where those of the table do not."""
+    film = sys.modules["diagnosis_film"]
+    asked = planned.scenario(1_049_001, minutes=0.5)
+    job = planned.Job(section="video", kind="nothing", round=0, scenario=asked, quick=True)
+    made = film.run(job, None)
+    assert made.get("error") is None
+    assert made["verdict"] == "untestable"
+    assert 2e-5 < made["noise_m"] < 1e-3
+
+
+def test_trials_through_video_are_run_by_what_films_them(planned, worked, monkeypatch):
+    """Not from the table, as all others."""
+    work, _ = worked
+    monkeypatch.setattr(sys.modules["diagnosis_film"], "run", sys.modules["diagnosis_trial"].run)
+    monkeypatch.setattr(sys.modules["diagnosis_trial"], "run", None)
+    (job, *_) = [
+        job
+        for job in planned.plan(planned.Scale(), LISTED, (), quick=True)
+        if job.section == "video"
+    ]
+    assert len(work([job])) == 1
 
 
 def test_no_trial_begins_after_the_deadline(planned, worked):
