@@ -88,8 +88,10 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             each is written as CSV at 15 Hz, imported and diagnosed as the commands do it, with the
             position noise estimated from the tracks, not given. Strength is in oracle nats: the
             sum over steps of log f_true minus log f_base, the base law at its own maximum
-            likelihood. Seeds begin at 20000 and nobody has tuned on them. Intervals are Wilson's,
-            95 %. Code: diagnosis {found["code"]["diagnosis"]}, extension
+            likelihood. Seeds begin at 20000; rules are chosen on others, though trials of earlier
+            runs have been looked at, and two of them (20901, 50801) are a part of why a place
+            beside a current must gain half of it. Intervals are Wilson's, 95 %. Code: diagnosis
+            {found["code"]["diagnosis"]}, extension
             {found["code"]["extension"]}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
