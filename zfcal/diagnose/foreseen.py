@@ -9,7 +9,10 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import Score
 
 _ERRS = 2.0
+"""Standard errors by which what is foreseen may fall short at the least."""
+
 _ERRS_SHARE = 0.1
+"""Of the standard errors of what is in the model by now."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
