@@ -375,6 +375,7 @@ FREE = {
     "component": ("alignment", {"weight": 20.0}, "weight"),
     "factor": ("turning-bias", {"strength": 0.4}, "strength"),
     "sight": ("rear-blind-zone", {"ignored": 0.8}, "ignored"),
+    "strong factor": ("generic:heading:own-turn", {"strength": 9.0}, "strength"),
 }
 
 
