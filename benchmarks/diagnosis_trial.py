@@ -35,11 +35,14 @@ GENERATIONS = 30
 ORACLE = "oracle"
 """Section of the rows that hold what an oracle sees."""
 
+Measure = Callable[[Path, Any, dict[str, Any]], Path]
+"""Makes a trial directory with tracks in an empty folder, of what was made for a scenario."""
+
 _SCREENED = 3
 _WARMING_SEED = 9000
 
 _HIDDEN = ("tests/hidden",)
-_DIAGNOSIS = (
+DIAGNOSIS_CODE = (
     *_HIDDEN,
     "benchmarks/diagnosis_trial.py",
     "zfcal/diagnose",
@@ -54,12 +57,12 @@ _DIAGNOSIS = (
     "zfcal/online/import_.py",
     "zfcal/artifacts/foreign",
 )
-_EXTENSION = (*_DIAGNOSIS, "zfcal/online", "zfcal/calibrate")
+_EXTENSION = (*DIAGNOSIS_CODE, "zfcal/online", "zfcal/calibrate")
 
 
 def marks(sections: tuple[str, ...]) -> dict[str, str]:
     """Return the fingerprint of the code that bears on the answers of each section."""
-    diagnosis, extension = fingerprint(ROOT, _DIAGNOSIS), fingerprint(ROOT, _EXTENSION)
+    diagnosis, extension = fingerprint(ROOT, DIAGNOSIS_CODE), fingerprint(ROOT, _EXTENSION)
     made = {section: extension if section == EXTEND else diagnosis for section in sections}
     return {**made, ORACLE: fingerprint(ROOT, _HIDDEN)}
 
@@ -82,7 +85,24 @@ def oracle_said(asked: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in asked.items() if key not in {"chain", "fps"}}
 
 
-def run(job: Job, nats: dict[str, float] | None) -> Row:
+def tabled(folder: Path, made: Any, asked: dict[str, Any]) -> Path:
+    """Return a trial directory with the tracks of a hidden trial, imported from a table.
+
+    Parameters
+    ----------
+    folder
+        An empty one.
+    made
+        What the second simulator made.
+    asked
+        Its scenario.
+    """
+    root = folder / "trial"
+    lay_out(root, made, asked)
+    return root
+
+
+def run(job: Job, nats: dict[str, float] | None, measure: Measure = tabled) -> Row:
     """Make a trial and diagnose it.
 
     Parameters
@@ -90,7 +110,9 @@ def run(job: Job, nats: dict[str, float] | None) -> Row:
     job
         What is asked.
     nats
-        What an oracle sees, where it is known; it is counted otherwise.
+        What an oracle sees in the true tracks, where it is known; it is counted otherwise.
+    measure
+        How tracks come from what was made; from a table if not said.
 
     Returns
     -------
@@ -101,7 +123,7 @@ def run(job: Job, nats: dict[str, float] | None) -> Row:
     begin = time.perf_counter()
     try:
         with tempfile.TemporaryDirectory(prefix="zfcal-bench-") as folder:
-            row |= _answer(job, nats, Path(folder))
+            row |= _answer(job, nats, Path(folder), measure)
     # A trial that fails must not end hours of others; its row says how.
     except Exception as error:  # noqa: BLE001
         row |= {"verdict": "error", "effects": [], "error": _described(error)}
@@ -123,15 +145,14 @@ def _described(error: Exception) -> str:
     return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
 
 
-def _answer(job: Job, nats: dict[str, float] | None, folder: Path) -> Row:
+def _answer(job: Job, nats: dict[str, float] | None, folder: Path, measure: Measure) -> Row:
     from hidden.chain import Chain
     from hidden.scenario import Scenario, make_trial
 
     asked = Scenario(**{**job.scenario, "chain": Chain(**job.scenario["chain"])})
     asks = bool(asked.hidden) and nats is None
     made = make_trial(asked, oracle=asks)
-    root = folder / "trial"
-    lay_out(root, made, job.scenario)
+    root = measure(folder, made, job.scenario)
     row: Row = {
         "truth": list(asked.hidden),
         "strengths": made.truth["effects"],
@@ -173,12 +194,12 @@ def lay_out(root: Path, made: Any, asked: dict[str, Any]) -> None:
         n_fish=asked["n_fish"], n_robots=int(asked["robot"]), fps=asked["fps"],
         arena=arena, seed=asked["seed"],
     )  # fmt: skip
-    create_trial(root, new, _silent)
+    create_trial(root, new, silent)
     write_csv(made, table)
-    import_tracks(root, Source(path=table, format="csv", options={}), _silent)
+    import_tracks(root, Source(path=table, format="csv", options={}), silent)
 
 
-def _silent(_event: object) -> None:
+def silent(_event: object) -> None:
     """Take no notice."""
 
 
@@ -187,7 +208,7 @@ def _diagnosed(root: Path, job: Job) -> Row:
     from zfcal.online.diagnose import DiagnoseOptions, diagnose
 
     options = DiagnoseOptions(quick=job.quick, n_workers=job.workers)
-    path, wall_s, cpu_s = _timed(lambda: diagnose(root, options, _silent))
+    path, wall_s, cpu_s = _timed(lambda: diagnose(root, options, silent))
     document = json.loads(path.read_text(encoding="utf-8"))
     return {**_said(document), "wall_s": wall_s, "cpu_s": cpu_s}
 
@@ -233,7 +254,7 @@ def _extended(root: Path) -> Row:
     extend = importlib.import_module("zfcal.online.extend")
     settings = Settings(generations=GENERATIONS)
     options = extend.ExtendOptions(calibration=CalibrateOptions(settings=settings, n_workers=1))
-    path, wall_s, cpu_s = _timed(lambda: extend.extend(root, options, _silent))
+    path, wall_s, cpu_s = _timed(lambda: extend.extend(root, options, silent))
     findings = json.loads((root / "diagnosis" / "findings.json").read_text(encoding="utf-8"))
     return {
         "extended": path is not None,

@@ -523,7 +523,7 @@ def test_the_oracle_counts_once_whatever_the_mode(planned, worked):
 
 
 @pytest.mark.slow
-def test_a_trial_through_video_is_tracked(bench, planned, monkeypatch):
+def test_a_trial_through_video_is_tracked(bench, planned):
     """Its positions are the tracker's: they err, where those of the table do not."""
     film = sys.modules["diagnosis_film"]
     asked = planned.scenario(1_049_001, minutes=0.5)
