@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +56,7 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         zfcal diagnose trial --model trial/models/extended.toml
         zfcal diagnose day1 day2 --window 0:1800 --noise-mm 0.5
     """
-    from .diagnosis import choose, diagnose_one
+    from .diagnosis import choose, diagnose_all
 
     chosen, task = choose(options, trials)
     out.bare = len(trials) == 1
@@ -67,5 +66,4 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         roots[found.root] = None
 
     each_trial(out, trials, collect)
-    for root in roots:
-        out.attempt(functools.partial(diagnose_one, out, root, chosen, task))
+    diagnose_all(out, roots, chosen, task)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,13 +53,16 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
         raise click.UsageError("-o is for one trial: its findings would overwrite each other's.")
 
 
-def diagnose_one(out: Output, root: Path, chosen: DiagnoseOptions, task: Task) -> None:
-    """Diagnose one trial, draw its page, and say in words what it comes to."""
+def diagnose_all(out: Output, roots: Iterable[Path], chosen: DiagnoseOptions, task: Task) -> None:
+    """Diagnose trials, draw their pages, and say in words what each comes to."""
     from zfcal.online.diagnose import diagnose
-    from zfcal.report import diagnosis_page
+    from zfcal.report.easel import Easel
 
-    tell = functools.partial(tell_and_warn, out, root, in_words=True)
-    diagnose(root, chosen, tell, task=task, draw=diagnosis_page)
+    with Easel() as easel:
+        for root in roots:
+            tell = functools.partial(tell_and_warn, out, root, in_words=True)
+            work = functools.partial(diagnose, root, chosen, tell, task=task, draw=easel)
+            out.attempt(work)
 
 
 def tell_and_warn(out: Output, root: Path, event: Event, *, in_words: bool = False) -> None:

@@ -62,7 +62,8 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 def extend_one(out: Output, root: Path, chosen: ExtendOptions, task: Task) -> None:
     """Extend the model of one trial and draw the findings' page anew."""
     from zfcal.online.extend import extend
-    from zfcal.report import diagnosis_page
+    from zfcal.report.easel import Easel
 
     tell = functools.partial(tell_and_warn, out, root)
-    extend(root, chosen, tell, task=task, draw=diagnosis_page)
+    with Easel() as easel:
+        extend(root, chosen, tell, task=task, draw=easel)

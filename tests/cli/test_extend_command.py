@@ -22,10 +22,11 @@ def answered(monkeypatch, make_diagnosis):
         lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
     )
     monkeypatch.setattr(
-        "zfcal.report.diagnosis_page.write_picture",
-        lambda picture, path: path.write_text(picture.title, encoding="utf-8"),
+        "zfcal.report.diagnosis_drawing.png_of", lambda picture: picture.title.encode()
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
+    # Processes of their own would draw all the same.
+    monkeypatch.setattr("zfcal.report.easel.Easel.prepare", lambda _easel: None)
 
 
 def test_no_effect_is_nothing_to_do(zfcal, trial, answered):

@@ -97,12 +97,12 @@ def test_a_context_by_hand():
 
 def test_one_rare_heading_does_not_decide():
     """A residual of 30 among variances of 1 / 40 each is not worth its 30 / sqrt(1)."""
-    residual, variance = np.zeros(40), np.full(40, 1 / 40)
+    residual, variance = np.zeros((40, 1)), np.full((40, 1), 1 / 40)
     residual[0] = 30.0
     bins = np.zeros(40, dtype=np.int64)
 
-    assert rare_by_context(residual, variance, bins, 33.0) < 1.7
-    assert rare_by_context(residual, variance, bins, 0.0) > 20
+    assert rare_by_context(residual, variance, bins, 33.0)[0] < 1.7
+    assert rare_by_context(residual, variance, bins, 0.0)[0] > 20
 
 
 def test_rare_headings_have_mean_zero_under_the_model(base):

@@ -4,6 +4,7 @@ import dataclasses
 import html
 import json
 import math
+import multiprocessing
 import re
 import subprocess
 from dataclasses import replace
@@ -20,6 +21,7 @@ from zfcal.report.diagnosis_figures import finding_picture, shown_places, slug
 from zfcal.report.diagnosis_overview import gap_picture, screened_picture
 from zfcal.report.diagnosis_tables import tables
 from zfcal.report.diagnosis_words import statements, verdict_sentence
+from zfcal.report.easel import Easel
 from zfcal.report.panels import compose
 
 OPTIONS = (
@@ -100,8 +102,7 @@ def make_sheet(two_rooms, make_diagnosis):
 def undrawn(monkeypatch):
     """Draw nothing: for tests of what is written when, and of words."""
     monkeypatch.setattr(
-        "zfcal.report.diagnosis_page.write_picture",
-        lambda picture, path: path.write_text(picture.title, encoding="utf-8"),
+        "zfcal.report.diagnosis_drawing.png_of", lambda picture: picture.title.encode()
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
 
@@ -374,6 +375,31 @@ def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
     diagnosis_page.write(tmp_path, make_sheet(names=()))
     assert not (tmp_path / "1-alignment.png").exists()
     assert (tmp_path / "mine.png").exists()
+
+
+def test_an_easel_draws_what_is_drawn_without(make_sheet, tmp_path):
+    """Processes of its own give the same bytes, and are gone afterwards."""
+    sheet = make_sheet(names=())
+    with Easel() as easel:
+        easel.prepare()
+        hands = multiprocessing.active_children()
+        drawn = {path.name: path.read_bytes() for path in easel.write(tmp_path / "a", sheet)}
+    assert len(hands) == 2
+    assert not multiprocessing.active_children()
+    without = diagnosis_page.write(tmp_path / "b", sheet)
+    assert drawn == {path.name: path.read_bytes() for path in without}
+
+
+def test_an_easel_whose_process_was_killed(make_sheet, tmp_path, undrawn):
+    """The page is drawn all the same."""
+    with Easel() as easel:
+        easel.prepare()
+        for hand in multiprocessing.active_children():
+            hand.kill()
+        written = easel.write(tmp_path, make_sheet())
+    assert [path.name for path in written] == ["report.html", "1-alignment.png", "screened.png"]
+    assert easel.reason(tmp_path, "f" * 64) is None
+    assert easel.files(tmp_path) == written
 
 
 @pytest.mark.slow

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
+from zfcal.diagnose.kernels import sums_in_bins
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -43,21 +45,17 @@ def by_context(values: Floats, bins: Ints) -> float:
     Parameters
     ----------
     values : ndarray, shape (step, degree)
-        Of mean 0 and variance 1; NaN where there is none.
+        Of mean 0 and variance 1; NaN in all of a step's degrees where it has none.
     bins : ndarray of int64, shape (step,)
         -1 for none. A bin with fewer than 20 steps is left out.
     """
-    rows = (bins >= 0) & np.isfinite(values[:, 0])
-    if not rows.any():
-        return math.nan
-    count = np.bincount(bins[rows])
-    enough = count >= LEAST_IN_BIN
-    sums = np.stack([np.bincount(bins[rows], column[rows]) for column in values.T])
-    chi2 = (sums[:, enough] ** 2 / count[enough]).sum()
-    return normal_of(float(chi2), int(enough.sum()) * values.shape[1])
+    count, sums = _in_bins(values, bins)
+    enough = count[0] >= LEAST_IN_BIN
+    chi2 = (sums[:, enough] ** 2 / count[:, enough]).sum()
+    return normal_of(float(chi2), int(enough.sum()) * len(sums))
 
 
-def rare_by_context(residual: Floats, variance: Floats, bins: Ints, largest: float) -> float:
+def rare_by_context(residual: Floats, variance: Floats, bins: Ints, largest: float) -> list[float]:
     r"""Return how far residuals of which few are large differ from 0 in the bins of a context.
 
     A bin's sum S of residuals with variance V, none above c, counts as
@@ -67,18 +65,30 @@ def rare_by_context(residual: Floats, variance: Floats, bins: Ints, largest: flo
 
     Parameters
     ----------
-    residual, variance : ndarray, shape (step,)
-        NaN where there is none.
+    residual, variance : ndarray, shape (step, column)
+        NaN where there is none, in both.
     bins : ndarray of int64, shape (step,)
         -1 for none. A bin with fewer than 20 steps is left out.
     largest
         The bound c.
+
+    Returns
+    -------
+    list of float
+        Of each column; NaN without bins.
     """
-    rows = (bins >= 0) & np.isfinite(residual)
-    if not rows.any():
-        return math.nan
-    enough = np.bincount(bins[rows]) >= LEAST_IN_BIN
-    sums = np.bincount(bins[rows], residual[rows])[enough]
-    whole = np.bincount(bins[rows], variance[rows])[enough] + largest * np.maximum(sums, 0) / 3
-    kept = whole > 0
-    return normal_of(float((sums[kept] ** 2 / whole[kept]).sum()), int(kept.sum()))
+    count, sums = _in_bins(residual, bins)
+    whole = _in_bins(variance, bins)[1] + largest * np.maximum(sums, 0) / 3
+    kept = (count >= LEAST_IN_BIN) & (whole > 0)
+    return [
+        normal_of(float((own[rows] ** 2 / by[rows]).sum()), int(rows.sum()))
+        for own, by, rows in zip(sums, whole, kept, strict=True)
+    ]
+
+
+def _in_bins(values: Floats, bins: Ints) -> tuple[Ints, Floats]:
+    """Return how many values there are in each bin, and their sums, shape (column, bin)."""
+    shape = (int(bins.max(initial=-1)) + 1, values.shape[1])
+    count, sums = np.zeros(shape, dtype=np.int64), np.zeros(shape)
+    sums_in_bins(np.ascontiguousarray(values), bins, count, sums)
+    return np.ascontiguousarray(count.T), np.ascontiguousarray(sums.T)

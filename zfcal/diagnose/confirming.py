@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc
 
 from zfcal.diagnose.candidates import Candidate, in_model, is_generic
 from zfcal.diagnose.findings import Note
@@ -207,7 +207,7 @@ def _one_strength(steps: Floats, block: Floats) -> bool:
     mean = float(sums.sum()) / total
     q, df = float(((sums - mean * information) ** 2 / information).sum()), len(sums) - 1
     spread2 = (q - df) / (total - float((information**2).sum()) / total)
-    return bool(spread2 <= mean**2 or stats.chi2.sf(q, df) > _WAVERS)
+    return bool(spread2 <= mean**2 or chdtrc(df, q) > _WAVERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

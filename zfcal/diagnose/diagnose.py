@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtri
 
 from zfcal.diagnose.candidates import Candidate, in_model, not_forms_of
 from zfcal.diagnose.case import (
@@ -134,9 +134,13 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         given=in_model(case.screen.fitted.parameters),
         told=tell,
     )
-    selection = selector.select(case.screen, scores)
+    selection, where = together(
+        lambda: selector.select(case.screen, scores),
+        lambda: _where(own[0], rows),
+        n_workers=question.n_workers,
+    )
     judged = _judged(case, rows, selection, omnibus)
-    return _diagnosis(case, rows, selection, judged, _where(own[0], rows))
+    return _diagnosis(case, rows, selection, judged, where)
 
 
 def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omnibus) -> _Judged:
@@ -174,7 +178,7 @@ def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]
     best = _best_shapes(scores)
     if not question.quick:
         return tuple(candidate for _, candidate in best)
-    clear = -stats.norm.ppf(LEVEL / 2 / max(len(scores), 1))
+    clear = -ndtri(LEVEL / 2 / max(len(scores), 1))
     if not has_noise(question) or not any(z > clear for z, _ in best):
         return ()
     return tuple(candidate for z, candidate in best if z > _QUICK_Z)

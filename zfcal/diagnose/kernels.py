@@ -193,6 +193,30 @@ def product_sums(values: Floats, other: Ints, sums: Floats) -> int:
 
 
 @kernel
+def sums_in_bins(values: Floats, bins: Ints, count: Ints, sums: Floats) -> None:
+    """Add up the values of each bin, column by column.
+
+    Parameters
+    ----------
+    values : ndarray, shape (step, column)
+        NaN where there is none.
+    bins : ndarray of int64, shape (step,)
+        -1 for none.
+    count, sums : ndarray, shape (bin, column)
+        Zero; receive the number of values and their sum.
+    """
+    for s in range(bins.size):
+        b = bins[s]
+        if b < 0:
+            continue
+        for c in range(values.shape[1]):
+            value = values[s, c]
+            if math.isfinite(value):
+                count[b, c] += 1
+                sums[b, c] += value
+
+
+@kernel
 def _counted(angle: float, folded: bool) -> float:
     """Return an angle from -pi to 3 pi in [-pi, pi), or its size there."""
     if angle >= math.pi:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
-from scipy.stats import false_discovery_control
 
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
@@ -241,6 +240,9 @@ def located(
     most
         At most so many.
     """
+    # Slow to import, and needed here alone.
+    from scipy.stats import false_discovery_control
+
     if not len(table):
         return ()
     z = (table.z - centre) / spread

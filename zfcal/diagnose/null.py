@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtr, stdtr
 
 from zfcal.arena import Arena
 from zfcal.diagnose.screening import Screen
@@ -85,9 +85,9 @@ class Null:
         Student's law stands for what is not known of centre and spread.
         """
         if self.n == 0:
-            return np.asarray(2 * stats.norm.sf(np.abs(z)))
+            return np.asarray(2 * ndtr(-np.abs(z)))
         widened = np.abs(z) / np.sqrt(1 + 1 / self.n)
-        return np.asarray(2 * stats.t.sf(widened, self.n - 1 + _PRIOR_WEIGHT))
+        return np.asarray(2 * stdtr(self.n - 1 + _PRIOR_WEIGHT, -widened))
 
 
 def theory(n_statistics: int) -> Null:

@@ -25,8 +25,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtr
-from scipy.stats import t as student
+from scipy.special import chdtrc, ndtr, stdtr
 
 from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of, normal_of_tail
@@ -251,7 +250,7 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
         spread = math.sqrt((squares + _PRIOR_WEIGHT) / df * (1 + 1 / max(drawn.size, 1)))
         spread = math.hypot(spread, UNLIKE * centre)
         made[name] = (z - centre) / spread if n else z
-        tails[name] = float(student.sf(made[name], df)) if n else float(ndtr(-z))
+        tails[name] = float(stdtr(df, -made[name])) if n else float(ndtr(-z))
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from zfcal.diagnose.kernels import cell_ranks
 from zfcal.diagnose.surroundings import Surroundings
@@ -71,8 +70,8 @@ def speed_ranks(moves: Moves, factor: Floats, rng: np.random.Generator) -> Float
     speed = speed * (1 + 1e-9 * rng.random(len(moves))) + 1e-12 * rng.random(len(moves))
     ranks = np.empty(len(moves))
     for zone in np.unique(moves.zone):
-        rows = moves.zone == zone
-        ranks[rows] = (rankdata(speed[rows]) - 0.5) / rows.sum()
+        rows = np.flatnonzero(moves.zone == zone)
+        ranks[rows[np.argsort(speed[rows])]] = (np.arange(len(rows)) + 0.5) / len(rows)
     return ranks
 
 

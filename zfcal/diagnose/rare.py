@@ -55,17 +55,20 @@ def rare_statistics(standing: Standing) -> dict[str, float]:
     residual = np.empty(axis.shape[:2])
     variance = np.empty(axis.shape[:2])
     rare_headings(standing.probability, turns.taken, axis, _FLOOR, residual, variance)
-    residual[~standing.fitted.used] = np.nan
+    unused = ~standing.fitted.used
+    residual[unused], variance[unused] = np.nan, np.nan
     found = contexts(standing.scene, turns, about)
     sorted_by = {"": np.zeros(len(turns), dtype=np.int64)}
     sorted_by |= {f" by {context}": found[context] for context in _CONTEXTS}
-    made = {}
-    for column, name in enumerate(names):
-        own, spread = residual[:, column], variance[:, column]
-        for context, bins in sorted_by.items():
-            z = rare_by_context(own, spread, bins, 1 / _FLOOR)
-            made[f"rare headings {name}{context}"] = z
-    return made
+    table = {
+        context: rare_by_context(residual, variance, bins, 1 / _FLOOR)
+        for context, bins in sorted_by.items()
+    }
+    return {
+        f"rare headings {name}{context}": by_column[column]
+        for column, name in enumerate(names)
+        for context, by_column in table.items()
+    }
 
 
 def run_statistics(standing: Standing, rng: np.random.Generator) -> dict[str, float]:

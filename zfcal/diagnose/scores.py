@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, ndtri
 
 from zfcal.diagnose.candidates import Candidate
 from zfcal.model.fitted import Fitted
@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 
 _FLOOR = 0.01
 """Share of a uniform law in a heading's density, beside the lapse that was fitted."""
+
+_LEAST_TAIL = 1e-260
+"""Smaller ones count by their logarithm."""
 
 _SEVERAL = 60.0
 """Steps of one size that a score must be made of, to be as good as normal."""
@@ -115,11 +118,14 @@ def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
 
 def normal_deviate(chi2: float, df: int) -> float:
     """Return the normal deviate of the same upper tail as a chi-square."""
-    tail = float(stats.chi2.logsf(chi2, df))
-    if math.isinf(tail):  # beyond what a double holds: the first term of its expansion
-        half = chi2 / 2
-        tail = (df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)
-    return float(stats.norm.isf(np.exp(tail))) if tail > -600 else float(np.sqrt(-2 * tail))
+    tail = float(chdtrc(df, chi2))
+    if tail > _LEAST_TAIL:
+        return -float(ndtri(tail))
+    if tail > 0.0:
+        return math.sqrt(-2 * math.log(tail))
+    # Beyond what a double holds: the first term of its logarithm's expansion.
+    half = chi2 / 2
+    return math.sqrt(-2 * ((df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)))
 
 
 def excess_deviate(count: float, expected: float) -> float:
@@ -133,7 +139,7 @@ def excess_deviate(count: float, expected: float) -> float:
     away = expected - count + (count * math.log(count / expected) if count > 0.0 else 0.0)
     if count <= expected:
         return -math.sqrt(2 * max(away, 0.0))
-    return max(0.0, float(stats.norm.isf(math.exp(-away)))) if away < 700 else math.sqrt(2 * away)
+    return max(0.0, -float(ndtri(math.exp(-away)))) if away < 700 else math.sqrt(2 * away)
 
 
 def summed(candidate: Candidate, steps: Floats) -> Score:

@@ -83,7 +83,8 @@ class ZoneTurns:
     @cached_property
     def reachable(self) -> NDArray[np.bool_]:
         """Zones in which a heading lands, shape (zone,)."""
-        return np.asarray(self.share.any(axis=(0, 1)))
+        # Over both axes at once numpy takes twenty times as long.
+        return np.asarray(self.share.any(axis=0).any(axis=0))
 
 
 def zone_turns(scene: Scene) -> tuple[ZoneTurns, ...]:

@@ -174,6 +174,8 @@ def diagnose(
             tell_version([book.path], expected, tell)
             tell(UpToDate(path=book.path))
         else:
+            if draw is not None and options.workers > 1:
+                draw.prepare()
             diagnosis = _answer(case, stretch, tell)
             book.write(_document(case, stretch, diagnosis), expected)
             tell(Made(path=book.path, reason=reason))

@@ -23,6 +23,9 @@ FILE = "findings.json"
 class Draw(Protocol):
     """Who draws a page about findings into their folder."""
 
+    def prepare(self) -> None:
+        """Get ready beside other work: what takes a while is about to be computed."""
+
     def reason(self, folder: Path, findings_sha256: str) -> str | None:
         """Return why the page must be drawn; None if it shows these findings."""
 

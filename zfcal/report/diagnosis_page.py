@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from zfcal.artifacts.atomic import sha256_of, storage_error, write_text_whole, write_whole
 from zfcal.artifacts.lineage import package_version
 from zfcal.diagnose.document import Sheet
-from zfcal.report.diagnosis_figures import finding_picture
-from zfcal.report.diagnosis_overview import gap_picture, screened_picture
-from zfcal.report.diagnosis_tables import tables
-from zfcal.report.diagnosis_words import facts, statements, verdict_sentence
-from zfcal.report.panels import Picture, write_picture
-from zfcal.report.render import render
+from zfcal.report.contents import Section
 
 PAGE = "report.html"
 
 _EMBEDDED = re.compile(r'<script type="application/json" id="provenance">(.*?)</script>', re.DOTALL)
 
 
-def write(folder: Path, sheet: Sheet) -> list[Path]:
+def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path]:
     """Draw pictures and page of findings.
 
     Parameters
@@ -32,6 +28,8 @@ def write(folder: Path, sheet: Sheet) -> list[Path]:
         Where they go.
     sheet
         What they show.
+    pool
+        Whose workers draw; None for a thread.
 
     Returns
     -------
@@ -44,15 +42,19 @@ def write(folder: Path, sheet: Sheet) -> list[Path]:
     StorageError
         The disk is full, or the place cannot be written.
     """
-    pictures = pictures_of(sheet)
+    if pool is None:
+        with ThreadPoolExecutor(1) as own:
+            return write(folder, sheet, own)
+    drawn, sections = pool.submit(_pngs, sheet), pool.submit(_sections, sheet)
     hashes = {}
-    for picture in pictures:
-        path = folder / f"{picture.name}.png"
-        write_whole(path, _drawer(picture))
+    for name, png in drawn.result().items():
+        path = folder / f"{name}.png"
+        write_whole(path, _writer(png))
         hashes[path.name] = sha256_of(path)
     _remove_outdated(folder, set(hashes))
     provenance = {**sheet.provenance, "pictures": hashes, "version": package_version()}
-    write_text_whole(folder / PAGE, render(_content(sheet), pictures, provenance))
+    page = pool.submit(_page, sheet, sections.result(), provenance)
+    write_text_whole(folder / PAGE, page.result())
     return files(folder)
 
 
@@ -89,34 +91,6 @@ def files(folder: Path) -> list[Path]:
     return [folder / PAGE, *(folder / name for name in said.get("pictures", {}))]
 
 
-def pictures_of(sheet: Sheet) -> list[Picture]:
-    """Return the pictures of findings, in the order in which they are told."""
-    findings = sheet.findings
-    found = [effect.name for effect in findings.effects]
-    made = [
-        gap_picture(findings.gap),
-        *(
-            None if pictured is None else finding_picture(name, number, pictured, sheet.arena)
-            for number, (name, pictured) in enumerate(
-                zip(found, findings.pictured, strict=True), start=1
-            )
-        ),
-        screened_picture(findings.screened, found),
-    ]
-    return [picture for picture in made if picture is not None]
-
-
-def _content(sheet: Sheet) -> dict[str, Any]:
-    return {
-        "title": verdict_sentence(sheet.findings),
-        "facts": facts(sheet),
-        "statements": statements(sheet.findings),
-        "gaps": [],
-        "left_out": [note.says for note in sheet.findings.notes if note.name == "left-out"],
-        "tables": tables(sheet),
-    }
-
-
 def _provenance(page: Path) -> dict[str, Any] | None:
     try:
         found = _EMBEDDED.search(page.read_text(encoding="utf-8"))
@@ -126,8 +100,32 @@ def _provenance(page: Path) -> dict[str, Any] | None:
     return said if isinstance(said, dict) else None
 
 
-def _drawer(picture: Picture) -> Callable[[Path], None]:
-    return lambda part: write_picture(picture, part)
+# Matplotlib is slow to load: whoever draws loads it, and a page that is up to date needs nobody.
+
+
+def _pngs(sheet: Sheet) -> dict[str, bytes]:
+    from zfcal.report.diagnosis_drawing import pngs_of
+
+    return pngs_of(sheet)
+
+
+def _sections(sheet: Sheet) -> list[Section]:
+    from zfcal.report.diagnosis_drawing import sections_of
+
+    return sections_of(sheet)
+
+
+def _page(sheet: Sheet, sections: Sequence[Section], provenance: Mapping[str, Any]) -> str:
+    from zfcal.report.diagnosis_drawing import page_of
+
+    return page_of(sheet, sections, provenance)
+
+
+def _writer(content: bytes) -> Callable[[Path], None]:
+    def write_bytes(part: Path) -> None:
+        part.write_bytes(content)
+
+    return write_bytes
 
 
 def _remove_outdated(folder: Path, made: set[str]) -> None:

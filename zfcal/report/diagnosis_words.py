@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from zfcal.diagnose.document import Findings, Sheet
 from zfcal.diagnose.findings import EffectFound, Gap, Note, Screened, Verdict
-from zfcal.report.summary import Statement
+from zfcal.report.contents import Statement
 
 A_WEEK_MIN = 7 * 24 * 60
 """Nobody records for longer: the recording cannot show it at all."""

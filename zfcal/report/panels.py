@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,6 +112,14 @@ def write_picture(picture: Picture, path: Path) -> None:
     """Write all panels of a picture, its title and its key as one PNG."""
     with theme.style():
         theme.save_png(compose(picture), path)
+
+
+def png_of(picture: Picture) -> bytes:
+    """Return what `write_picture` writes."""
+    made = BytesIO()
+    with theme.style():
+        theme.save_png(compose(picture), made)
+    return made.getvalue()
 
 
 def compose(picture: Picture) -> Figure:

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from zfcal.artifacts.lineage import Lineage, to_json
 from zfcal.report import theme
+from zfcal.report.contents import Section
 from zfcal.report.intervals import interval_tables
 from zfcal.report.numbers import lineage_table, tables, trials_table
 from zfcal.report.panels import Entry, Picture, entry_svg, panel_svg
 from zfcal.report.summary import gaps, statements
 from zfcal.report.trials_summary import gaps_of_trials, statements_of_trials
 from zfcal.report.views import TrialView
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Section:
-    """A picture as the page shows it."""
-
-    picture: Picture
-    panels: list[str]
-    keys: list[dict[str, str]]
 
 
 def render_page(views: Sequence[TrialView], pictures: Sequence[Picture], lineage: Lineage) -> str:
@@ -41,11 +32,11 @@ def render_page(views: Sequence[TrialView], pictures: Sequence[Picture], lineage
     """
     content = _of_one(views[0]) if len(views) == 1 else _of_several(views)
     content["left_out"] = [line for view in views for line in view.left_out]
-    return render(content, pictures, lineage.as_dict())
+    return render(content, list(map(section_of, pictures)), lineage.as_dict())
 
 
 def render(
-    content: Mapping[str, Any], pictures: Sequence[Picture], provenance: Mapping[str, Any]
+    content: Mapping[str, Any], sections: Sequence[Section], provenance: Mapping[str, Any]
 ) -> str:
     """Return a page as HTML.
 
@@ -53,8 +44,8 @@ def render(
     ----------
     content
         ``title``, ``facts``, ``statements``, ``gaps``, ``left_out`` and ``tables``.
-    pictures
-        In the order in which they are shown.
+    sections
+        Pictures, in the order in which they are shown.
     provenance
         Where the page comes from, with the ``version`` that made it; it stands in the
         page as JSON.
@@ -65,7 +56,7 @@ def render(
     environment.filters["hold"] = _hold
     text = environment.get_template("page.html.j2").render(
         **content,
-        sections=[_section(picture) for picture in pictures],
+        sections=sections,
         version=provenance["version"],
         lineage=_embedded(provenance),
         light=_colours(1),
@@ -112,9 +103,13 @@ def _facts(view: TrialView) -> str:
     return "; ".join(parts) + "."
 
 
-def _section(picture: Picture) -> _Section:
-    return _Section(
-        picture=picture,
+def section_of(picture: Picture) -> Section:
+    """Return a picture as the page shows it, its panels drawn."""
+    return Section(
+        name=picture.name,
+        title=picture.title,
+        short=picture.short,
+        note=picture.note,
         panels=[
             panel_svg(panel, f"{picture.name}-{number}")
             for number, panel in enumerate(picture.panels)

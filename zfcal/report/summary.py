@@ -13,6 +13,7 @@ import numpy as np
 
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
+from zfcal.report.contents import Statement
 from zfcal.report.integration import NOT_COMPARED
 from zfcal.report.statistics_figure import histogram_mean
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Mark, TrialView
@@ -35,28 +36,6 @@ _PLACES = {
     "T": "the moves between zones",
     "O": "the times in each zone",
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Statement:
-    """A question of the reader's and its answer.
-
-    Parameters
-    ----------
-    question
-        In everyday words.
-    answer
-        Sentences.
-    figure
-        The number that stands out, with its name; empty without one.
-    warns
-        Whether the answer puts all others in doubt.
-    """
-
-    question: str
-    answer: str
-    figure: tuple[str, str] = ("", "")
-    warns: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -180,7 +180,7 @@ def name_ticks(
         axes.set_xticks(at, labels)
 
 
-def save_png(figure: Figure, path: Path) -> None:
+def save_png(figure: Figure, path: Path | BytesIO) -> None:
     """Write the figure as a PNG that holds nothing of the day or the machine."""
     figure.savefig(path, format="png", dpi=PNG_DPI, metadata={"Software": None})
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from zfcal.report.summary import Gap, Statement, gaps
+from zfcal.report.contents import Statement
+from zfcal.report.summary import Gap, gaps
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
 
