@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import gc
 import importlib
 import os
 import signal
@@ -48,6 +49,9 @@ EXIT_READER_GONE = 141
 _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What says how many threads a product of matrices takes; read when numpy is loaded."""
+
+_OBJECTS = 100_000
+"""New objects after which Python looks for those that refer to each other and to nothing else."""
 
 _BUG_HINT = "Run it again with --traceback to see where, and report it."
 
@@ -143,6 +147,8 @@ def main() -> NoReturn:
             # the next product of small matrices, take the processor from them: a diagnosis took
             # twice as long.
             os.environ.setdefault(name, "1")
+    # Libraries leave some 100,000 objects for good, which would be looked through again and again.
+    gc.set_threshold(_OBJECTS)
     sys.exit(run(sys.argv[1:]))
 
 
