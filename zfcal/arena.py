@@ -209,10 +209,11 @@ class Arena:
             How many were moved.
         """
         settled = np.array(xy_m, dtype=np.float64)
-        known = ~np.isnan(settled).any(axis=-1)
-        points = shapely.points(settled[known])
-        away = np.full(known.shape, np.nan)
-        away[known] = shapely.distance(self.outline, points)
+        shapely.prepare(self.outline)
+        inside = shapely.intersects_xy(self.outline, settled[..., 0], settled[..., 1])
+        outside = ~inside & ~np.isnan(settled).any(axis=-1)
+        away = np.zeros(outside.shape)
+        away[outside] = shapely.distance(self.outline, shapely.points(settled[outside]))
         rows = (away > 0) & (away <= self.wall_tolerance_m)
         if rows.any():
             # The nearest point of the edge itself can round to just outside.

@@ -109,12 +109,24 @@ def test_rare_headings_have_mean_zero_under_the_model(base):
     """Summed over all turns the score of a component is within four standard errors of zero."""
     scene, fitted = base
     axis = np.ascontiguousarray(surroundings(scene, scene.turns).toward_near[:, None])
-    residual, variance = np.empty((len(axis), 1)), np.empty((len(axis), 1))
+    residual, variance = np.empty((len(axis), 2)), np.empty((len(axis), 2))
 
     rare_headings(probabilities(fitted), scene.turns.taken, axis, 0.03, residual, variance)
 
     assert (variance >= -1e-12).all()
-    assert abs(residual.sum()) < 4 * math.sqrt(variance.sum())
+    assert (abs(residual.sum(axis=0)) < 4 * np.sqrt(variance.sum(axis=0))).all()
+
+
+def test_rare_headings_by_hand():
+    """At equal chances half of the cells count for a direction, and the others against it."""
+    probability, taken = np.full((1, 64), 1 / 64), np.array([[-1.0, 0.0]])
+    residual, variance = np.empty((1, 2)), np.empty((1, 2))
+
+    rare_headings(probability, taken, np.array([[[1.0, 0.0]]]), 0.0, residual, variance)
+
+    # Means of cos^6 and cos^12 over the circle are 5/16 and 231/1024; half of them each.
+    assert residual[0] == pytest.approx([-5 / 32, 1 - 5 / 32])
+    assert variance[0] == pytest.approx([231 / 2048 - 25 / 1024] * 2)
 
 
 def omnibus(scene, fitted):

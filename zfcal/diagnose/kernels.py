@@ -276,9 +276,10 @@ def rare_headings(
         Unit vectors, or (0, 0) for none.
     floor
         A density is counted as at least so much of a uniform one.
-    residual, variance : ndarray, shape (step, axis)
-        Receive ``h - E h`` and the variance of h, the bump ``max(0, cos)^6`` about the
-        direction over the density: the score of a small component there.
+    residual, variance : ndarray, shape (step, 2 * axis)
+        Receive ``h - E h`` and the variance of h, the bump ``max(0, cos)^6`` about a
+        direction over the density: the score of a small component there. Of each axis
+        first its own direction, then the opposite one.
     """
     cells = probability.shape[1]
     gx, gy = np.empty(cells), np.empty(cells)
@@ -291,15 +292,19 @@ def rare_headings(
             weight[g] = 1.0 / (probability[s, g] * cells + floor)
         for a in range(axis.shape[1]):
             x, y = axis[s, a, 0], axis[s, a, 1]
-            mean, square, here = 0.0, 0.0, 0.0
+            along, along2, against, against2, here, behind = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             if x != 0.0 or y != 0.0:
                 for g in range(cells):
                     cosine = gx[g] * x + gy[g] * y
+                    cosine2 = cosine * cosine
+                    h = cosine2 * cosine2 * cosine2 * weight[g]
+                    p = probability[s, g] * h
                     if cosine > 0.0:
-                        cosine2 = cosine * cosine
-                        h = cosine2 * cosine2 * cosine2 * weight[g]
-                        mean += probability[s, g] * h
-                        square += probability[s, g] * h * h
+                        along, along2 = along + p, along2 + p * h
                         here = h if g == own else here
-            residual[s, a] = here - mean
-            variance[s, a] = square - mean * mean
+                    else:
+                        against, against2 = against + p, against2 + p * h
+                        behind = h if g == own else behind
+            residual[s, 2 * a], variance[s, 2 * a] = here - along, along2 - along * along
+            residual[s, 2 * a + 1] = behind - against
+            variance[s, 2 * a + 1] = against2 - against * against

@@ -50,10 +50,10 @@ def rare_statistics(standing: Standing) -> dict[str, float]:
         "the x axis": east,
         "the y axis": east[:, ::-1],
     }
-    axis = np.stack([sign * way for way in ways.values() for sign in (1.0, -1.0)], axis=1)
+    axis = np.stack(list(ways.values()), axis=1)
     names = [f"{sign} {way}" for way in ways for sign in ("along", "against")]
-    residual = np.empty(axis.shape[:2])
-    variance = np.empty(axis.shape[:2])
+    residual = np.empty((len(axis), len(names)))
+    variance = np.empty_like(residual)
     rare_headings(standing.probability, turns.taken, axis, _FLOOR, residual, variance)
     unused = ~standing.fitted.used
     residual[unused], variance[unused] = np.nan, np.nan
