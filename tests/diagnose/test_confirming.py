@@ -5,7 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from zfcal.diagnose.confirming import confirm, half_of, halves, is_shared, is_steady
+from zfcal.diagnose.confirming import (
+    MINUTES_S,
+    SECONDS_S,
+    confirm,
+    half_of,
+    halves,
+    is_shared,
+    is_steady,
+)
 from zfcal.diagnose.naming import choose, refit
 from zfcal.diagnose.scores import summed
 from zfcal.diagnose.screening import Screen
@@ -161,34 +169,39 @@ def scores_at(screen, candidate, when, strength=0.25, seed=5):
     return summed(candidate, steps), scene
 
 
-def test_an_effect_that_is_there_all_the_time_is_steady(screen, candidate):
+@pytest.mark.parametrize("block_s", [MINUTES_S, SECONDS_S])
+def test_an_effect_that_is_there_all_the_time_is_steady(screen, candidate, block_s):
     """Clear or faint, and at a strength that halves on the way: in all of sixty."""
     bias = candidate("turning-bias")
     for seed in range(20):
         for strength in (0.06, 0.5):
             score, scene = scores_at(screen, bias, lambda t: t >= 0, strength, seed)
-            assert is_steady(score, scene)
+            assert is_steady(score, scene, block_s)
         steps = score.steps - 0.25 * (scene.time_s(scene.turns) > 300)
-        assert is_steady(summed(bias, steps), scene)
+        assert is_steady(summed(bias, steps), scene, block_s)
 
 
 @pytest.mark.parametrize(
-    "when",
-    [lambda t: t % 300 < 60, lambda t: t % 40 < 5, lambda t: (t > 150) & (t < 210)],
+    ("when", "block_s"),
+    [
+        (lambda t: t % 300 < 60, MINUTES_S),
+        (lambda t: t % 40 < 5, SECONDS_S),
+        (lambda t: (t > 150) & (t < 210), MINUTES_S),
+    ],
     ids=["a minute in five", "five seconds in forty", "once"],
 )
-def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when):
+def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when, block_s):
     """Whatever its times, if it is clear while it is there."""
     score, scene = scores_at(screen, candidate("turning-bias"), when, strength=1.0)
     assert score.z > 4
-    assert not is_steady(score, scene)
+    assert not is_steady(score, scene, block_s)
 
 
 @pytest.mark.parametrize("name", ["boldness", "freezing", "generic:heading:time"])
 def test_what_differs_between_times_by_nature_may_do_so(screen, candidate, name):
     """Individuals are near a door at times, rests go on, and some effects have their times."""
     score, scene = scores_at(screen, candidate(name), lambda t: t % 300 < 60, strength=1.0)
-    assert is_steady(score, scene)
+    assert is_steady(score, scene, MINUTES_S)
 
 
 def of_fish(screen, candidate, strengths, seed=5):

@@ -292,12 +292,30 @@ def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
     steady = dataclasses.replace(told, steady=True)
     steps = ("the first", "the last")
 
-    explained = _explains(asks, (steady, told), Omnibus(p=left, worst="", z=0.0))
+    last = Omnibus(p=left, worst="", z=0.0, p_in_time=left)
+    explained = _explains(asks, (steady, told), last)
 
     assert explained == stands
     kept = _kept(steps, (steady, told), explained=explained)
     assert kept == (steps if stands else steps[:1])
     assert _kept(steps, (dataclasses.replace(told, holds=False), told), explained=True) == ()
+
+
+@pytest.mark.parametrize(
+    ("in_time", "minutes", "others", "stands"),
+    [(0.5, True, 1, True), (1e-6, True, 1, False), (0.5, False, 1, False), (0.5, True, 0, False)],
+    ids=["of another form", "as a sound is", "from minute to minute", "alone"],
+)
+def test_an_effect_that_seems_to_come_and_go_beside_another_that_leaves_something(
+    question, record, in_time, minutes, others, stands
+):
+    """It stands where what is left does not come and go itself, and all minutes have it."""
+    asks = question(record(23, BIAS, minutes=6.0), noise_m=0.0)
+    steady = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True)
+    told = dataclasses.replace(steady, steady=False, in_all_minutes=minutes)
+    last = Omnibus(p=1e-9, worst="", z=7.0, p_in_time=in_time)
+
+    assert _explains(asks, (told, *[steady] * others), last) == stands
 
 
 LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}

@@ -40,9 +40,11 @@ _LEAST_VARIANCE = 1e-12
 _OF_OTHERS = 2.0
 """Standard errors that are left of an effect without the fish that asks for it most."""
 
-_WAVERS_S = (60.0, 10.0)
+MINUTES_S, SECONDS_S = 60.0, 10.0
+"""Blocks of time in which an effect is to be of one strength."""
+
 _WAVERS = 3e-3
-"""Chance at which the scores of blocks of so many seconds are no longer of one strength."""
+"""Chance at which the scores of blocks are no longer of one strength."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,12 +61,15 @@ class Confirmed:
         that of one fish, and not what an effect before it leaves over.
     steady
         Whether the effect is there all the time.
+    in_all_minutes
+        Whether it is there in all minutes, if not in all seconds.
     """
 
     gain_nats_per_step: float
     gain_se: float
     holds: bool
     steady: bool = True
+    in_all_minutes: bool = True
 
 
 def half_of(scene: Scene, steps: Moves, which: int) -> NDArray[np.bool_]:
@@ -134,7 +139,9 @@ def _confirmed(
         and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
         and outlasts(score, step.before, earlier)
     )
-    return replace(told, holds=holds, steady=is_steady(score, scene))
+    minutes = is_steady(score, scene, MINUTES_S)
+    steady = minutes and is_steady(score, scene, SECONDS_S)
+    return replace(told, holds=holds, steady=steady, in_all_minutes=minutes)
 
 
 def _tells_apart(fitted: Fitted) -> bool:
@@ -175,7 +182,7 @@ def _of_speeds(step: Step) -> Confirmed:
     return _summary(gain)
 
 
-def is_steady(score: Score, scene: Scene) -> bool:
+def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
     """Return whether the strength of an effect differs between blocks by less than its mean.
 
     The spread of the strength is that of DerSimonian and Laird (1986, Controlled Clinical
@@ -188,12 +195,14 @@ def is_steady(score: Score, scene: Scene) -> bool:
         Of the effect in the model without it.
     scene
         Whose steps the score is of.
+    block_s
+        Length of a block.
     """
     effect = score.candidate.effect
     if effect.individual or effect.stops or is_generic(effect.name):
         return True
     times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
-    return all(_one_strength(score.steps, times_s // block_s) for block_s in _WAVERS_S)
+    return _one_strength(score.steps, times_s // block_s)
 
 
 def _one_strength(steps: Floats, block: Floats) -> bool:

@@ -15,6 +15,7 @@ from zfcal.diagnose.case import (
     QUICK_REPLICATES,
     Case,
     can_suspect,
+    comes_and_goes,
     has_noise,
     is_suspicious,
     open_case,
@@ -246,7 +247,9 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
 
     Where an effect is strong and its true form another one than ours, what is left over goes by the
     fish's distances, say, which change within a minute: it looks like an effect that comes
-    and goes. With our form in the model nothing is left then that the omnibus test would notice.
+    and goes. With our form in the model nothing is left then that the omnibus test would notice; or
+    beside another effect, if that leaves something over, at least nothing that comes and goes
+    itself. This goes for seconds: what differs between minutes is not that.
 
     Parameters
     ----------
@@ -259,7 +262,10 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
     """
     if all(told.steady for told in confirmed) or not can_suspect(question):
         return False
-    return not is_suspicious(question, last)
+    if not is_suspicious(question, last):
+        return True
+    several = len(confirmed) > 1 and all(told.in_all_minutes for told in confirmed)
+    return several and not comes_and_goes(question, last)
 
 
 def _kept(

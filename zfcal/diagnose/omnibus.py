@@ -42,6 +42,7 @@ Ints = NDArray[np.int64]
 
 LAGS = 5
 _BINS = 20
+_BURSTS, _PULSES = "bursts", "pulses"
 _BURSTS_S = (1.0, 3.0, 10.0, 30.0)
 _HARMONICS = (1, 5, 20)
 _SHORTEST_PERIOD_S = 5.0
@@ -65,12 +66,15 @@ class Omnibus:
         Its value, in standard deviations of the null.
     statistics
         All of them, likewise.
+    p_in_time
+        As p, of bursts and pulses alone: what comes and goes.
     """
 
     p: float
     worst: str
     z: float
     statistics: dict[str, float] = field(default_factory=dict)
+    p_in_time: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,7 +117,7 @@ def statistics(standing: Standing, rng: np.random.Generator) -> dict[str, float]
         if scores.name in _AXES:
             compass.append(_summed_up(scores, scene)[0])
     if compass:
-        made["compass: pulses"] = pulses(np.stack(compass), scene.dt_s)
+        made[f"compass: {_PULSES}"] = pulses(np.stack(compass), scene.dt_s)
     made |= rare_statistics(standing)
     made |= run_statistics(standing, rng)
     return {name: z for name, z in made.items() if math.isfinite(z)}
@@ -182,9 +186,9 @@ def _in_time(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
     sums, squares = _summed_up(scores, scene), _summed_up(scores, scene, 2)
     for length_s in _BURSTS_S:
         per = max(1, round(length_s / scene.dt_s))
-        yield f"{scores.name}: bursts of {length_s:g} s", _burst(sums, squares, per)
+        yield f"{scores.name}: {_BURSTS} of {length_s:g} s", _burst(sums, squares, per)
     for series, which in zip(sums, ("", " of size"), strict=True):
-        yield f"{scores.name}: pulses{which}", pulses(series[None], scene.dt_s)
+        yield f"{scores.name}: {_PULSES}{which}", pulses(series[None], scene.dt_s)
 
 
 def _burst(sums: Floats, squares: Floats, per: int) -> float:
@@ -254,5 +258,11 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])
-    p = min(1.0, tails[worst] * len(tails))
-    return Omnibus(p=p, worst=worst, z=made[worst], statistics=made)
+    in_time = [tail for name, tail in tails.items() if _BURSTS in name or _PULSES in name]
+    return Omnibus(
+        p=min(1.0, tails[worst] * len(tails)),
+        worst=worst,
+        z=made[worst],
+        statistics=made,
+        p_in_time=min(1.0, min(in_time, default=1.0) * max(len(in_time), 1)),
+    )
