@@ -36,13 +36,11 @@ class Easel:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._pool is None:
-            return
-        if kind is not None:
-            # Nobody waits until they have loaded what will not be needed.
+        if self._pool is not None:
+            # Nobody waits until they have loaded what will not be needed, or tidied up.
             for hand in self._hands:
                 hand.terminate()
-        self._pool.shutdown(cancel_futures=True)
+            self._pool.shutdown(cancel_futures=True)
 
     def prepare(self) -> None:
         """Start the processes, unless they are there: a page will be drawn in a while."""
