@@ -8,6 +8,7 @@ import pytest
 from zfcal.diagnose.confirming import (
     MINUTES_S,
     SECONDS_S,
+    _lasts,
     confirm,
     half_of,
     halves,
@@ -197,11 +198,25 @@ def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when, block_s):
     assert not is_steady(score, scene, block_s)
 
 
+@pytest.mark.parametrize("minutes", [True, False])
+@pytest.mark.parametrize("seconds", [True, False])
+def test_what_is_told_of_times(screen, candidate, monkeypatch, minutes, seconds):
+    """There all the time is there in all minutes and in all seconds."""
+    step = added(screen(11, minutes=3.0), candidate("turning-bias"))
+    found = {MINUTES_S: minutes, SECONDS_S: seconds}
+    monkeypatch.setattr(
+        "zfcal.diagnose.confirming.is_steady", lambda _score, _scene, block_s: found[block_s]
+    )
+    told = alone(step)
+    assert (told.steady, told.in_all_minutes, told.lasting) == (minutes and seconds, minutes, True)
+
+
 @pytest.mark.parametrize("name", ["boldness", "freezing", "generic:heading:time"])
 def test_what_differs_between_times_by_nature_may_do_so(screen, candidate, name):
     """Individuals are near a door at times, rests go on, and some effects have their times."""
     score, scene = scores_at(screen, candidate(name), lambda t: t % 300 < 60, strength=1.0)
     assert is_steady(score, scene, MINUTES_S)
+    assert not _lasts(score.candidate)
 
 
 def of_fish(screen, candidate, strengths, seed=5):

@@ -302,12 +302,28 @@ def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
 
 
 @pytest.mark.parametrize(
-    ("in_time", "minutes", "others", "stands"),
-    [(0.5, True, 1, True), (1e-6, True, 1, False), (0.5, False, 1, False), (0.5, True, 0, False)],
-    ids=["of another form", "as a sound is", "from minute to minute", "alone"],
+    ("in_time", "minutes", "other", "stands"),
+    [
+        (0.5, True, {}, True),
+        (1e-6, True, {}, False),
+        (0.5, False, {}, False),
+        (0.5, True, None, False),
+        (0.5, True, {"holds": False}, False),
+        (0.5, True, {"lasting": False}, False),
+        (0.5, True, {"steady": False}, False),
+    ],
+    ids=[
+        "of another form",
+        "as a sound is",
+        "from minute to minute",
+        "alone",
+        "beside one that does not hold",
+        "beside one that has its times",
+        "beside its like",
+    ],
 )
 def test_an_effect_that_seems_to_come_and_go_beside_another_that_leaves_something(
-    question, record, in_time, minutes, others, stands
+    question, record, in_time, minutes, other, stands
 ):
     """It stands where what is left does not come and go itself, and all minutes have it."""
     asks = question(record(23, BIAS, minutes=6.0), noise_m=0.0)
@@ -315,7 +331,8 @@ def test_an_effect_that_seems_to_come_and_go_beside_another_that_leaves_somethin
     told = dataclasses.replace(steady, steady=False, in_all_minutes=minutes)
     last = Omnibus(p=1e-9, worst="", z=7.0, p_in_time=in_time)
 
-    assert _explains(asks, (told, *[steady] * others), last) == stands
+    beside = () if other is None else (dataclasses.replace(steady, **other),)
+    assert _explains(asks, (told, *beside), last) == stands
 
 
 LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}

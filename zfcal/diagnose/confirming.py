@@ -63,6 +63,9 @@ class Confirmed:
         Whether the effect is there all the time.
     in_all_minutes
         Whether it is there in all minutes, if not in all seconds.
+    lasting
+        Whether it is one that could not be there at times: listed, and neither of individuals nor
+        of rests.
     """
 
     gain_nats_per_step: float
@@ -70,6 +73,7 @@ class Confirmed:
     holds: bool
     steady: bool = True
     in_all_minutes: bool = True
+    lasting: bool = True
 
 
 def half_of(scene: Scene, steps: Moves, which: int) -> NDArray[np.bool_]:
@@ -141,7 +145,14 @@ def _confirmed(
     )
     minutes = is_steady(score, scene, MINUTES_S)
     steady = minutes and is_steady(score, scene, SECONDS_S)
-    return replace(told, holds=holds, steady=steady, in_all_minutes=minutes)
+    return replace(
+        told, holds=holds, steady=steady, in_all_minutes=minutes, lasting=_lasts(best.candidate)
+    )
+
+
+def _lasts(candidate: Candidate) -> bool:
+    effect = candidate.effect
+    return not (effect.individual or effect.stops or is_generic(effect.name))
 
 
 def _tells_apart(fitted: Fitted) -> bool:
@@ -198,9 +209,9 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
     block_s
         Length of a block.
     """
-    effect = score.candidate.effect
-    if effect.individual or effect.stops or is_generic(effect.name):
+    if not _lasts(score.candidate):
         return True
+    effect = score.candidate.effect
     times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
     return _one_strength(score.steps, times_s // block_s)
 

@@ -248,8 +248,9 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
     Where an effect is strong and its true form another one than ours, what is left over goes by the
     fish's distances, say, which change within a minute: it looks like an effect that comes
     and goes. With our form in the model nothing is left then that the omnibus test would notice; or
-    beside another effect, if that leaves something over, at least nothing that comes and goes
-    itself. This goes for seconds: what differs between minutes is not that.
+    beside another effect, one that is there all the time and leaves something over, at least
+    nothing that comes and goes itself. This goes for seconds: what differs between minutes is not
+    that.
 
     Parameters
     ----------
@@ -264,8 +265,9 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
         return False
     if not is_suspicious(question, last):
         return True
-    several = len(confirmed) > 1 and all(told.in_all_minutes for told in confirmed)
-    return several and not comes_and_goes(question, last)
+    beside = any(told.steady and told.lasting for told in confirmed)
+    stand = all(told.holds and told.in_all_minutes for told in confirmed)
+    return beside and stand and not comes_and_goes(question, last)
 
 
 def _kept(

@@ -302,7 +302,7 @@ def rare_headings(
                     if cosine > 0.0:
                         along, along2 = along + p, along2 + p * h
                         here = h if g == own else here
-                    else:
+                    elif cosine < 0.0:
                         against, against2 = against + p, against2 + p * h
                         behind = h if g == own else behind
             residual[s, 2 * a], variance[s, 2 * a] = here - along, along2 - along * along

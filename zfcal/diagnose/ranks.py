@@ -71,7 +71,9 @@ def speed_ranks(moves: Moves, factor: Floats, rng: np.random.Generator) -> Float
     ranks = np.empty(len(moves))
     for zone in np.unique(moves.zone):
         rows = np.flatnonzero(moves.zone == zone)
-        ranks[rows[np.argsort(speed[rows])]] = (np.arange(len(rows)) + 0.5) / len(rows)
+        ranks[rows[np.argsort(speed[rows], kind="stable")]] = (np.arange(len(rows)) + 0.5) / len(
+            rows
+        )
     return ranks
 
 
