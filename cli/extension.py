@@ -65,5 +65,5 @@ def extend_one(out: Output, root: Path, chosen: ExtendOptions, task: Task) -> No
     from zfcal.report.easel import Easel
 
     tell = functools.partial(tell_and_warn, out, root)
-    with Easel() as easel:
+    with Easel(ahead=False) as easel:
         extend(root, chosen, tell, task=task, draw=easel)

@@ -50,7 +50,7 @@ _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What says how many threads a product of matrices takes; read when numpy is loaded."""
 
-_OBJECTS = 100_000
+_OBJECTS = 50_000
 """New objects after which Python looks for those that refer to each other and to nothing else."""
 
 _BUG_HINT = "Run it again with --traceback to see where, and report it."
@@ -148,7 +148,7 @@ def main() -> NoReturn:
             # twice as long.
             os.environ.setdefault(name, "1")
     # Libraries leave some 100,000 objects for good, which would be looked through again and again.
-    gc.set_threshold(_OBJECTS)
+    gc.set_threshold(_OBJECTS, 5, 5)
     sys.exit(run(sys.argv[1:]))
 
 

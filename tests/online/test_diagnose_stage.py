@@ -28,6 +28,11 @@ class Page:
 
     def __init__(self, *, killed=False):
         self.killed = killed
+        self.prepared = 0
+
+    def prepare(self):
+        """Count how often there was something to get ready for."""
+        self.prepared += 1
 
     def reason(self, folder, findings_sha256):
         """Return why it must be drawn."""
@@ -215,6 +220,21 @@ def test_a_run_killed_before_its_page_goes_on_there(make_trial, asked, heard, re
     killed = read_all(root)
     diagnose(root, DiagnoseOptions(), heard.append, draw=Page(), task=Task(force=True))
     assert read_all(root) == killed
+
+
+def test_a_page_gets_ready_while_the_answer_is_worked_out(make_trial, asked, heard):
+    """With a thread to spare, and only where there is an answer to wait for."""
+    root, page = make_trial(seconds=130), Page()
+    two = DiagnoseOptions(n_workers=2)
+    diagnose(root, two, heard.append, draw=page, task=Task(dry_run=True))
+    assert page.prepared == 0
+    diagnose(root, two, heard.append, draw=page)
+    assert page.prepared == 1
+    diagnose(root, two, heard.append, draw=page)
+    alone = DiagnoseOptions(n_workers=1)
+    diagnose(root, alone, heard.append, draw=page, task=Task(force=True))
+    assert page.prepared == 1
+    assert len(asked) == 2
 
 
 def test_a_damaged_segment_is_left_out_and_noted(make_trial, asked, heard):

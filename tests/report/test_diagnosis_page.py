@@ -6,8 +6,11 @@ import json
 import math
 import multiprocessing
 import re
+import signal
 import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -390,6 +393,66 @@ def test_an_easel_draws_what_is_drawn_without(make_sheet, tmp_path):
     assert drawn == {path.name: path.read_bytes() for path in without}
 
 
+def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
+    """An interrupt is for whoever began them; then nobody waits until they are ready."""
+    hands = {}
+
+    def interrupted():
+        with Easel() as easel:
+            easel.prepare()
+            for hand in multiprocessing.active_children():
+                status = Path(f"/proc/{hand.pid}/status").read_text()
+                (held,) = re.findall(r"SigBlk:\s*(\w+)", status)
+                hands[hand] = int(held, 16) >> (signal.SIGINT - 1) & 1
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert list(hands.values()) == [1, 1]
+    assert [hand.exitcode for hand in hands] == [-signal.SIGTERM] * 2
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+ALONE = """
+import multiprocessing, os, signal
+from zfcal.report.easel import Easel
+with Easel() as easel:
+    easel.prepare()
+    print(*(hand.pid for hand in multiprocessing.active_children()), flush=True)
+    input()
+"""
+
+
+def test_hands_end_with_a_parent_that_is_killed():
+    """They would wait for good."""
+    parent = subprocess.Popen(
+        [sys.executable, "-c", ALONE],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    hands = parent.stdout.readline().split()
+    parent.kill()
+    assert len(hands) == 2
+    # They hold its output open: that ends when they do.
+    assert parent.communicate(timeout=60)[0] == ""
+
+
+def test_an_easel_that_can_have_no_processes(make_sheet, tmp_path, undrawn, monkeypatch):
+    """Where they are not allowed, the page is drawn without."""
+
+    def refused(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("zfcal.report.easel.ProcessPoolExecutor", refused)
+    with Easel() as easel:
+        easel.prepare()
+        easel.prepare()
+        written = easel.write(tmp_path, make_sheet())
+    assert written[0].name == "report.html"
+
+
 def test_an_easel_whose_process_was_killed(make_sheet, tmp_path, undrawn):
     """The page is drawn all the same."""
     with Easel() as easel:
@@ -398,6 +461,8 @@ def test_an_easel_whose_process_was_killed(make_sheet, tmp_path, undrawn):
             hand.kill()
         written = easel.write(tmp_path, make_sheet())
     assert [path.name for path in written] == ["report.html", "1-alignment.png", "screened.png"]
+    # Drawn here, where drawing is replaced by a line.
+    assert not written[1].read_bytes().startswith(b"\x89PNG")
     assert easel.reason(tmp_path, "f" * 64) is None
     assert easel.files(tmp_path) == written
 

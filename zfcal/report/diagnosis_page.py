@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from zfcal.artifacts.atomic import sha256_of, storage_error, write_text_whole, write_whole
+from zfcal.artifacts.atomic import sha256_of, storage_error, write_bytes_whole, write_text_whole
 from zfcal.artifacts.lineage import package_version
 from zfcal.diagnose.document import Sheet
 from zfcal.report.contents import Section
+
+T = TypeVar("T")
 
 PAGE = "report.html"
 
@@ -29,7 +31,7 @@ def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path
     sheet
         What they show.
     pool
-        Whose workers draw; None for a thread.
+        Whose workers draw; None for whoever calls.
 
     Returns
     -------
@@ -42,18 +44,16 @@ def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path
     StorageError
         The disk is full, or the place cannot be written.
     """
-    if pool is None:
-        with ThreadPoolExecutor(1) as own:
-            return write(folder, sheet, own)
-    drawn, sections = pool.submit(_pngs, sheet), pool.submit(_sections, sheet)
+    ask = _at_once if pool is None else pool.submit
+    drawn, sections = ask(_pngs, sheet), ask(_sections, sheet)
     hashes = {}
     for name, png in drawn.result().items():
         path = folder / f"{name}.png"
-        write_whole(path, _writer(png))
+        write_bytes_whole(path, png)
         hashes[path.name] = sha256_of(path)
     _remove_outdated(folder, set(hashes))
     provenance = {**sheet.provenance, "pictures": hashes, "version": package_version()}
-    page = pool.submit(_page, sheet, sections.result(), provenance)
+    page = ask(_page, sheet, sections.result(), provenance)
     write_text_whole(folder / PAGE, page.result())
     return files(folder)
 
@@ -100,6 +100,12 @@ def _provenance(page: Path) -> dict[str, Any] | None:
     return said if isinstance(said, dict) else None
 
 
+def _at_once(work: Callable[..., T], *args: Any) -> Future[T]:
+    done: Future[T] = Future()
+    done.set_result(work(*args))
+    return done
+
+
 # Matplotlib is slow to load: whoever draws loads it, and a page that is up to date needs nobody.
 
 
@@ -119,13 +125,6 @@ def _page(sheet: Sheet, sections: Sequence[Section], provenance: Mapping[str, An
     from zfcal.report.diagnosis_drawing import page_of
 
     return page_of(sheet, sections, provenance)
-
-
-def _writer(content: bytes) -> Callable[[Path], None]:
-    def write_bytes(part: Path) -> None:
-        part.write_bytes(content)
-
-    return write_bytes
 
 
 def _remove_outdated(folder: Path, made: set[str]) -> None:

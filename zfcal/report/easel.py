@@ -21,9 +21,16 @@ _HANDS = 2
 
 
 class Easel:
-    """Draws pages of findings; a context, at whose end its processes are gone."""
+    """Draws pages of findings; a context, at whose end its processes are gone.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    ahead
+        Whether processes get ready when they are told that there will be something to draw.
+    """
+
+    def __init__(self, *, ahead: bool = True) -> None:
+        self._ahead = ahead
         self._pool: ProcessPoolExecutor | None = None
         self._hands: set[BaseProcess] = set()
 
@@ -36,29 +43,13 @@ class Easel:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._pool is not None:
-            # Nobody waits until they have loaded what will not be needed, or tidied up.
-            for hand in self._hands:
-                hand.terminate()
-            self._pool.shutdown(cancel_futures=True)
+        self._let_go(at_once=kind is not None)
 
     def prepare(self) -> None:
         """Start the processes, unless they are there: a page will be drawn in a while."""
-        if self._pool is not None:
-            return
-        others = set(active_children())
-        spawn = get_context("spawn")
-        self._pool = ProcessPoolExecutor(_HANDS, mp_context=spawn, initializer=_get_ready)
-        # An interrupt from the keyboard goes to all processes. Those that draw say nothing of it,
-        # whoever began them does; they are born with it held back.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            # Each starts when there is something to do and nobody at leisure.
-            for _ in range(_HANDS):
-                self._pool.submit(int)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        self._hands = set(active_children()) - others
+        if self._ahead and self._pool is None:
+            # Where none can be had, the page is drawn without.
+            self._ahead = self._begin()
 
     def reason(self, folder: Path, findings_sha256: str) -> str | None:
         """Return why a page must be drawn, as `diagnosis_page.reason`."""
@@ -75,8 +66,41 @@ class Easel:
                 return diagnosis_page.write(folder, sheet, self._pool)
             except BrokenExecutor:
                 # One was killed, for want of memory, say: it can be done here as well.
-                self._pool = None
+                self._let_go(at_once=True)
         return diagnosis_page.write(folder, sheet)
+
+    def _begin(self) -> bool:
+        """Start the processes; whether they could be."""
+        others = set(active_children())
+        # An interrupt from the keyboard goes to all processes. Those that draw say nothing of it,
+        # whoever began them does; they are born with it held back.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            spawn = get_context("spawn")
+            self._pool = ProcessPoolExecutor(_HANDS, mp_context=spawn, initializer=_get_ready)
+            # Each starts when there is something to do and nobody at leisure.
+            for _ in range(_HANDS):
+                self._pool.submit(int)
+        except OSError:
+            begun = False
+        else:
+            begun = True
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            self._hands = set(active_children()) - others
+        if not begun:
+            self._let_go(at_once=True)
+        return begun
+
+    def _let_go(self, *, at_once: bool) -> None:
+        if self._pool is None:
+            return
+        if at_once:
+            # Nobody waits until they have loaded what will not be needed.
+            for hand in self._hands:
+                hand.terminate()
+        self._pool.shutdown(cancel_futures=True)
+        self._pool = None
 
 
 def _get_ready() -> None:
