@@ -111,6 +111,13 @@ def _completeness(found: Mapping[str, Any]) -> str:
         for mode, told in _modes(found)
     ]
     done = " and ".join(of_mode) or "none"
+    quick = dict(_modes(found)).get("quick", {"n": {}})
+    whole = all(quick["n"].get(section, 0) >= n for section, n in planned.items())
+    if whole and not found["lacking"]:
+        return _prose(
+            f"""**Complete with `--quick`**, {sum(planned.values())} trials. With 39 replicates,
+            which take six times as long, {sum(full["n"].values())} of them were run."""
+        )
     return _prose(
         f"""**A partial run.** Of {sum(planned.values())} planned trials {done} were run; the
         others, however few these are, do not count below, and the intervals say how little

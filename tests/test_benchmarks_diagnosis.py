@@ -473,6 +473,9 @@ def test_a_complete_run_says_so(bench, summary, row):
     assert document._completeness(found) == "A complete run with 39 replicates.\n"
     more = summary.summarise(rows, planned={"listed": 2}, lacking={})
     assert "partial" in document._completeness(more)
+    short = summary.summarise([{**rows[0], "quick": True}], planned={"listed": 1}, lacking={})
+    assert "Complete with `--quick`**, 1 trial" in document._completeness(short)
+    assert "0 of them" in document._completeness(short)
 
 
 @pytest.fixture
