@@ -110,12 +110,11 @@ class Picture:
 
 def write_picture(picture: Picture, path: Path) -> None:
     """Write all panels of a picture, its title and its key as one PNG."""
-    with theme.style():
-        theme.save_png(compose(picture), path)
+    path.write_bytes(png_of(picture))
 
 
 def png_of(picture: Picture) -> bytes:
-    """Return what `write_picture` writes."""
+    """Return all panels of a picture, its title and its key as one PNG."""
     made = BytesIO()
     with theme.style():
         theme.save_png(compose(picture), made)
