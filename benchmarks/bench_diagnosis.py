@@ -18,7 +18,8 @@ import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -30,7 +31,7 @@ import diagnosis_film
 import diagnosis_ledger as ledger
 import diagnosis_summary
 import diagnosis_trial
-from diagnosis_plan import EXTEND, SECTIONS, TIME, VIDEO, Job, Scale, plan
+from diagnosis_plan import EXTEND, LISTED_SECTION, SECTIONS, TIME, VIDEO, Job, Scale, plan
 from measuring import RESULTS, ROOT, machine
 from regressions import Places, parser, places
 
@@ -58,11 +59,31 @@ class Desk:
     marks: dict[str, str]
     packed: Sequence[ledger.Row] = ()
 
-    def rows(self, section: str) -> dict[str, ledger.Row]:
-        """Return the rows of a section that the present code has made, by key."""
+    def rows(self, section: str, marks: Mapping[str, str] | None = None) -> dict[str, ledger.Row]:
+        """Return the rows of a section that the present code has made, or another, by key."""
+        return ledger.current(self.all_rows(section), marks or self.marks)
+
+    def all_rows(self, section: str) -> list[ledger.Row]:
+        """Return the rows of a section that any code has made."""
         made = [row for row in self.packed if row["section"] == section]
-        made += ledger.read(self.folder / f"{section}.jsonl")
-        return ledger.current(made, self.marks)
+        return made + ledger.read(self.folder / f"{section}.jsonl")
+
+    def marks_of(self, *, quick: bool) -> dict[str, str]:
+        """Return the fingerprints of the code whose trials of a mode are told.
+
+        They are those of the present code. Where that has made no trial of the mode, they are
+        those by which most trials of each section were made.
+        """
+        made = {
+            section: [row["code"] for row in self.all_rows(section) if row["quick"] is quick]
+            for section in SECTIONS
+        }
+        if any(self.marks[section] in codes for section, codes in made.items()):
+            return {section: self.marks[section] for section in SECTIONS}
+        usual = {section: Counter(codes).most_common(1) for section, codes in made.items()}
+        return {
+            section: most[0][0] if most else self.marks[section] for section, most in usual.items()
+        }
 
     def n_stale(self, section: str) -> int:
         """Return how many rows of a section other code has made."""
@@ -155,15 +176,30 @@ def _line(job: Job, row: ledger.Row) -> str:
     )
 
 
+def told(desk: Desk) -> list[ledger.Row]:
+    """Return the rows of both modes that the document counts."""
+    return [
+        row
+        for quick in (True, False)
+        for section in SECTIONS
+        for row in desk.rows(section, desk.marks_of(quick=quick)).values()
+        if row["quick"] is quick
+    ]
+
+
 def summary(desk: Desk, jobs: Sequence[Job]) -> dict[str, Any]:
-    """Return all numbers that the trials of the present code give."""
-    rows = [row for section in SECTIONS for row in desk.rows(section).values()]
+    """Return all numbers that the trials give; each mode says by which code they were made."""
+    marks = {mode: desk.marks_of(quick=mode == "quick") for mode in diagnosis_document.MODES}
+    rows = told(desk)
     planned = {section: sum(job.section == section for job in jobs) for section in SECTIONS}
     lacking = {section: what for section in SECTIONS if (what := diagnosis_trial.lacks(section))}
     made = diagnosis_summary.summarise(rows, planned=planned, lacking=lacking)
     return {
         "machine": machine(),
-        "code": {"diagnosis": desk.marks[TIME], "extension": desk.marks[EXTEND]},
+        "code": {
+            mode: {"diagnosis": each[LISTED_SECTION], "extension": each[EXTEND]}
+            for mode, each in marks.items()
+        },
         **made,
     }
 
@@ -219,8 +255,7 @@ def main() -> None:
             work(part, desk, workers=workers, deadline_s=deadline_s)
     full, place = plan(Scale(), LISTED, UNLISTED, quick=options.quick), places(options)
     publish(summary(desk, full), place)
-    made = [row for section in desk.marks for row in desk.rows(section).values()]
-    ledger.pack(place.results / PACKED, made)
+    ledger.pack(place.results / PACKED, [*told(desk), *desk.rows(diagnosis_trial.ORACLE).values()])
     if stale := sum(map(desk.n_stale, SECTIONS)):
         print(f"{stale} trials were made by other code and do not count.", file=sys.stderr)
 

@@ -90,13 +90,24 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             sum over steps of log f_true minus log f_base, the base law at its own maximum
             likelihood. Seeds begin at 20000; rules are chosen on others, though trials of earlier
             runs have been looked at, and two of them (20901, 50801) are a part of why a place
-            beside a current must gain half of it. Intervals are Wilson's, 95 %. Code: diagnosis
-            {found["code"]["diagnosis"]}, extension
-            {found["code"]["extension"]}. Machine: {found["machine"]}, shared with other work."""
+            beside a current must gain half of it. Intervals are Wilson's, 95 %. Code
+            {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
         table(("section", "trials", "planned", *MODES.values(), ""), rows),
     ]
+
+
+def _codes(found: Mapping[str, Any]) -> str:
+    """Return the fingerprints of the code that each mode's trials were made by."""
+    of_mode = {
+        mode: f"diagnosis {code['diagnosis']}, extension {code['extension']}"
+        for mode, code in found["code"].items()
+        if mode in found["modes"]
+    }
+    if len(set(of_mode.values())) == 1:
+        return next(iter(of_mode.values()))
+    return "; ".join(f"with {MODES[mode]}: {said}" for mode, said in of_mode.items())
 
 
 def _completeness(found: Mapping[str, Any]) -> str:

@@ -268,6 +268,32 @@ def test_a_run_goes_on_from_trials_that_were_made_elsewhere(bench, ledger, tmp_p
     assert set(desk.rows("nulls")) == {"c"}
 
 
+def test_a_mode_that_the_present_code_was_not_asked_in_shows_what_another_said(bench, tmp_path):
+    """With a fingerprint of its own; one trial of the present code takes its place."""
+    document = sys.modules["diagnosis_document"]
+    marks = dict.fromkeys(sys.modules["diagnosis_plan"].SECTIONS, "new")
+    desk = bench.Desk(folder=tmp_path, marks=marks)
+    for key, code, quick in (
+        ("a", "old", True), ("b", "old", True), ("c", "older", True),
+        ("d", "old", False), ("e", "new", False),
+    ):  # fmt: skip
+        other = bench.Desk(folder=tmp_path, marks={"listed": code})
+        other.keep("listed", {"key": key, "quick": quick, "verdict": "named"})
+
+    assert [row["key"] for row in bench.told(desk)] == ["a", "b", "e"]
+    assert desk.marks_of(quick=True)["listed"] == "old"
+    assert desk.marks_of(quick=False) == marks
+    codes = {
+        mode: {"diagnosis": desk.marks_of(quick=mode == "quick")["listed"], "extension": "x"}
+        for mode in ("full", "quick")
+    }
+    assert document._codes({"code": codes, "modes": codes}) == (
+        "with 39 replicates: diagnosis new, extension x; with `--quick`: diagnosis old, extension x"
+    )
+    desk.keep("listed", {"key": "f", "quick": True, "verdict": "named"})
+    assert [row["key"] for row in bench.told(desk)] == ["f", "e"]
+
+
 def test_the_same_trials_are_packed_to_the_same_bytes(ledger, tmp_path):
     """Whatever their order and the time of day."""
     made = [{"key": "a", "n": 1}, {"n": 2, "key": "b"}]
@@ -430,7 +456,7 @@ def test_the_document_says_that_a_run_is_partial(bench, summary, row, tmp_path):
     planned = dict.fromkeys(sys.modules["diagnosis_plan"].SECTIONS, 20)
     found = {
         "machine": "a machine",
-        "code": {"diagnosis": "0", "extension": "1"},
+        "code": {mode: {"diagnosis": "0", "extension": "1"} for mode in ("full", "quick")},
         **summary.summarise(rows, planned=planned, lacking={"video": "needs zfcal track"}),
     }
     bench.publish(found, sys.modules["regressions"].Places(results=tmp_path, docs=tmp_path))
