@@ -12,6 +12,7 @@ from zfcal.diagnose.confirming import (
     confirm,
     half_of,
     halves,
+    has_pulses,
     is_shared,
     is_steady,
 )
@@ -198,17 +199,44 @@ def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when, block_s):
     assert not is_steady(score, scene, block_s)
 
 
+@pytest.mark.parametrize("every_s", [30, 60])
+def test_pulses_that_blocks_do_not_see(screen, candidate, every_s):
+    """Three seconds in each minute or half of it: blocks have one strength, phases do not."""
+    score, scene = scores_at(screen, candidate("turning-bias"), lambda t: t % every_s < 3, 0.8)
+    assert score.z > 3
+    assert is_steady(score, scene, MINUTES_S)
+    assert has_pulses(score, scene)
+
+
+def test_what_is_there_all_the_time_has_no_pulses(screen, candidate):
+    """Clear or faint: in none of forty. Nor has what waxes and wanes by less than its mean, however
+    plain its period is, or what is of others than the fish all the time.
+    """
+    bias = candidate("turning-bias")
+    for seed in range(20):
+        for strength in (0.06, 0.5):
+            assert not has_pulses(*scores_at(screen, bias, lambda t: t >= 0, strength, seed))
+    score, scene = scores_at(screen, bias, lambda t: t >= 0, 1.0)
+    wave = 0.6 * np.sin(2 * np.pi * scene.time_s(scene.turns) / 60)
+    assert not has_pulses(summed(bias, score.steps + wave), scene)
+    assert has_pulses(summed(bias, score.steps - 0.7 + wave), scene)
+    assert not has_pulses(summed(candidate("boldness"), score.steps - 0.7 + wave), scene)
+
+
 @pytest.mark.parametrize("minutes", [True, False])
 @pytest.mark.parametrize("seconds", [True, False])
-def test_what_is_told_of_times(screen, candidate, monkeypatch, minutes, seconds):
-    """There all the time is there in all minutes and in all seconds."""
+@pytest.mark.parametrize("pulsed", [True, False])
+def test_what_is_told_of_times(screen, candidate, monkeypatch, minutes, seconds, pulsed):
+    """There all the time is there in all minutes and in all seconds, and not in pulses."""
     step = added(screen(11, minutes=3.0), candidate("turning-bias"))
     found = {MINUTES_S: minutes, SECONDS_S: seconds}
     monkeypatch.setattr(
         "zfcal.diagnose.confirming.is_steady", lambda _score, _scene, block_s: found[block_s]
     )
+    monkeypatch.setattr("zfcal.diagnose.confirming.has_pulses", lambda _score, _scene: pulsed)
     told = alone(step)
-    assert (told.steady, told.in_all_minutes, told.lasting) == (minutes and seconds, minutes, True)
+    steady = minutes and seconds and not pulsed
+    assert (told.steady, told.in_all_minutes, told.lasting) == (steady, minutes, True)
 
 
 @pytest.mark.parametrize("name", ["boldness", "freezing", "generic:heading:time"])

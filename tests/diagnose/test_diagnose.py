@@ -8,7 +8,7 @@ import pytest
 
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.confirming import Confirmed
-from zfcal.diagnose.diagnose import _explains, _kept, diagnose
+from zfcal.diagnose.diagnose import _explains, _kept, _omnibus, _Row, diagnose
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
@@ -333,6 +333,24 @@ def test_an_effect_that_seems_to_come_and_go_beside_another_that_leaves_somethin
 
     beside = () if other is None else (dataclasses.replace(steady, **other),)
     assert _explains(asks, (told, *beside), last) == stands
+
+
+@pytest.mark.parametrize(("noise_m", "sure"), [(0.0, True), (0.001, False), (None, False)])
+def test_replicates_of_sharp_positions_have_the_theory_beside_them(question, record, noise_m, sure):
+    """One in four hundred at 5.2 is enough then; where positions err, or may, it is not."""
+    rng = np.random.default_rng(14)
+    names = [f"turn by context {n}" for n in range(400)]
+    rows = [
+        _Row(
+            listed=np.zeros(0),
+            controls=None,
+            at_large=({}, dict(zip(names, rng.normal(size=400), strict=True))),
+        )
+        for _ in range(20)
+    ]
+    asks = question(record(23, BIAS, minutes=6.0), noise_m=noise_m, quick=False)
+    own = {**dict.fromkeys(names, 0.0), names[7]: 5.2}
+    assert (_omnibus(asks, own, rows).p < 1e-3) == sure
 
 
 LINEAR = {"generic:speed:own-speed": {"strength": 0.12}}

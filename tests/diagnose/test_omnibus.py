@@ -9,7 +9,7 @@ from scipy.stats import chi2, kstest, norm
 
 from zfcal.diagnose.chances import by_context, normal_of, rare_by_context
 from zfcal.diagnose.kernels import cell_ranks, product_sums, rare_headings
-from zfcal.diagnose.omnibus import judge, pulses, statistics
+from zfcal.diagnose.omnibus import judge, statistics
 from zfcal.diagnose.ranks import heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.standing import standing_of
 from zfcal.diagnose.surroundings import probabilities, signed_angle, surroundings
@@ -196,22 +196,6 @@ def test_a_preferred_distance_is_noticed(base, worlds):
     assert "nearest neighbour" in found.worst
 
 
-def test_pulses_by_hand():
-    """A series that is 1 in one sample of fifty has all harmonics of its period alike: with 20
-    of them, twice the power of white noise each, and 40 degrees of freedom it cannot be missed;
-    white noise gives nothing.
-    """
-    rng = np.random.default_rng(11)
-    comb = np.zeros((1, 5000))
-    comb[0, ::50] = 1.0
-    white = rng.normal(size=(1, 5000))
-
-    assert pulses(comb - comb.mean(), 0.2) > 20
-    assert pulses(white, 0.2) < 3
-    assert pulses(white + 2.0 * comb, 0.2) > 5
-    assert math.isnan(pulses(white[:, :20], 0.2))
-
-
 def test_a_startle_that_spreads_is_noticed(base):
     """Every 15 s one fish darts for three steps, and its nearest neighbour with it."""
     scene, fitted = base
@@ -258,6 +242,21 @@ def test_bursts_and_pulses_count_by_themselves_as_well():
     found = judge({"speed: bursts of 1 s": 2.0, "turn: pulses": 0.0, "turn by zone": 9.0})
 
     assert found.p_in_time == pytest.approx(2 * 0.0227501, rel=1e-5)
+
+
+def test_sharp_positions_have_the_theory_beside_few_replicates():
+    """Five standard deviations stand out of four hundred statistics then; by Student's law for
+    twenty replicates alone they do not. What replicates show counts all the same.
+    """
+    rng = np.random.default_rng(13)
+    names = [f"turn by context {n}" for n in range(400)]
+    nulls = [dict(zip(names, rng.normal(size=400), strict=True)) for _ in range(20)]
+    measured = {**dict.fromkeys(names, 0.0), names[7]: 5.2}
+
+    assert judge(measured, nulls).p > 1e-3
+    assert judge(measured, nulls, sharp=True).p < 1e-3
+    wide = [{name: 3 * z for name, z in null.items()} for null in nulls]
+    assert judge(measured, wide, sharp=True).p > 1e-3
 
 
 def test_no_statistics_no_disagreement():

@@ -101,8 +101,12 @@ def comes_and_goes(question: Question, omnibus: Omnibus) -> bool:
 
 def can_suspect(question: Question) -> bool:
     """Tell whether the omnibus test has a null: positions are sharp, or replicates asked for."""
-    sharp = question.noise_m is not None and question.noise_m <= _SHARP_M
-    return not question.quick or sharp
+    return not question.quick or is_sharp(question)
+
+
+def is_sharp(question: Question) -> bool:
+    """Tell whether positions are known to err by so little that the theory alone is a null."""
+    return question.noise_m is not None and question.noise_m <= _SHARP_M
 
 
 def has_noise(question: Question) -> bool:

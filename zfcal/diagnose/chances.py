@@ -39,6 +39,15 @@ def normal_of_tail(tail: float) -> float:
     return -float(ndtri(min(max(tail, _LEAST_TAIL), _MOST_TAIL)))
 
 
+def least_of(tails: Floats | float, n: int) -> Floats:
+    """Return the probabilities that the least of n tails is as small as each of these.
+
+    Of independent ones (Sidak 1967, Journal of the American Statistical Association 62:
+    626-633). By n times the tail most of what chance gives would be certain.
+    """
+    return np.asarray(-np.expm1(n * np.log1p(-np.minimum(tails, 1 - 1e-16))))
+
+
 def by_context(values: Floats, bins: Ints) -> float:
     """Return how far scores differ from 0 in the bins of a context.
 

@@ -19,6 +19,7 @@ from scipy.special import chdtrc
 from zfcal.diagnose.candidates import Candidate, in_model, is_generic
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.leftover import outlasts
+from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score, by_track
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
@@ -39,6 +40,9 @@ _LEAST_VARIANCE = 1e-12
 
 _OF_OTHERS = 2.0
 """Standard errors that are left of an effect without the fish that asks for it most."""
+
+_PHASES = 20
+"""Parts of the time from pulse to pulse."""
 
 MINUTES_S, SECONDS_S = 60.0, 10.0
 """Blocks of time in which an effect is to be of one strength."""
@@ -144,7 +148,7 @@ def _confirmed(
         and outlasts(score, step.before, earlier)
     )
     minutes = is_steady(score, scene, MINUTES_S)
-    steady = minutes and is_steady(score, scene, SECONDS_S)
+    steady = minutes and is_steady(score, scene, SECONDS_S) and not has_pulses(score, scene)
     return replace(
         told, holds=holds, steady=steady, in_all_minutes=minutes, lasting=_lasts(best.candidate)
     )
@@ -214,6 +218,29 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
     effect = score.candidate.effect
     times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
     return _one_strength(score.steps, times_s // block_s)
+
+
+def has_pulses(score: Score, scene: Scene) -> bool:
+    """Return whether an effect comes in pulses at regular times.
+
+    Blocks of 10 s see of a pulse of 3 s in every minute little, of all of them together.
+
+    Parameters
+    ----------
+    score
+        Of the effect in the model without it.
+    scene
+        Whose steps the score is of.
+    """
+    if not _lasts(score.candidate):
+        return False
+    moves = scene.moves if score.candidate.effect.on_speed else scene.turns
+    series = np.bincount(moves.at, score.steps, len(scene.k)).astype(np.float64)
+    found = pulses(series[None], scene.dt_s)
+    if found.tail > _WAVERS:
+        return False
+    phase = scene.time_s(moves) / found.period_s % 1
+    return not _one_strength(score.steps, phase * _PHASES // 1)
 
 
 def _one_strength(steps: Floats, block: Floats) -> bool:

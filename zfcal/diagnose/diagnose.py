@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from zfcal.diagnose.case import (
     can_suspect,
     comes_and_goes,
     has_noise,
+    is_sharp,
     is_suspicious,
     open_case,
 )
@@ -122,7 +123,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     )
     asked = _asked(question, scores)
     rows = _null_rows(case, asked, tell)
-    omnibus = judge(own[1], [row.at_large[1] for row in rows if row.at_large])
+    omnibus = _omnibus(question, own[1], rows)
     selector = Selector(
         listed=Asked(
             candidates=case.listed,
@@ -146,10 +147,10 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 
 def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omnibus) -> _Judged:
     """Return which of the effects that were selected stand, and what is left then."""
-    steps, nulls = selection.steps, [row.at_large[1] for row in rows if row.at_large]
+    steps = selection.steps
 
     def after(step: Step) -> Omnibus:
-        return judge(case.ranks(0, step.choice.best.screen), nulls)
+        return _omnibus(case.question, case.ranks(0, step.choice.best.screen), rows)
 
     (confirmed, halves), last = together(
         lambda: confirm(case.screen, steps, n_workers=case.question.n_workers),
@@ -169,6 +170,11 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
         omnibus=omnibus,
         suspicious=wavers or is_suspicious(case.question, omnibus),
     )
+
+
+def _omnibus(question: Question, own: Mapping[str, float], rows: Sequence[_Row]) -> Omnibus:
+    nulls = [row.at_large[1] for row in rows if row.at_large]
+    return judge(own, nulls, sharp=is_sharp(question))
 
 
 def _asked(question: Question, scores: Sequence[Score]) -> tuple[Candidate, ...]:

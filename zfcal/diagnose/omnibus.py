@@ -8,9 +8,7 @@ when the model is right. Asked are:
 * serial correlation: products of an agent's score with its own one to five steps before,
   and with its nearest neighbour's at the same step and one to five before;
 * bursts: correlation of all agents' scores within 1, 3, 10 and 30 s;
-* pulses at regular times: the periodogram of the scores' sum over agents, summed over
-  harmonics of a fundamental (de Jager et al. 1989, Astronomy and Astrophysics 221: 180-190),
-  the largest of all fundamentals;
+* pulses at regular times (`pulses`) of the scores' sum over agents;
 * what is `rare`: headings that the model hardly expects, and runs of like speeds.
 
 Each is turned into a standard normal number z that is large where the model is wrong, and
@@ -25,13 +23,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtr, stdtr
+from scipy.special import ndtr, stdtr
 
 from zfcal.diagnose.battery import speed_factor
-from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of, normal_of_tail
+from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.kernels import product_sums
 from zfcal.diagnose.null import UNLIKE
+from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
 from zfcal.diagnose.standing import Standing
@@ -44,11 +43,9 @@ LAGS = 5
 _BINS = 20
 _BURSTS, _PULSES = "bursts", "pulses"
 _BURSTS_S = (1.0, 3.0, 10.0, 30.0)
-_HARMONICS = (1, 5, 20)
-_SHORTEST_PERIOD_S = 5.0
-_LEAST_PULSES = 4
 _AXES = ("angle to the x axis", "angle to the y axis")
-_PRIOR_WEIGHT = 10.0
+_PRIOR_WEIGHT, _PRIOR_WEIGHT_SHARP = 10.0, 100.0
+"""Replicates that the theory, a spread of one, counts for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,7 +114,7 @@ def statistics(standing: Standing, rng: np.random.Generator) -> dict[str, float]
         if scores.name in _AXES:
             compass.append(_summed_up(scores, scene)[0])
     if compass:
-        made[f"compass: {_PULSES}"] = pulses(np.stack(compass), scene.dt_s)
+        made[f"compass: {_PULSES}"] = pulses(np.stack(compass), scene.dt_s).z
     made |= rare_statistics(standing)
     made |= run_statistics(standing, rng)
     return {name: z for name, z in made.items() if math.isfinite(z)}
@@ -188,7 +185,7 @@ def _in_time(scores: _Scores, scene: Scene) -> Iterator[tuple[str, float]]:
         per = max(1, round(length_s / scene.dt_s))
         yield f"{scores.name}: {_BURSTS} of {length_s:g} s", _burst(sums, squares, per)
     for series, which in zip(sums, ("", " of size"), strict=True):
-        yield f"{scores.name}: {_PULSES}{which}", pulses(series[None], scene.dt_s)
+        yield f"{scores.name}: {_PULSES}{which}", pulses(series[None], scene.dt_s).z
 
 
 def _burst(sums: Floats, squares: Floats, per: int) -> float:
@@ -204,35 +201,12 @@ def _burst(sums: Floats, squares: Floats, per: int) -> float:
     return float((pairs.sum(axis=1) / spread).sum() / math.sqrt(DEGREES))
 
 
-def pulses(sums: Floats, dt_s: float) -> float:
-    """Return the largest sum of a periodogram over harmonics, as a normal number.
-
-    The grid of fundamentals is as fine as the highest harmonic needs.
-
-    Parameters
-    ----------
-    sums : ndarray, shape (series, sample)
-        Of mean 0; the powers of several series, each scaled to its own, are added.
-    dt_s
-        Between samples.
-    """
-    n = sums.shape[1]
-    whole = np.maximum((sums**2).sum(axis=1, keepdims=True), 1e-300)
-    power = (np.abs(np.fft.rfft(sums, axis=1)) ** 2 / whole * 2).sum(axis=0)
-    tail, tried = 1.0, 0
-    for harmonics in _HARMONICS:
-        high = min(n * dt_s / _SHORTEST_PERIOD_S, (power.size - 1) / harmonics)
-        fundamental = np.arange(_LEAST_PULSES, high, 1 / harmonics)
-        if not fundamental.size:
-            continue
-        at = np.rint(fundamental[:, None] * np.arange(1, harmonics + 1)).astype(np.int64)
-        most = float(power[at].sum(axis=1).max())
-        tried += 1
-        tail = min(tail, float(chdtrc(2 * harmonics * len(sums), most)) * fundamental.size)
-    return normal_of_tail(tail * tried) if tried else math.nan
-
-
-def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = ()) -> Omnibus:
+def judge(
+    measured: Mapping[str, float],
+    nulls: Sequence[Mapping[str, float]] = (),
+    *,
+    sharp: bool = False,
+) -> Omnibus:
     """Return what the statistics come to.
 
     Parameters
@@ -242,16 +216,20 @@ def judge(measured: Mapping[str, float], nulls: Sequence[Mapping[str, float]] = 
     nulls
         Likewise, of simulations of the fitted model through the same measurement; without
         them the analytic null counts.
+    sharp
+        Positions are so sharp that the theory holds. Replicates are few, and Student's law for
+        few of them asks for one standard deviation more than it.
     """
     n = len(nulls)
+    prior = _PRIOR_WEIGHT_SHARP if sharp else _PRIOR_WEIGHT
     made: dict[str, float] = {}
     tails: dict[str, float] = {}
     for name, z in measured.items():
         drawn = np.array([null[name] for null in nulls if name in null])
         centre = float(drawn.mean()) if drawn.size else 0.0
         squares = float(((drawn - centre) ** 2).sum())
-        df = max(drawn.size - 1, 0) + _PRIOR_WEIGHT
-        spread = math.sqrt((squares + _PRIOR_WEIGHT) / df * (1 + 1 / max(drawn.size, 1)))
+        df = max(drawn.size - 1, 0) + prior
+        spread = math.sqrt((squares + prior) / df * (1 + 1 / max(drawn.size, 1)))
         spread = math.hypot(spread, UNLIKE * centre)
         made[name] = (z - centre) / spread if n else z
         tails[name] = float(stdtr(df, -made[name])) if n else float(ndtr(-z))

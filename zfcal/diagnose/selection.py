@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate, is_generic
+from zfcal.diagnose.chances import least_of
 from zfcal.diagnose.foreseen import Known, unforeseen
 from zfcal.diagnose.heats import Heat, Sampled, ahead, hopeful, run_heats, unbeaten
 from zfcal.diagnose.leftover import outlasts
@@ -92,8 +93,7 @@ class Asked:
 
     def family_p(self, z: Floats) -> Floats:
         """Return p-values over the whole family, however many of it were asked for."""
-        own, n = self.null.p(z), len(self.candidates)
-        return np.asarray(-np.expm1(n * np.log1p(-np.minimum(own, 1 - 1e-16))))
+        return least_of(self.null.p(z), len(self.candidates))
 
     def centre_of(self, candidate: Candidate) -> tuple[float, float]:
         """Return centre and spread of a candidate's z, the effect's at another shape if need be.
