@@ -199,22 +199,44 @@ def test_an_effect_that_comes_and_goes_is_not(screen, candidate, when, block_s):
     assert not is_steady(score, scene, block_s)
 
 
-@pytest.mark.parametrize("every_s", [30, 60])
-def test_pulses_that_blocks_do_not_see(screen, candidate, every_s):
-    """Three seconds in each minute or half of it: blocks have one strength, phases do not."""
-    score, scene = scores_at(screen, candidate("turning-bias"), lambda t: t % every_s < 3, 0.8)
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_pulses_that_blocks_do_not_see(screen, candidate, seed):
+    """Two seconds in each twenty, whenever they begin: blocks have one strength, phases do not."""
+    bias = candidate("turning-bias")
+    score, scene = scores_at(screen, bias, lambda t: (t + 1.7) % 20 < 2, 0.5, seed)
     assert score.z > 3
     assert is_steady(score, scene, MINUTES_S)
+    assert is_steady(score, scene, SECONDS_S)
     assert has_pulses(score, scene)
 
 
+def test_pulses_of_an_effect_on_speed(screen, candidate):
+    """They are of all moves, with headings or not: of another number than turns are."""
+    scene = screen(11).scene
+    draws = np.random.default_rng(5).normal(size=len(scene.moves))
+    assert not has_pulses(summed(candidate("crowding"), draws + 0.1), scene)
+    at_times = (scene.time_s(scene.moves) + 1.7) % 60 < 3
+    for strength in (0.8, 1.5, 3.0):
+        assert has_pulses(summed(candidate("crowding"), draws + strength * at_times), scene)
+
+
+def test_what_cannot_be_told_has_no_pulses(screen, candidate):
+    """Scores that are 0 or not known, in a recording too short for four pulses as well."""
+    score, scene = scores_at(screen, candidate("turning-bias"), lambda t: t % 60 < 3, 1.0)
+    for value in (0.0, np.nan):
+        assert not has_pulses(summed(score.candidate, np.full_like(score.steps, value)), scene)
+    brief = screen(11, minutes=0.25).scene
+    steps = np.ones(len(brief.turns))
+    assert not has_pulses(summed(score.candidate, steps), brief)
+
+
 def test_what_is_there_all_the_time_has_no_pulses(screen, candidate):
-    """Clear or faint: in none of forty. Nor has what waxes and wanes by less than its mean, however
+    """Clear or faint: in none of sixty, of which chance alone gives six phases that differ. Nor has what waxes and wanes by less than its mean, however
     plain its period is, or what is of others than the fish all the time.
     """
     bias = candidate("turning-bias")
     for seed in range(20):
-        for strength in (0.06, 0.5):
+        for strength in (0.02, 0.06, 0.5):
             assert not has_pulses(*scores_at(screen, bias, lambda t: t >= 0, strength, seed))
     score, scene = scores_at(screen, bias, lambda t: t >= 0, 1.0)
     wave = 0.6 * np.sin(2 * np.pi * scene.time_s(scene.turns) / 60)
@@ -236,6 +258,7 @@ def test_what_is_told_of_times(screen, candidate, monkeypatch, minutes, seconds,
     monkeypatch.setattr("zfcal.diagnose.confirming.has_pulses", lambda _score, _scene: pulsed)
     told = alone(step)
     steady = minutes and seconds and not pulsed
+    assert told.pulsed == pulsed
     assert (told.steady, told.in_all_minutes, told.lasting) == (steady, minutes, True)
 
 

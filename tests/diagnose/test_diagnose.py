@@ -301,6 +301,17 @@ def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
     assert _kept(steps, (dataclasses.replace(told, holds=False), told), explained=True) == ()
 
 
+@pytest.mark.parametrize("beside", [False, True])
+def test_what_comes_in_pulses_does_not_stand_however_little_is_left(question, record, beside):
+    """Its own form is then in the model on average, and of 400 statistics one tells."""
+    asks = question(record(23, BIAS, minutes=6.0), noise_m=0.0)
+    steady = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True)
+    told = dataclasses.replace(steady, steady=False, pulsed=True)
+    last = Omnibus(p=0.5, worst="", z=0.0, p_in_time=0.5)
+
+    assert not _explains(asks, (told, steady) if beside else (told,), last)
+
+
 @pytest.mark.parametrize(
     ("in_time", "minutes", "other", "stands"),
     [

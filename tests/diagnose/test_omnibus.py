@@ -245,8 +245,8 @@ def test_bursts_and_pulses_count_by_themselves_as_well():
 
 
 def test_sharp_positions_have_the_theory_beside_few_replicates():
-    """Five standard deviations stand out of four hundred statistics then; by Student's law for
-    twenty replicates alone they do not. What replicates show counts all the same.
+    """Five standard deviations stand out of four hundred statistics then; where the theory counts
+    for ten replicates beside twenty they do not. What replicates show counts all the same.
     """
     rng = np.random.default_rng(13)
     names = [f"turn by context {n}" for n in range(400)]

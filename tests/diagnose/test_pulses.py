@@ -43,6 +43,8 @@ def test_a_mean_is_no_pulse():
     """It is no power of the noise either."""
     white = np.random.default_rng(13).normal(size=(2, 4000))
     assert pulses(white + 100.0, 0.2).tail == pytest.approx(pulses(white, 0.2).tail, rel=1e-6)
+    for constant in (0.0, 0.1, 1.0):
+        assert pulses(np.full((1, 3001), constant), 0.2).tail == 1.0
 
 
 def test_the_least_of_many_tails():

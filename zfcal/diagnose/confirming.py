@@ -65,6 +65,8 @@ class Confirmed:
         that of one fish, and not what an effect before it leaves over.
     steady
         Whether the effect is there all the time.
+    pulsed
+        Whether it comes in pulses at regular times: it is not steady then.
     in_all_minutes
         Whether it is there in all minutes, if not in all seconds.
     lasting
@@ -76,6 +78,7 @@ class Confirmed:
     gain_se: float
     holds: bool
     steady: bool = True
+    pulsed: bool = False
     in_all_minutes: bool = True
     lasting: bool = True
 
@@ -148,9 +151,15 @@ def _confirmed(
         and outlasts(score, step.before, earlier)
     )
     minutes = is_steady(score, scene, MINUTES_S)
-    steady = minutes and is_steady(score, scene, SECONDS_S) and not has_pulses(score, scene)
+    pulsed = has_pulses(score, scene)
+    steady = minutes and is_steady(score, scene, SECONDS_S) and not pulsed
     return replace(
-        told, holds=holds, steady=steady, in_all_minutes=minutes, lasting=_lasts(best.candidate)
+        told,
+        holds=holds,
+        steady=steady,
+        pulsed=pulsed,
+        in_all_minutes=minutes,
+        lasting=_lasts(best.candidate),
     )
 
 
@@ -223,7 +232,9 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
 def has_pulses(score: Score, scene: Scene) -> bool:
     """Return whether an effect comes in pulses at regular times.
 
-    Blocks of 10 s see of a pulse of 3 s in every minute little, of all of them together.
+    Blocks of 10 s miss pulses of 3 s in every minute half of the time. Scores of a steady effect
+    are no white noise where few moments ask for it, and then have a period as well; that its
+    strength spreads by more than its mean over the phases is asked of it in any case.
 
     Parameters
     ----------
@@ -237,7 +248,7 @@ def has_pulses(score: Score, scene: Scene) -> bool:
     moves = scene.moves if score.candidate.effect.on_speed else scene.turns
     series = np.bincount(moves.at, score.steps, len(scene.k)).astype(np.float64)
     found = pulses(series[None], scene.dt_s)
-    if found.tail > _WAVERS:
+    if not found.tail <= _WAVERS:
         return False
     phase = scene.time_s(moves) / found.period_s % 1
     return not _one_strength(score.steps, phase * _PHASES // 1)

@@ -256,7 +256,7 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
     and goes. With our form in the model nothing is left then that the omnibus test would notice; or
     beside another effect, one that is there all the time and leaves something over, at least
     nothing that comes and goes itself. This goes for seconds: what differs between minutes is not
-    that.
+    that. Nor is what comes in pulses at regular times, for distances do not.
 
     Parameters
     ----------
@@ -267,7 +267,9 @@ def _explains(question: Question, confirmed: Sequence[Confirmed], last: Omnibus)
     last
         The omnibus test with all of them in the model.
     """
-    if all(told.steady for told in confirmed) or not can_suspect(question):
+    if all(told.steady for told in confirmed) or any(told.pulsed for told in confirmed):
+        return False
+    if not can_suspect(question):
         return False
     if not is_suspicious(question, last):
         return True

@@ -55,8 +55,8 @@ def pulses(sums: Floats, dt_s: float) -> Pulses:
     dt_s
         Between samples.
     """
-    n = sums.shape[1]
-    whole = np.maximum(((sums - sums.mean(axis=1, keepdims=True)) ** 2).sum(axis=1), 1e-300)
+    n, sums = sums.shape[1], sums - sums.mean(axis=1, keepdims=True)
+    whole = np.maximum((sums**2).sum(axis=1), 1e-300)
     power = (np.abs(np.fft.rfft(sums, axis=1)) ** 2 / whole[:, None] * 2).sum(axis=0)
     found = []
     for harmonics in _HARMONICS:
