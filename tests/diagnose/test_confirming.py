@@ -231,12 +231,13 @@ def test_what_cannot_be_told_has_no_pulses(screen, candidate):
 
 
 def test_what_is_there_all_the_time_has_no_pulses(screen, candidate):
-    """Clear or faint: in none of sixty, of which chance alone gives six phases that differ. Nor has what waxes and wanes by less than its mean, however
-    plain its period is, or what is of others than the fish all the time.
+    """Clear or faint: in none of eighty, though chance alone gives phases that differ to one in ten
+    faint ones. Nor has what waxes and wanes by less than its mean, however plain its period is, or
+    what is of individuals.
     """
     bias = candidate("turning-bias")
-    for seed in range(20):
-        for strength in (0.02, 0.06, 0.5):
+    for seed in range(40):
+        for strength in (0.02, 0.5):
             assert not has_pulses(*scores_at(screen, bias, lambda t: t >= 0, strength, seed))
     score, scene = scores_at(screen, bias, lambda t: t >= 0, 1.0)
     wave = 0.6 * np.sin(2 * np.pi * scene.time_s(scene.turns) / 60)
