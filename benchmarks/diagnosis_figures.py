@@ -108,4 +108,4 @@ def _decorate(axes: Axes, title: str) -> None:
     axes.set_ylim(-4, 104)
     axes.set(title=title, xlabel="oracle nats (median of the bin)")
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="center right")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=4)
