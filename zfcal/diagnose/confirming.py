@@ -168,6 +168,11 @@ def _lasts(candidate: Candidate) -> bool:
     return not (effect.individual or effect.stops or is_generic(effect.name))
 
 
+def _judged_by(score: Score, scene: Scene) -> Moves:
+    """Return the steps that an effect's score is of: all moves, or those with a turn."""
+    return scene.moves if score.candidate.effect.on_speed else scene.turns
+
+
 def _tells_apart(fitted: Fitted) -> bool:
     """Return whether individuals differ in a model."""
     return any(find_effect(name).individual for name in fitted.parameters.effects)
@@ -189,7 +194,7 @@ def is_shared(score: Score, scene: Scene) -> bool:
     effect = score.candidate.effect
     if effect.individual or effect.stops:
         return True
-    track = (scene.moves if effect.on_speed else scene.turns).track
+    track = _judged_by(score, scene).track
     sums, information = by_track(track, score.steps)
     total = float(sums.sum())
     others = information.sum() - information
@@ -224,8 +229,7 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
     """
     if not _lasts(score.candidate):
         return True
-    effect = score.candidate.effect
-    times_s = scene.time_s(scene.moves if effect.on_speed else scene.turns)
+    times_s = scene.time_s(_judged_by(score, scene))
     return _one_strength(score.steps, times_s // block_s)
 
 
@@ -245,7 +249,7 @@ def has_pulses(score: Score, scene: Scene) -> bool:
     """
     if not _lasts(score.candidate):
         return False
-    moves = scene.moves if score.candidate.effect.on_speed else scene.turns
+    moves = _judged_by(score, scene)
     series = np.bincount(moves.at, score.steps, len(scene.k)).astype(np.float64)
     found = pulses(series[None], scene.dt_s)
     if not found.tail <= _WAVERS:
