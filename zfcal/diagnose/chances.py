@@ -44,6 +44,13 @@ def least_of(tails: Floats | float, n: int) -> Floats:
 
     Of independent ones (Sidak 1967, Journal of the American Statistical Association 62:
     626-633). By n times the tail most of what chance gives would be certain.
+
+    Parameters
+    ----------
+    tails : float or ndarray, any shape
+        Probabilities; what is returned has their shape.
+    n
+        Of how many each is the least.
     """
     return np.asarray(-np.expm1(n * np.log1p(-np.minimum(tails, 1 - 1e-16))))
 
