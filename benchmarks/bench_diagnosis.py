@@ -85,10 +85,11 @@ class Desk:
             section: most[0][0] if most else self.marks[section] for section, most in usual.items()
         }
 
-    def n_stale(self, section: str) -> int:
-        """Return how many rows of a section other code has made."""
-        rows = ledger.read(self.folder / f"{section}.jsonl")
-        return sum(row["code"] != self.marks[section] for row in rows)
+    def n_stale(self, section: str, rows: Sequence[ledger.Row]) -> int:
+        """Return how many rows of a section here were made by other code than those that count."""
+        counted = {(row["code"], row["quick"]) for row in rows if row["section"] == section}
+        made = ledger.read(self.folder / f"{section}.jsonl")
+        return sum((row["code"], row["quick"]) not in counted for row in made)
 
     def keep(self, section: str, row: ledger.Row) -> None:
         """Keep a row."""
@@ -178,11 +179,12 @@ def _line(job: Job, row: ledger.Row) -> str:
 
 def told(desk: Desk) -> list[ledger.Row]:
     """Return the rows of both modes that the document counts."""
+    marks = {quick: desk.marks_of(quick=quick) for quick in (True, False)}
     return [
         row
-        for quick in (True, False)
+        for quick, codes in marks.items()
         for section in SECTIONS
-        for row in desk.rows(section, desk.marks_of(quick=quick)).values()
+        for row in desk.rows(section, codes).values()
         if row["quick"] is quick
     ]
 
@@ -255,8 +257,9 @@ def main() -> None:
             work(part, desk, workers=workers, deadline_s=deadline_s)
     full, place = plan(Scale(), LISTED, UNLISTED, quick=options.quick), places(options)
     publish(summary(desk, full), place)
-    ledger.pack(place.results / PACKED, [*told(desk), *desk.rows(diagnosis_trial.ORACLE).values()])
-    if stale := sum(map(desk.n_stale, SECTIONS)):
+    rows = told(desk)
+    ledger.pack(place.results / PACKED, [*rows, *desk.rows(diagnosis_trial.ORACLE).values()])
+    if stale := sum(desk.n_stale(section, rows) for section in SECTIONS):
         print(f"{stale} trials were made by other code and do not count.", file=sys.stderr)
 
 

@@ -241,12 +241,12 @@ def test_a_second_run_does_what_is_missing_or_has_failed(bench, planned, tmp_pat
     desk = bench.Desk(folder=tmp_path, marks={"listed": "new"})
     old = bench.Desk(folder=tmp_path, marks={"listed": "old"})
     keys = [ledger.key_of(job.said()) for job in jobs]
-    desk.keep("listed", {"key": keys[0], "verdict": "named"})
-    desk.keep("listed", {"key": keys[1], "verdict": "error"})
-    old.keep("listed", {"key": keys[2], "verdict": "named"})
+    desk.keep("listed", {"key": keys[0], "quick": True, "verdict": "named"})
+    desk.keep("listed", {"key": keys[1], "quick": True, "verdict": "error"})
+    old.keep("listed", {"key": keys[2], "quick": True, "verdict": "named"})
 
     assert bench.missing(jobs, desk, ["listed"]) == jobs[1:]
-    assert desk.n_stale("listed") == 1
+    assert desk.n_stale("listed", list(desk.rows("listed").values())) == 1
 
 
 def test_a_run_goes_on_from_trials_that_were_made_elsewhere(bench, ledger, tmp_path):
@@ -281,6 +281,7 @@ def test_a_mode_that_the_present_code_was_not_asked_in_shows_what_another_said(b
         other.keep("listed", {"key": key, "quick": quick, "verdict": "named"})
 
     assert [row["key"] for row in bench.told(desk)] == ["a", "b", "e"]
+    assert desk.n_stale("listed", bench.told(desk)) == 2
     assert desk.marks_of(quick=True)["listed"] == "old"
     assert desk.marks_of(quick=False) == marks
     codes = {
