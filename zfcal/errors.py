@@ -7,6 +7,7 @@
     │   └── SchemaError   an artifact of another schema or version
     ├── DamagedError      a file that cannot be read whole; the rest goes on, exit 3
     ├── StorageError      the disk is full, or a place cannot be written
+    ├── ChangedError      an input has changed while something was made from it
     └── LockedError       the same command is at work on the same trial, exit 75
 
 A message says what, where, expected and got; the hint says what to do. The
@@ -58,6 +59,10 @@ class DamagedError(ZfcalError):
 
 class StorageError(ZfcalError):
     """A file cannot be written: the disk is full or the place is closed."""
+
+
+class ChangedError(ZfcalError):
+    """An input has changed while something was made from it; nothing is published."""
 
 
 class LockedError(ZfcalError):

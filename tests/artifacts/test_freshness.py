@@ -2,10 +2,11 @@
 
 import dataclasses
 import os
+import time
 
 import pytest
 
-from zfcal.artifacts import freshness
+from zfcal.artifacts import reading
 from zfcal.artifacts.freshness import hash_inputs, relative_to, stale_reason, version_change
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.tables import STATS, TRACKS, write_tracks
@@ -170,9 +171,11 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     """A half-hour trial has each segment in two windows."""
     path = tmp_path / "x"
     path.write_text("abc")
+    # Left alone for longer than the clock of files takes from one tick to the next.
+    time.sleep(0.1)
     read = []
-    real = freshness.sha256_of
-    monkeypatch.setattr(freshness, "sha256_of", lambda p: read.append(p) or real(p))
+    real = reading.sha256_of
+    monkeypatch.setattr(reading, "sha256_of", lambda p: read.append(p) or real(p))
 
     first = hash_inputs(tmp_path, [path])
     assert hash_inputs(tmp_path, [path]) == first

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import itertools
 import os
 import platform
@@ -17,7 +16,8 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-from zfcal.errors import InputError, StorageError
+from zfcal.artifacts.reading import check_contents, forget_content
+from zfcal.errors import StorageError
 
 _COUNTER = itertools.count()
 _IN_USE: set[str] = set()
@@ -57,6 +57,9 @@ def write_whole(path: Path, write: Callable[[Path], None], *, parents: bool = Tr
     StorageError
         The disk is full, or the place cannot be written. What was there stays,
         and the dot-file is removed.
+    ChangedError
+        Something that it was made from has changed meanwhile (`reading.one_content`);
+        the same holds.
     """
     part = _part_of(path)
     _IN_USE.add(part.name)
@@ -65,7 +68,9 @@ def write_whole(path: Path, write: Callable[[Path], None], *, parents: bool = Tr
         _remove_orphans(path)
         write(part)
         _flush(part)
+        check_contents()
         part.replace(path)
+        forget_content(path)
         _flush_folder(path.parent)
     except OSError as error:
         raise storage_error(path, error) from error
@@ -104,34 +109,10 @@ def append_bytes(path: Path, data: bytes) -> None:
     try:
         with path.open("ab") as file:
             file.write(data)
+        forget_content(path)
         _flush(path)
     except OSError as error:
         raise storage_error(path, error) from error
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes, in hexadecimal.
-
-    Raises
-    ------
-    InputError
-        The file is missing or cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise unreadable(path, error) from error
-
-
-def unreadable(path: Path, error: OSError) -> InputError:
-    """Return the error for a file that cannot be opened for reading."""
-    if isinstance(error, FileNotFoundError):
-        return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
-    return InputError(
-        f"{path}: cannot be read ({error.strerror or error}).",
-        hint="Check that it is a file, and its permissions.",
-    )
 
 
 def storage_error(path: Path, error: OSError) -> StorageError:

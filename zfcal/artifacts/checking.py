@@ -19,10 +19,10 @@ from zfcal.artifacts import machine
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
-from zfcal.artifacts.freshness import hash_of
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
+from zfcal.artifacts.reading import hash_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import POPULATION, SCORES, STATS, read_table, read_tracks
 from zfcal.artifacts.validation import check, read_json

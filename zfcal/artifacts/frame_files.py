@@ -24,9 +24,10 @@ from mcap.well_known import MessageEncoding
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
-from zfcal.artifacts.atomic import storage_error, unreadable
+from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, package_version
 from zfcal.artifacts.mcap_files import BROKEN, Overview, read_messages
+from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError, InputError
 from zfcal.trial import second_of
 
@@ -303,7 +304,7 @@ def _indexed(
 ) -> Iterator[tuple[Channel, Message]] | None:
     """Return the messages from a second on by the file's index; None if it has none."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             summary = make_reader(file).get_summary()
     except OSError as error:
         raise unreadable(path, error) from error
@@ -319,7 +320,7 @@ def _indexed(
 
 
 def _seek(path: Path, start_ns: int, found: Overview) -> Iterator[tuple[Channel, Message]]:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         reader = make_reader(file, validate_crcs=True)
         messages = reader.iter_messages(starting_at=start_ns, log_time_order=False)
         try:

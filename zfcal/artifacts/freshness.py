@@ -6,12 +6,9 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from zfcal.artifacts.atomic import sha256_of, unreadable
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage, to_json
+from zfcal.artifacts.reading import hash_of
 from zfcal.errors import DamagedError, InputError
-
-_HASHES: dict[tuple[int, int], tuple[tuple[int, ...], str]] = {}
-"""For each inode what its file looked like when it was hashed, and the hash."""
 
 
 def hash_inputs(root: Path, paths: Iterable[Path]) -> dict[str, str]:
@@ -137,23 +134,3 @@ def _shown(value: JSON) -> str:
     if value is None:
         return "none"
     return value if isinstance(value, str) else to_json(value)
-
-
-def hash_of(path: Path | str) -> str:
-    """Return the SHA-256 of a file, which is read only if it has changed since.
-
-    Raises
-    ------
-    InputError
-        The file is missing or cannot be read.
-    """
-    try:
-        status = os.stat(path)  # noqa: PTH116 - asked so often that making a Path would tell
-    except OSError as error:
-        raise unreadable(Path(path), error) from error
-    place = (status.st_dev, status.st_ino)
-    looks = (status.st_mtime_ns, status.st_ctime_ns, status.st_size)
-    known = _HASHES.get(place)
-    if known is None or known[0] != looks:
-        known = _HASHES[place] = (looks, sha256_of(Path(path)))
-    return known[1]

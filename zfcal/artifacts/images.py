@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError
 
 
@@ -27,10 +27,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     DamagedError
         It is no image, or one that is cut.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise unreadable(path, error) from error
+    data = read_bytes(path)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
     if image is None:

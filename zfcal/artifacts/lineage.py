@@ -17,7 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias, Union
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError, InputError
 
 JSON: TypeAlias = Union["Mapping[str, JSON]", "Sequence[JSON]", str, int, float, bool, None]
@@ -162,18 +162,24 @@ def _without_none(value: JSON) -> JSON:
 def _of_parquet(path: Path) -> Mapping[str, Any] | None:
     import pyarrow.parquet as pq  # slow to import, and a TOML file does not need it
 
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         metadata = pq.ParquetFile(file).metadata.metadata or {}
     text = metadata.get(LINEAGE_KEY.encode())
     return None if text is None else _as_mapping(json.loads(text))
 
 
+def _text_of(path: Path) -> str:
+    # An artifact is asked where it comes from, not read: what it holds bears on nothing here.
+    with open_regular(path) as file:
+        return file.read().decode()
+
+
 def _of_toml(path: Path) -> Mapping[str, Any] | None:
-    return _of_document(tomllib.loads(path.read_text(encoding="utf-8")))
+    return _of_document(tomllib.loads(_text_of(path)))
 
 
 def _of_json(path: Path) -> Mapping[str, Any] | None:
-    return _of_document(_as_mapping(json.loads(path.read_text(encoding="utf-8"))))
+    return _of_document(_as_mapping(json.loads(_text_of(path))))
 
 
 def _of_mcap(path: Path) -> Mapping[str, Any] | None:

@@ -18,7 +18,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError
 
 _RECORD_LIMIT = 2**28
@@ -177,7 +177,7 @@ class _Bounded:
 def _records(path: Path, found: Overview) -> Iterator[tuple[McapRecord, int]]:
     """Yield each record and where the next one starts, in file order."""
     try:
-        file = path.open("rb")
+        file = open_regular(path)
     except OSError as error:
         raise unreadable(path, error) from error
     with file:

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError, InputError
 
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -56,11 +56,9 @@ def read_older_camera(path: Path) -> OlderCamera:
         It is not XML of OpenCV.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DamagedError(f"{path}: is no text.", hint=_HINT) from error
-    except OSError as error:
-        raise unreadable(path, error) from error
     if "<opencv_storage>" not in text:
         raise DamagedError(f"{path}: is no XML of OpenCV (no <opencv_storage>).", hint=_HINT)
     try:

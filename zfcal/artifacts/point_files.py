@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError, InputError
 
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -49,13 +49,11 @@ def read_points(path: Path) -> PointFile:
         It is no text.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DamagedError(
             f"{path}: is no UTF-8 text (byte {error.start}).", hint="Save it as CSV in UTF-8."
         ) from error
-    except OSError as error:
-        raise unreadable(path, error) from error
     kept = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

@@ -14,9 +14,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from zfcal.artifacts.arrays import numbers_of
-from zfcal.artifacts.atomic import unreadable, write_whole
+from zfcal.artifacts.atomic import write_whole
 from zfcal.artifacts.columns import TABLE_SCHEMAS, form_of, make_table, problem_of
 from zfcal.artifacts.lineage import JSON, LINEAGE_KEY, Lineage, first_line, to_json
+from zfcal.artifacts.reading import open_regular, read_bytes, unreadable
 from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.tracks import KINDS, Tracks
 
@@ -125,7 +126,7 @@ def read_extra(path: Path) -> dict[str, JSON]:
     """
     _check_ends(path, "Make it again.")
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             metadata = pq.ParquetFile(file).metadata.metadata or {}
         extra: dict[str, JSON] = json.loads(metadata.get(_EXTRA_KEY, b"{}"))
     except (pa.ArrowException, OSError, ValueError) as error:
@@ -160,7 +161,7 @@ def read_parquet(path: Path, hint: str) -> pa.Table:
     try:
         # From memory: reading a file itself, pyarrow starts a thread even where it is told not to,
         # and a process that then ends at once is aborted now and then (apache/arrow issue 34314).
-        source = pa.py_buffer(path.read_bytes())
+        source = pa.py_buffer(read_bytes(path))
         # Not read_table: it loads pyarrow.dataset and with it pandas, a fifth of a second.
         whole = pq.ParquetFile(source, page_checksum_verification=True)
         return whole.read(use_threads=False)
@@ -171,7 +172,7 @@ def read_parquet(path: Path, hint: str) -> pa.Table:
 def _check_ends(path: Path, hint: str) -> None:
     """Tell an empty, a foreign and a cut file apart: the library calls them all invalid."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(4)
             size = file.seek(0, 2)
             file.seek(max(size - 4, 0))

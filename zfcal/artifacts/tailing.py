@@ -16,8 +16,8 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 
-from zfcal.artifacts.atomic import unreadable
 from zfcal.artifacts.mcap_files import BROKEN
+from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -84,7 +84,7 @@ class Tail:
     def _take(self) -> bytes:
         """Read the whole records that were added."""
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 if file.seek(0, io.SEEK_END) < self._offset:
                     # Written anew: the one that was read is gone.
                     self._offset = 0

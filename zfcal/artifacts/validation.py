@@ -21,7 +21,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 from referencing import Registry, Resource
 
-from zfcal.artifacts.atomic import unreadable
+from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError, InputError, SchemaError
 
 _TYPE_NAMES = {
@@ -156,14 +156,12 @@ def _validator(schema: str) -> Draft202012Validator:
 
 def _text_of(path: Path) -> str:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DamagedError(
             f"{path}: is no UTF-8 text (byte {error.start}).",
             hint="Save it as UTF-8, or copy the right file there.",
         ) from error
-    except OSError as error:
-        raise unreadable(path, error) from error
     if not text.strip("\0 \t\r\n"):
         raise DamagedError(f"{path}: the file is empty.", hint="Copy it again, or make it anew.")
     return text

@@ -18,9 +18,10 @@ import cv2
 from zfcal.artifacts.atomic import write_whole
 from zfcal.artifacts.cameras import SCHEMA as CAMERA
 from zfcal.artifacts.frame_files import FRAMES, FrameWriter, frame_segments
-from zfcal.artifacts.freshness import hash_inputs, hash_of
+from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.images import read_image
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
+from zfcal.artifacts.reading import hash_of
 from zfcal.artifacts.settings import name_camera, read_trial
 from zfcal.artifacts.tables import read_tracks
 from zfcal.errors import DamagedError, InputError

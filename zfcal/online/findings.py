@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from zfcal.artifacts.atomic import sha256_of, write_text_whole
+from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.reading import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.diagnose.document import Findings, Sheet, read_document
 from zfcal.errors import InputError

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from zfcal.artifacts.atomic import sha256_of
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
+from zfcal.artifacts.reading import hash_of, hold_steady
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import Made, Note, Progress, Tell
@@ -65,12 +65,13 @@ def hash_sources(root: Path, path: Path) -> dict[str, str]:
     """
     files = sorted(part for part in path.rglob("*") if part.is_file()) if path.is_dir() else [path]
     outside = relative_to(root, path).startswith("..")
-    return {
-        (
-            part.relative_to(path.parent).as_posix() if outside else relative_to(root, part)
-        ): sha256_of(part)
-        for part in files
-    }
+    found = {}
+    for part in files:
+        # Readers of films and of other programs' tracks open it by its name.
+        hold_steady(part)
+        name = part.relative_to(path.parent).as_posix() if outside else relative_to(root, part)
+        found[name] = hash_of(part)
+    return found
 
 
 def check_same_source(trial: Trial, lineage: Lineage, task: Task) -> None:

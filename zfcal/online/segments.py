@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import final
 
 from zfcal.arena import Arena
-from zfcal.artifacts.freshness import hash_inputs, hash_of
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.reading import hash_of
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool

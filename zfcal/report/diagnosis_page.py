@@ -9,8 +9,9 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any, TypeVar
 
-from zfcal.artifacts.atomic import sha256_of, storage_error, write_bytes_whole, write_text_whole
+from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole
 from zfcal.artifacts.lineage import package_version
+from zfcal.artifacts.reading import sha256_of
 from zfcal.diagnose.document import Sheet
 from zfcal.report.contents import Section
 

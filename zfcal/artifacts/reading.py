@@ -1,0 +1,279 @@
+"""Reading files of a trial: regular ones only, and each with one content for one piece of work.
+
+An artifact states the SHA-256 of what it was made from. That is the hash of the bytes that
+were read, not of those that lie there later: within `one_content` every look at a file,
+be it a hash or the bytes themselves, must show the same content, and `check_contents` looks
+once more before something is published. What the bytes mean is the business of others.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import io
+import os
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias, final
+
+from zfcal.errors import ChangedError, InputError
+
+Looks: TypeAlias = tuple[int, ...]
+"""What tells one content of a place from the next without reading it."""
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+_HASHES: dict[Looks, tuple[Looks, str]] = {}
+"""For each inode what its file looked like when it was hashed, and the hash."""
+
+_TICK_NS = 50_000_000
+"""Files are stamped by a clock that ticks every few milliseconds. Two contents that are written
+within a tick look the same: a hash is kept only of a file that has been left alone longer."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What files held when they were looked at during one piece of work.
+
+    Parameters
+    ----------
+    digests
+        SHA-256 by absolute path.
+    steady
+        The looks of files that must not even be touched, by absolute path.
+    """
+
+    digests: dict[str, str] = field(default_factory=dict)
+    steady: dict[str, Looks] = field(default_factory=dict)
+
+    def continued(self) -> Contents:
+        """Return a copy for work that builds on this one."""
+        return Contents(digests=dict(self.digests), steady=dict(self.steady))
+
+    def note(self, path: Path | str, digest: str) -> None:
+        """Note the hash of a file that was looked at.
+
+        Raises
+        ------
+        ChangedError
+            It was another one before.
+        """
+        place = os.path.abspath(path)  # noqa: PTH100 - asked so often that a Path would cost
+        if self.digests.setdefault(place, digest) != digest:
+            raise _changed(place)
+
+    def note_steady(self, path: Path | str, looks: Looks) -> None:
+        """Note a file that a library reads by its name: it must not be touched at all."""
+        place = os.path.abspath(path)  # noqa: PTH100 - as above
+        if self.steady.setdefault(place, looks) != looks:
+            raise _changed(place)
+
+    def forget(self, path: Path) -> None:
+        """Let a file change that this work itself writes."""
+        place = os.path.abspath(path)  # noqa: PTH100 - as above
+        self.digests.pop(place, None)
+        self.steady.pop(place, None)
+
+    def check(self) -> None:
+        """Look at every file once more.
+
+        Raises
+        ------
+        ChangedError
+            One is gone, or holds something else than when it was read.
+        """
+        for place, looks in self.steady.items():
+            if _looks_of(place) != looks:
+                raise _changed(place)
+        for place, digest in self.digests.items():
+            try:
+                found = _digest_of(place)
+            except InputError as error:
+                raise _changed(place) from error
+            if found != digest:
+                raise _changed(place)
+
+
+_CONTENTS: ContextVar[Contents | None] = ContextVar("contents", default=None)
+
+
+@contextmanager
+def one_content(known: Contents | None = None) -> Iterator[Contents]:
+    """Hold every file that is read within this context to one content.
+
+    Parameters
+    ----------
+    known
+        What was seen before on whose results this work builds, such as a trial's settings.
+    """
+    seen = Contents() if known is None else known.continued()
+    token = _CONTENTS.set(seen)
+    try:
+        yield seen
+    finally:
+        _CONTENTS.reset(token)
+
+
+def check_contents() -> None:
+    """Look once more at all that was read within the current `one_content`, if there is one.
+
+    Raises
+    ------
+    ChangedError
+        A file has changed since it was read.
+    """
+    seen = _CONTENTS.get()
+    if seen is not None:
+        seen.check()
+
+
+def forget_content(path: Path) -> None:
+    """Let a file change that the current work itself writes."""
+    seen = _CONTENTS.get()
+    if seen is not None:
+        seen.forget(path)
+
+
+def open_regular(path: Path) -> io.BufferedReader:
+    """Open a regular file for reading; a pipe, a device or a folder keeps nobody waiting.
+
+    Raises
+    ------
+    OSError
+        It is missing, no regular file, or cannot be opened; see `unreadable`.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY)
+    kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
+    if kind != stat.S_IFREG:
+        os.close(descriptor)
+        number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
+        text = f"expected a regular file, got {_KINDS.get(kind, 'something else')}"
+        raise OSError(number, text, str(path))
+    os.set_blocking(descriptor, True)
+    return os.fdopen(descriptor, "rb")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return what a regular file holds, all at once; the hash of these very bytes is noted.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no regular one, or cannot be read.
+    ChangedError
+        The current piece of work has seen another content of it.
+    """
+    try:
+        with open_regular(path) as file:
+            data = file.read()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    seen = _CONTENTS.get()
+    if seen is not None:
+        seen.note(path, hashlib.sha256(data).hexdigest())
+    return data
+
+
+def hash_of(path: Path | str) -> str:
+    """Return the SHA-256 of a file, which is read only if it has changed since; noted as well.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no regular one, or cannot be read.
+    ChangedError
+        The current piece of work has seen another content of it.
+    """
+    digest = _digest_of(path)
+    seen = _CONTENTS.get()
+    if seen is not None:
+        seen.note(path, digest)
+    return digest
+
+
+def hold_steady(path: Path) -> None:
+    """Note a file that a library is about to read by its name: until the end nobody may touch it.
+
+    Its times tell, since nobody sees the bytes that the library reads.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no regular one, or cannot be read.
+    ChangedError
+        It was touched since the current piece of work has seen it.
+    """
+    seen = _CONTENTS.get()
+    if seen is not None:
+        looks = _looks_of(path)
+        if looks is None:
+            raise unreadable(path, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)))
+        seen.note_steady(path, looks)
+        seen.note(path, _digest_of(path))
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hexadecimal.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no regular one, or cannot be read.
+    """
+    try:
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """Return the error for a file that cannot be opened for reading."""
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
+    return InputError(
+        f"{path}: cannot be read ({error.strerror or error}).",
+        hint="Check that it is a file, and its permissions.",
+    )
+
+
+def _looks_of(path: Path | str) -> Looks | None:
+    try:
+        status = os.stat(path)  # noqa: PTH116 - asked so often that making a Path would tell
+    except OSError:
+        return None
+    times = (status.st_mtime_ns, status.st_ctime_ns)
+    return (status.st_dev, status.st_ino, *times, status.st_size)
+
+
+def _digest_of(path: Path | str) -> str:
+    looks = _looks_of(path)
+    if looks is None:
+        return sha256_of(Path(path))
+    known = _HASHES.get(looks[:2])
+    if known is not None and known[0] == looks:
+        return known[1]
+    asked_ns = time.time_ns()
+    digest = sha256_of(Path(path))
+    if looks == _looks_of(path) and abs(asked_ns - looks[3]) > _TICK_NS:
+        _HASHES[looks[:2]] = (looks, digest)
+    return digest
+
+
+def _changed(place: str) -> ChangedError:
+    return ChangedError(
+        f"{place}: has changed while it was being used.",
+        hint="Run the command again once nobody writes there any more.",
+    )
