@@ -59,6 +59,7 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
     """Write the report of trials, unless it is up to date."""
     from zfcal.online.events import LeftOut, Made, Planned, UpToDate
     from zfcal.online.opening import at_work
+    from zfcal.online.settled import settled
     from zfcal.report.page import (
         PAGE,
         report_files,
@@ -67,7 +68,7 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
         write_report,
     )
 
-    with at_work(roots[0], "report", task):
+    def work() -> None:
         reason = report_reason(roots, folder) or ("forced" if task.force else None)
         if reason is None:
             for path in report_files(roots, folder):
@@ -79,6 +80,9 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
         else:
             for path in write_report(roots, folder, on_damage=_damage(out)):
                 out.tell(Made(path=path, reason=reason))
+
+    with at_work(roots[0], "report", task):
+        settled(work, out.tell)
 
 
 def _damage(out: Output) -> Callable[[DamagedError], None]:

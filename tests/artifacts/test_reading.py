@@ -135,6 +135,25 @@ def test_work_that_builds_on_other_work_keeps_to_what_that_has_seen(place):
         hash_of(place)
 
 
+def test_a_part_of_the_work_is_held_to_what_the_whole_has_seen(place):
+    """What a part has seen counts for the whole, unless the part failed and is done again."""
+
+    def fail():
+        with one_content():
+            read_bytes(place)
+            raise KeyError
+
+    with one_content():
+        with pytest.raises(KeyError):
+            fail()
+        place.write_bytes(b"new")
+        with one_content():
+            read_bytes(place)
+        place.write_bytes(b"newer")
+        with pytest.raises(ChangedError):
+            hash_of(place)
+
+
 def test_nobody_is_held_to_anything_outside():
     """Without `one_content` there is nothing to check."""
     check_contents()

@@ -58,9 +58,18 @@ class Contents:
     digests: dict[str, str] = field(default_factory=dict)
     steady: dict[str, Looks] = field(default_factory=dict)
 
-    def continued(self) -> Contents:
-        """Return a copy for work that builds on this one."""
-        return Contents(digests=dict(self.digests), steady=dict(self.steady))
+    def take(self, other: Contents) -> None:
+        """Note all that other work has seen.
+
+        Raises
+        ------
+        ChangedError
+            It has seen another content of a file.
+        """
+        for place, digest in other.digests.items():
+            self.note(place, digest)
+        for place, looks in other.steady.items():
+            self.note_steady(place, looks)
 
     def note(self, path: Path | str, digest: str) -> None:
         """Note the hash of a file that was looked at.
@@ -113,17 +122,24 @@ _CONTENTS: ContextVar[Contents | None] = ContextVar("contents", default=None)
 def one_content(known: Contents | None = None) -> Iterator[Contents]:
     """Hold every file that is read within this context to one content.
 
+    A context within another one is a part of its work: what it has seen counts there as well,
+    unless it failed.
+
     Parameters
     ----------
     known
         What was seen before on whose results this work builds, such as a trial's settings.
     """
-    seen = Contents() if known is None else known.continued()
+    outer, seen = _CONTENTS.get(), Contents()
+    if known is not None:
+        seen.take(known)
     token = _CONTENTS.set(seen)
     try:
         yield seen
     finally:
         _CONTENTS.reset(token)
+    if outer is not None:
+        outer.take(seen)
 
 
 def check_contents() -> None:

@@ -126,8 +126,7 @@ def read_extra(path: Path) -> dict[str, JSON]:
     """
     _check_ends(path, "Make it again.")
     try:
-        with open_regular(path) as file:
-            metadata = pq.ParquetFile(file).metadata.metadata or {}
+        metadata = pq.ParquetFile(pa.py_buffer(read_bytes(path))).metadata.metadata or {}
         extra: dict[str, JSON] = json.loads(metadata.get(_EXTRA_KEY, b"{}"))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DamagedError(f"{path}: cannot be read whole ({first_line(error)}).") from error

@@ -7,11 +7,13 @@ run on the newest one are the same code: they differ in `Task.ends_s`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from zfcal.arena import VOID
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import make_table, write_table
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.rows import join_tables, statistics_to_rows
@@ -21,6 +23,7 @@ from zfcal.online.events import LeftOut, Made, Note, Progress, Result, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, tell_reason
 from zfcal.online.scoring import SCORINGS, Window, scores_of
 from zfcal.online.segments import Pooled, Segments, segment_hashes, segment_name
+from zfcal.online.settled import Items
 from zfcal.online.windows import starts_of, whole_segments, window_ends
 from zfcal.trial import second_of
 
@@ -133,24 +136,30 @@ def analyse(
         The trial or its arena is wrong, the disk is full, or another analyse is
         at work on the trial. Damaged segments are left out and told instead.
     """
-    task, segments = task or Task(), segments or Segments()
-    opened = segments.open(root)
-    with at_work(root, "analyse", task):
-        control = ControlGroup.read(opened, options.control, segments, tell)
-        run = _Run(
+    task, known_segments = task or Task(), segments or Segments()
+
+    def open_run() -> _Run:
+        opened = known_segments.open(root)
+        return _Run(
             opened=opened,
             options=options,
-            control=control,
+            control=ControlGroup.read(opened, options.control, known_segments, tell),
             task=task,
             tell=tell,
-            segments=segments,
+            segments=known_segments,
             whole=tuple(whole_segments(opened.trial)),
         )
-        known = window_ends(opened.trial, tell, list(run.whole))
-        _tell_oddities(run, known)
+
+    # First: where there is no trial no lock is to lie.
+    read_trial(root)
+    with at_work(root, "analyse", task):
+        items = Items(open_run, tell)
+        known = window_ends(items.run.opened.trial, tell, list(items.run.whole))
+        _tell_oddities(items.run, known)
         ends = [end for end in known if task.wants(end)]
         for number, end in enumerate(ends, start=1):
-            _make_window(run, end)
+            path = items.run.opened.trial.path("scores", end, ".parquet")
+            items.make(path, partial(_make_window, end_s=end))
             tell(Progress(stage="analyse", done=number, total=len(ends)))
 
 

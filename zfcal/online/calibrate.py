@@ -10,11 +10,13 @@ import math
 import os
 import time
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
+from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.baselines import random_search, unchanged
 from zfcal.calibrate.cluster import ClusterGroup
@@ -40,6 +42,7 @@ from zfcal.online.rounds import (
     summary_of,
     write_round,
 )
+from zfcal.online.settled import Items
 from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
 from zfcal.trial import second_of
@@ -180,23 +183,29 @@ def calibrate(
         told instead.
     """
     task = task or Task()
-    opened = open_trial(root)
+
+    def open_run() -> _Run:
+        opened = open_trial(root)
+        group = make_group(opened, options)
+        return _Run(opened=opened, options=options, task=task, tell=tell, group=group)
+
+    # First: where there is no trial no lock is to lie.
+    read_trial(root)
     with at_work(root, "calibrate", task):
-        run = _Run(
-            opened=opened,
-            options=options,
-            task=task,
-            tell=tell,
-            group=make_group(opened, options),
-        )
-        ends = _ends(run)
+        items = Items(open_run, tell)
+        ends = _ends(items.run)
         previous: Path | None = None
         planned = False
         for number, end in enumerate(ends):
             tell(Progress(stage="rounds", done=number, total=len(ends)))
             places = RoundPlaces(root=root, end_s=end)
             if task.wants(end) or not places.population.exists():
-                planned |= _make_round(run, places, previous, shaken=planned)
+                work = partial(_make_round, places=places, previous=previous, shaken=planned)
+                found = items.make(places.model, work)
+                if found is None:
+                    # Later rounds would start from another one than the next run's.
+                    return
+                planned |= found
             previous = places.population if places.population.exists() else previous
         tell(Progress(stage="rounds", done=len(ends), total=len(ends)))
 

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from zfcal.artifacts.frame_files import frame_segments
+from zfcal.artifacts.reading import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_camera
 from zfcal.online.events import Tell
+from zfcal.online.settled import settled
 from zfcal.online.sources import source_of
 from zfcal.trial import Trial
 from zfcal.vision.alignment import Alignment, Spots, align_spots
@@ -75,6 +77,10 @@ def align_cameras(root: Path, recording: Recording, tell: Tell, *, task: CameraT
     InputError
         A camera is not calibrated, there are no images, or the robot is not to be found.
     """
+    settled(lambda: _align(root, recording, tell, task=task), tell)
+
+
+def _align(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) -> None:
     trial = read_trial(root)
     overhead_file, below_file = _camera_file(trial, "overhead"), _camera_file(trial, "below")
     sources = {
@@ -222,4 +228,7 @@ def _files(sources: Iterable[str]) -> list[Path]:
                 hint="Record a minute with zfcal track --record while the robot drives.",
             )
         found += frame_segments(path) if path.is_dir() else [path] if path.is_file() else []
+    for path in found:
+        # What decodes a film opens it by its name.
+        hold_steady(path)
     return found

@@ -16,6 +16,7 @@ from zfcal.artifacts.images import read_image
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.camera_making import CameraTask, Found, Place, Recipe, make_camera
 from zfcal.online.events import LeftOut, Made, Note, Progress, Tell
+from zfcal.online.settled import settled
 from zfcal.vision.boards import Board, draw_board, find_board
 from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_boards import LensCalibration, calibrate_lens
@@ -83,6 +84,10 @@ def make_from_boards(place: Place, given: BoardImages, tell: Tell, *, task: Came
     InputError
         There are too few images with the board in them, or they differ in size.
     """
+    settled(lambda: _from_boards(place, given, tell, task=task), tell)
+
+
+def _from_boards(place: Place, given: BoardImages, tell: Tell, *, task: CameraTask) -> None:
     files = tuple(_files(given.paths))
     lies = given.lies
     if place.root is not None and lies is None:

@@ -12,6 +12,7 @@ from zfcal.online.camera_corners import size_of_images
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_lens
 from zfcal.online.events import Tell
+from zfcal.online.settled import settled
 from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_points import calibrate_points, calibrate_pose
 from zfcal.vision.lens import PINHOLE, Lens
@@ -54,6 +55,10 @@ def make_from_points(place: Place, points: Points, tell: Tell, *, task: CameraTa
     InputError
         The points do not determine a camera, or are not of this one.
     """
+    settled(lambda: _from_points(place, points, tell, task=task), tell)
+
+
+def _from_points(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
     lens = None if points.lens is None else read_lens(points.lens)
     if lens is not None and points.size_px is None and points.image is None:
         size_px = lens.size_px
@@ -84,6 +89,10 @@ def make_from_older(place: Place, points: Points, tell: Tell, *, task: CameraTas
     DamagedError
         It is not XML of OpenCV.
     """
+    settled(lambda: _from_older(place, points, tell, task=task), tell)
+
+
+def _from_older(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
     found = read_older_camera(points.path)
     lens = None
     if found.matrix is not None:

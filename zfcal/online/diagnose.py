@@ -23,6 +23,7 @@ from zfcal.errors import InputError
 from zfcal.online.events import Made, Planned, Progress, Result, Tell, UpToDate
 from zfcal.online.findings import FOLDER, Book, Draw
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, tell_version
+from zfcal.online.settled import settled
 from zfcal.online.stretch import Stretch, read_stretch
 from zfcal.parameters import Parameters
 
@@ -162,26 +163,32 @@ def diagnose(
     """
     task = task or Task()
     with at_work(root, "diagnose", task):
-        case = open_case(root, options)
-        stretch = read_stretch(case.opened, options.window_s, tell)
-        book = Book(opened=case.opened, folder=case.folder, draw=draw)
-        expected = lineage_of(case, stretch)
-        reason = stale_reason([book.path], expected) or ("forced" if task.force else None)
-        if reason is not None and task.dry_run:
-            tell(Planned(path=book.path, reason=reason))
-            return None
-        if reason is None:
-            tell_version([book.path], expected, tell)
-            tell(UpToDate(path=book.path))
-        else:
-            if draw is not None and options.workers > 1:
-                draw.prepare()
-            diagnosis = _answer(case, stretch, tell)
-            book.write(_document(case, stretch, diagnosis), expected)
-            tell(Made(path=book.path, reason=reason))
-        book.show(tell, task)
-        tell(Result(value=book.read()[0]))
-        return book.path
+        return settled(lambda: _diagnose(root, options, tell, task=task, draw=draw), tell)
+
+
+def _diagnose(
+    root: Path, options: DiagnoseOptions, tell: Tell, *, task: Task, draw: Draw | None
+) -> Path | None:
+    case = open_case(root, options)
+    stretch = read_stretch(case.opened, options.window_s, tell)
+    book = Book(opened=case.opened, folder=case.folder, draw=draw)
+    expected = lineage_of(case, stretch)
+    reason = stale_reason([book.path], expected) or ("forced" if task.force else None)
+    if reason is not None and task.dry_run:
+        tell(Planned(path=book.path, reason=reason))
+        return None
+    if reason is None:
+        tell_version([book.path], expected, tell)
+        tell(UpToDate(path=book.path))
+    else:
+        if draw is not None and options.workers > 1:
+            draw.prepare()
+        diagnosis = _answer(case, stretch, tell)
+        book.write(_document(case, stretch, diagnosis), expected)
+        tell(Made(path=book.path, reason=reason))
+    book.show(tell, task)
+    tell(Result(value=book.read()[0]))
+    return book.path
 
 
 def lineage_of(case: Case, stretch: Stretch) -> Lineage:

@@ -28,6 +28,7 @@ from zfcal.online.extension import Extension, extension_of
 from zfcal.online.findings import FILE, FOLDER, Book, Draw
 from zfcal.online.opening import Task, at_work, open_trial, reason_to_make
 from zfcal.online.rounds import MODEL, checkpoint_key
+from zfcal.online.settled import settled
 from zfcal.online.stretch import read_stretch
 
 Effects = Mapping[str, Mapping[str, float]]
@@ -96,33 +97,39 @@ def extend(
     """
     task = task or Task()
     with at_work(root, "extend", task):
-        path = _findings_of(root, options.findings)
-        asked = _question_of(root, path)
-        case = open_case(root, asked)
-        # Before the diagnosis, which takes minutes.
-        _check_new(case, options.names)
-        if not _up_to_date(root, asked, tell, task=task, draw=draw):
-            return None
-        book = Book(opened=case.opened, folder=path.parent, draw=draw)
-        document, found = book.read()
-        effects = _chosen(case, options, document, tell)
-        if effects is None:
-            tell(Result(value=document))
-            return None
-        output = options.output or _place(root, case.model)
-        stretch = read_stretch(case.opened, asked.window_s, say_nothing)
-        ties = [tie for effect in found.effects for tie in effect.ties]
-        extension = extension_of(case, stretch, effects, (options.calibration, ties, tell))
-        expected = _lineage(case, extension, list(stretch.files))
-        ignore = ("generations",) if options.calibration.budget_s is not None else ()
-        reason = reason_to_make(output, expected, task, tell, ignore=ignore)
-        if reason is not None:
-            _make(output, extension, expected)
-            tell(Made(path=output, reason=reason))
-        if not task.dry_run:
-            _tell_gap(book, document, output, tell, task=task)
-            tell(Result(value=book.read()[0]))
-        return None if task.dry_run else output
+        return settled(lambda: _extend(root, options, tell, task=task, draw=draw), tell)
+
+
+def _extend(
+    root: Path, options: ExtendOptions, tell: Tell, *, task: Task, draw: Draw | None
+) -> Path | None:
+    path = _findings_of(root, options.findings)
+    asked = _question_of(root, path)
+    case = open_case(root, asked)
+    # Before the diagnosis, which takes minutes.
+    _check_new(case, options.names)
+    if not _up_to_date(root, asked, tell, task=task, draw=draw):
+        return None
+    book = Book(opened=case.opened, folder=path.parent, draw=draw)
+    document, found = book.read()
+    effects = _chosen(case, options, document, tell)
+    if effects is None:
+        tell(Result(value=document))
+        return None
+    output = options.output or _place(root, case.model)
+    stretch = read_stretch(case.opened, asked.window_s, say_nothing)
+    ties = [tie for effect in found.effects for tie in effect.ties]
+    extension = extension_of(case, stretch, effects, (options.calibration, ties, tell))
+    expected = _lineage(case, extension, list(stretch.files))
+    ignore = ("generations",) if options.calibration.budget_s is not None else ()
+    reason = reason_to_make(output, expected, task, tell, ignore=ignore)
+    if reason is not None:
+        _make(output, extension, expected)
+        tell(Made(path=output, reason=reason))
+    if not task.dry_run:
+        _tell_gap(book, document, output, tell, task=task)
+        tell(Result(value=book.read()[0]))
+    return None if task.dry_run else output
 
 
 def _findings_of(root: Path, named: Path | None) -> Path:

@@ -30,6 +30,7 @@ from zfcal.online.cameras import read_camera, write_camera
 from zfcal.online.events import Made, Note, Planned, Progress, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.online.segments import STEP_S, segment_path, segment_starts
+from zfcal.online.settled import settled
 from zfcal.tracks import Tracks, concatenate
 from zfcal.trial import second_of
 from zfcal.vision.camera import Camera, Homography
@@ -109,15 +110,20 @@ def film(root: Path, options: FilmOptions, tell: Tell, *, task: Task | None = No
         There are no tracks, or images of a real camera lie there.
     """
     task = task or Task()
-    opened = open_trial(root)
+    read_trial(root)
     if not segment_starts(root):
         raise InputError(f"{root}: has no tracks to draw.", hint="Simulate some without --dry-run.")
     with at_work(root, COMMAND, task):
-        scene = _Scene(opened, options)
-        for name in camera_names(opened.trial.n_robots):
-            _check_drawn(root, name, task)
-            camera = _camera(opened, name, tell, task)
-            _film_one(scene, name, camera, tell, task)
+        settled(lambda: _film(root, options, tell, task), tell)
+
+
+def _film(root: Path, options: FilmOptions, tell: Tell, task: Task) -> None:
+    opened = open_trial(root)
+    scene = _Scene(opened, options)
+    for name in camera_names(opened.trial.n_robots):
+        _check_drawn(root, name, task)
+        camera = _camera(opened, name, tell, task)
+        _film_one(scene, name, camera, tell, task)
 
 
 @final

@@ -18,11 +18,13 @@ from zfcal.artifacts.atomic import write_text_whole, write_whole
 from zfcal.artifacts.frame_files import frame_segments, read_frames
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.reading import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import DamagedError, InputError, StorageError
 from zfcal.online.events import Made, Planned, Progress, Tell, UpToDate
 from zfcal.online.film import BELOW, camera_names, frames_folder
 from zfcal.online.opening import Task
+from zfcal.online.settled import settled
 from zfcal.vision.frames import Image
 
 SCHEMA = "zfcal.video/1"
@@ -73,7 +75,10 @@ def export_video(root: Path, video: Path, tell: Tell, *, task: Task | None = Non
     StorageError
         The disk is full, or OpenCV has no such codec.
     """
-    task = task or Task()
+    settled(lambda: _export(root, video, tell, task=task or Task()), tell)
+
+
+def _export(root: Path, video: Path, tell: Tell, *, task: Task) -> None:
     trial = read_trial(root)
     for camera, path in exported_paths(video, camera_names(trial.n_robots)).items():
         segments = frame_segments(frames_folder(root, camera))
@@ -81,6 +86,9 @@ def export_video(root: Path, video: Path, tell: Tell, *, task: Task | None = Non
             raise InputError(
                 f"{frames_folder(root, camera)}: holds no images.", hint="Draw them with --video."
             )
+        for segment in segments:
+            # Its images are read one by one while the video is written.
+            hold_steady(segment)
         lineage = Lineage(
             schema=SCHEMA,
             command="simulate",

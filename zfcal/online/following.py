@@ -13,6 +13,7 @@ import cv2
 
 from zfcal.artifacts.frame_files import FRAMES
 from zfcal.artifacts.images import read_image
+from zfcal.artifacts.reading import Contents, one_content
 from zfcal.artifacts.validation import written_by_people
 from zfcal.errors import InputError
 from zfcal.online.below import Below
@@ -59,6 +60,8 @@ class Following:
         Of live cameras.
     resumed
         What is there of a live recording.
+    seen
+        What its lineage has seen of the files that it reads at its start.
     """
 
     def __init__(  # noqa: PLR0913 - one keyword for each of its surroundings
@@ -70,11 +73,13 @@ class Following:
         task: Task,
         clock: ArrivalClock | None = None,
         resumed: Resumed | None = None,
+        seen: Contents | None = None,
     ) -> None:
         self._plan = plan
         self._tell = tell
         self._clock = clock or ArrivalClock()
         self._resumed = resumed or Resumed()
+        self._seen = seen
         self._fps = plan.opened.trial.fps
         self._numbers = FrameClock(self._fps, after=self._resumed.last)
         self._fuser = Fuser(
@@ -118,12 +123,14 @@ class Following:
         plan = self._plan
         # A camera waits for nobody, and compiling takes twenty seconds on a first start.
         prepare()
-        overhead = open_feed(plan.opened, plan.overhead, self._clock)
-        below = self._open_below()
+        with one_content(self._seen):
+            overhead = open_feed(plan.opened, plan.overhead, self._clock)
+            below = self._open_below()
+            background = self._background(overhead)
         tracker = FishTracker(
             plan.options.tracker,
             overhead.projection,
-            background=self._background(overhead),
+            background=background,
             region=region_of(plan.opened.arena, overhead.projection),
         )
         drawing = Drawing(plan, overhead)

@@ -15,6 +15,7 @@ from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.located import join
 from zfcal.behaviour.scores import Scores
@@ -44,6 +45,7 @@ from zfcal.online.rounds import (
     summary_of,
 )
 from zfcal.online.segments import STEP_S, Segments, segment_path, segment_starts
+from zfcal.online.settled import settled
 from zfcal.parameters import Parameters, to_genes
 from zfcal.tracks import FISH
 
@@ -228,45 +230,54 @@ def calibrate_span(
     task
         How to go about it.
     """
-    task, segments, output = task or Task(), Segments(), span.output
-    opened = segments.open(root)
+    task = task or Task()
+    # First: where there is no trial no lock is to lie.
+    read_trial(root)
     with at_work(root, "calibrate", task):
-        control, starts = pooled_fish(opened, segments, span.train_s)
-        if span.held_out_s:
-            starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
-        expected = _lineage(opened, options, span, starts)
-        ignore = ("generations",) if options.budget_s is not None else ()
-        reason = reason_to_make(output, expected, task, tell, ignore=ignore)
-        if reason is None:
-            return
-        settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
-        group = make_group(opened, options)
-        estimated = None
-        if options.seed_likelihood:
-            estimated = estimate(opened, group.template, span.train_s, tell)
-        round_task = RoundTask(
-            group=group,
-            control=control,
-            guests=None if estimated is None else estimated.genes,
-            seeds=SeedSource(trial_seed=expected.seed or 0, window_end_s=span.train_s[1]),
-        )
-        checkpoint = output.with_name(f".{output.name}.checkpoint")
-        result = run_search(
-            round_task,
-            replace(options, settings=settings),
-            checkpoint,
-            tell,
-            key=checkpoint_key(expected),
-        )
-        judged = _judge(opened, span, result.champion, expected.seed or 0, segments)
-        baselines = baseline_scores(round_task, options, result)
-        likelihood = None if estimated is None else estimated.table
-        table = {**result_table(result, baselines, likelihood), **judged}
-        made = replace(expected, options={**expected.options, "generations": result.generations})
-        write_model(output, result.champion, made, table)
-        checkpoint.unlink(missing_ok=True)
-        tell(Made(path=output, reason=reason))
-        tell(Result(value={"path": str(output), **summary_of(result, baselines), **judged}))
+        settled(lambda: _calibrate_span(root, span, options, tell, task=task), tell)
+
+
+def _calibrate_span(
+    root: Path, span: Span, options: CalibrateOptions, tell: Tell, *, task: Task
+) -> None:
+    segments, output = Segments(), span.output
+    opened = segments.open(root)
+    control, starts = pooled_fish(opened, segments, span.train_s)
+    if span.held_out_s:
+        starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
+    expected = _lineage(opened, options, span, starts)
+    ignore = ("generations",) if options.budget_s is not None else ()
+    reason = reason_to_make(output, expected, task, tell, ignore=ignore)
+    if reason is None:
+        return
+    settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
+    group = make_group(opened, options)
+    estimated = None
+    if options.seed_likelihood:
+        estimated = estimate(opened, group.template, span.train_s, tell)
+    round_task = RoundTask(
+        group=group,
+        control=control,
+        guests=None if estimated is None else estimated.genes,
+        seeds=SeedSource(trial_seed=expected.seed or 0, window_end_s=span.train_s[1]),
+    )
+    checkpoint = output.with_name(f".{output.name}.checkpoint")
+    result = run_search(
+        round_task,
+        replace(options, settings=settings),
+        checkpoint,
+        tell,
+        key=checkpoint_key(expected),
+    )
+    judged = _judge(opened, span, result.champion, expected.seed or 0, segments)
+    baselines = baseline_scores(round_task, options, result)
+    likelihood = None if estimated is None else estimated.table
+    table = {**result_table(result, baselines, likelihood), **judged}
+    made = replace(expected, options={**expected.options, "generations": result.generations})
+    write_model(output, result.champion, made, table)
+    checkpoint.unlink(missing_ok=True)
+    tell(Made(path=output, reason=reason))
+    tell(Result(value={"path": str(output), **summary_of(result, baselines), **judged}))
 
 
 def _lineage(

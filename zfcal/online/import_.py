@@ -24,6 +24,7 @@ from zfcal.online.recording import (
     write_segments,
 )
 from zfcal.online.segments import segment_path
+from zfcal.online.settled import settled
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
 _LIMITS = {"n_fish", "n_robots"}
@@ -83,23 +84,30 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
     name = source.format or _guessed(source.path, tell)
     options = _options(opened, source.options)
     with at_work(root, "import", task):
-        lineage = _lineage(opened, source, name, options)
-        check_same_source(opened.trial, lineage, task)
-        starts = starts_of_recording(root)
-        if starts and not stale_segments(opened.trial, lineage, starts, task):
-            for start in starts:
-                tell(UpToDate(path=segment_path(root, start)))
-            return
-        tracks = _read(source, name, options, tell)
-        tell_outside(opened, tracks, tell)
-        tell_missing(opened, tracks, tell)
-        recording = Recording(
-            tracks=tracks,
-            end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
-            lineage=lineage,
-            extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
-        )
-        write_segments(opened.trial, recording, tell, task=task)
+        settled(lambda: _import(opened, source, (name, options), tell, task=task), tell)
+
+
+def _import(
+    opened: OpenTrial, source: Source, form: tuple[str, ImportOptions], tell: Tell, *, task: Task
+) -> None:
+    root, (name, options) = opened.trial.root, form
+    lineage = _lineage(opened, source, name, options)
+    check_same_source(opened.trial, lineage, task)
+    starts = starts_of_recording(root)
+    if starts and not stale_segments(opened.trial, lineage, starts, task):
+        for start in starts:
+            tell(UpToDate(path=segment_path(root, start)))
+        return
+    tracks = _read(source, name, options, tell)
+    tell_outside(opened, tracks, tell)
+    tell_missing(opened, tracks, tell)
+    recording = Recording(
+        tracks=tracks,
+        end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
+        lineage=lineage,
+        extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
+    )
+    write_segments(opened.trial, recording, tell, task=task)
 
 
 def _guessed(path: Path, tell: Tell) -> str:

@@ -12,6 +12,7 @@ from typing import TypeAlias, final
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
+from zfcal.artifacts.reading import check_contents
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import LeftOut, Made, Note, Tell, UpToDate
@@ -196,6 +197,8 @@ class Minutes:
 
     def _close(self, minute: _Minute, end_s: float, *, stretch: list[float] | None = None) -> None:
         root = self._opened.trial.root
+        # A file of poses that is closed counts as whole: it must be of what its lineage names.
+        check_contents()
         if minute.writer is not None:
             minute.writer.close()
         self._seen.add(minute.start_s)

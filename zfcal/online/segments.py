@@ -14,7 +14,7 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
-from zfcal.artifacts.reading import hash_of
+from zfcal.artifacts.reading import hash_of, one_content
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool
@@ -101,8 +101,9 @@ class Segments:
 
     def open(self, root: Path) -> OpenTrial:
         """Open a trial; as long as its arena file stays, it is the very same arena."""
-        opened = open_trial(root)
-        hashes = hash_inputs(root, opened.arena_files)
+        with one_content():
+            opened = open_trial(root)
+            hashes = hash_inputs(root, opened.arena_files)
         key = (str(root.absolute()), "".join(hashes.values()) or opened.trial.arena)
         arena = self._arenas.setdefault(key, opened.arena)
         return OpenTrial(trial=opened.trial, arena=arena)
@@ -116,10 +117,12 @@ class Segments:
             The file is damaged, of another schema, or holds what no tracker writes.
         """
         path = segment_path(opened.trial.root, start_s)
-        key = (str(path.absolute()), hash_of(path), *_clock(opened))
-        if key not in self._located:
-            self._located[key] = _locate(opened, path, start_s)
-            self._forget()
+        # What is remembered under a hash was read from the bytes that have it.
+        with one_content():
+            key = (str(path.absolute()), hash_of(path), *_clock(opened))
+            if key not in self._located:
+                self._located[key] = _locate(opened, path, start_s)
+                self._forget()
         return self._located[key]
 
     def _forget(self) -> None:

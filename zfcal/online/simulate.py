@@ -28,6 +28,7 @@ from zfcal.online.recording import (
     write_segments,
 )
 from zfcal.online.segments import segment_path
+from zfcal.online.settled import settled
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
 
@@ -99,23 +100,28 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
                 tell(Planned(path=segment_path(root, start), reason="missing"))
             return
         root = made.root
+    read_trial(root)
+    with at_work(root, "simulate", task):
+        settled(lambda: _simulate(root, options, tell, task=task, new=new), tell)
+
+
+def _simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task, new: bool) -> None:
     opened = open_trial(root)
     if not new:
         _check_existing(opened, options)
-    with at_work(root, "simulate", task):
-        lineage = _lineage(opened, options)
-        check_same_source(opened.trial, lineage, task)
-        starts = starts_between(0.0, options.duration_s)
-        if stale_segments(opened.trial, lineage, starts, task):
-            recording = Recording(
-                tracks=swim(opened, options),
-                end_s=options.duration_s,
-                lineage=lineage,
-            )
-            write_segments(opened.trial, recording, tell, task=task)
-            return
-        for start in starts:
-            tell(UpToDate(path=segment_path(root, start)))
+    lineage = _lineage(opened, options)
+    check_same_source(opened.trial, lineage, task)
+    starts = starts_between(0.0, options.duration_s)
+    if stale_segments(opened.trial, lineage, starts, task):
+        recording = Recording(
+            tracks=swim(opened, options),
+            end_s=options.duration_s,
+            lineage=lineage,
+        )
+        write_segments(opened.trial, recording, tell, task=task)
+        return
+    for start in starts:
+        tell(UpToDate(path=segment_path(root, start)))
 
 
 def new_trial(root: Path, options: SimulateOptions) -> NewTrial:

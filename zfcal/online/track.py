@@ -7,6 +7,7 @@ from pathlib import Path
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import POSES
+from zfcal.artifacts.reading import Contents, one_content
 from zfcal.online.events import Planned, Tell, UpToDate
 from zfcal.online.following import Following
 from zfcal.online.minutes import Origins, pose_files, poses_reason
@@ -14,6 +15,7 @@ from zfcal.online.opening import Task, at_work, open_trial, reason_to_make, tell
 from zfcal.online.recording import check_same_source, starts_between, stretch_of
 from zfcal.online.resuming import Resumed, begin_anew, resume
 from zfcal.online.segments import segment_path, segment_starts
+from zfcal.online.settled import settled
 from zfcal.online.sources import source_of
 from zfcal.online.track_plan import Plan, TrackOptions, plan_of
 from zfcal.vision.live import ArrivalClock
@@ -41,21 +43,31 @@ def track(root: Path, options: TrackOptions, tell: Tell, *, task: Task | None = 
         A video cannot be opened at all.
     """
     task = task or Task()
-    plan = plan_of(open_trial(root), options)
+    with one_content() as seen:
+        plan = plan_of(open_trial(root), options)
     with at_work(root, "track", task):
-        tracks = plan.lineage()
-        poses = dataclasses.replace(tracks, schema=POSES)
-        check_same_source(plan.opened.trial, tracks, task)
         if plan.is_live:
-            _follow_live(plan, tracks, poses, tell, task=task)
+            # What drives a camera is read once, at its start: an image never comes again.
+            with one_content(seen) as seen:
+                tracks = plan.lineage()
+            check_same_source(plan.opened.trial, tracks, task)
+            _follow_live(plan, (tracks, seen), tell, task=task)
             return
-        origins = Origins(tracks=tracks, poses=poses, is_live=False)
-        if is_done(plan, origins, tell, task=task):
-            return
-        if task.dry_run:
-            _tell_plan(plan, origins, tell, task=task)
-            return
-        Following(plan, origins, tell, task=task).run()
+        settled(lambda: _track(root, options, tell, task=task), tell)
+
+
+def _track(root: Path, options: TrackOptions, tell: Tell, *, task: Task) -> None:
+    plan = plan_of(open_trial(root), options)
+    tracks = plan.lineage()
+    poses = dataclasses.replace(tracks, schema=POSES)
+    check_same_source(plan.opened.trial, tracks, task)
+    origins = Origins(tracks=tracks, poses=poses, is_live=False)
+    if is_done(plan, origins, tell, task=task):
+        return
+    if task.dry_run:
+        _tell_plan(plan, origins, tell, task=task)
+        return
+    Following(plan, origins, tell, task=task).run()
 
 
 def is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
@@ -94,7 +106,8 @@ def _tell_plan(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> None:
         reason_to_make(path, origins.tracks, task, tell)
 
 
-def _follow_live(plan: Plan, tracks: Lineage, poses: Lineage, tell: Tell, *, task: Task) -> None:
+def _follow_live(plan: Plan, origin: tuple[Lineage, Contents], tell: Tell, *, task: Task) -> None:
+    tracks, seen = origin
     root = plan.opened.trial.root
     if task.dry_run:
         tell(Planned(path=root / "tracks", reason=f"{plan.overhead.source} is live"))
@@ -103,5 +116,6 @@ def _follow_live(plan: Plan, tracks: Lineage, poses: Lineage, tell: Tell, *, tas
         begin_anew(root, tell)
     resumed = Resumed() if task.force else resume(root, tell)
     clock = ArrivalClock(resumed.started_unix_s)
+    poses = dataclasses.replace(tracks, schema=POSES)
     origins = Origins(tracks=tracks, poses=poses, is_live=True)
-    Following(plan, origins, tell, task=task, clock=clock, resumed=resumed).run()
+    Following(plan, origins, tell, task=task, clock=clock, resumed=resumed, seen=seen).run()
