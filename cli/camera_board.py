@@ -108,9 +108,11 @@ def board(
 
     if (lies is None) != (at is None):
         raise click.UsageError("--lies and --at go together.")
+    if lies is None and where["side"] is not None:
+        raise click.UsageError("--seen-from is for a board that --lies in the tank.")
     known = None
     if lies is not None and at is not None:
-        down = face_down or where["name"] == "below"
+        down = face_down or (where["side"] or where["name"]) == "below"
         known = BoardAt(image=lies, x_m=at[0], y_m=at[1], angle_rad=at[2], face_down=down)
 
     def make() -> None:

@@ -35,11 +35,14 @@ def corners(
     In the order lower left, lower right, upper right, upper left as the arena
     has them (y up), however the camera is turned. The corners are those of
     the rectangle round the arena. A lens that bends lines needs more: points.
+    A camera below sees them in the opposite sense, through the floor.
 
     \b
     Example:
         zfcal camera corners 52,448 447,450 449,51 50,53 --size 500x500 \
             --trial trial --camera overhead
+        zfcal camera corners 148,62 503,68 496,424 140,416 --size 640x480 \
+            --trial trial --camera below
     """
     from zfcal.online.camera_corners import Corners, make_from_corners
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Command = Callable[..., None]
 
+SIDES = ("above", "below")
 
 figure_option = click.option(
     "--figure", type=PLACE, metavar="PNG", help="Draw the errors into this file."
@@ -60,7 +61,7 @@ def image_options(command: Command) -> Command:
 
 
 def place_options(command: Command) -> Command:
-    """Add -o, --trial, --camera and --figure: what `aim_of` takes."""
+    """Add -o, --trial, --camera, --seen-from and --figure: what `aim_of` takes."""
     for option in reversed(
         (
             click.option("-o", "--out", "place", type=PLACE, help="The camera file to write."),
@@ -70,6 +71,12 @@ def place_options(command: Command) -> Command:
                 "name",
                 type=click.Choice(["overhead", "below"]),
                 help="Which one of the trial it is.",
+            ),
+            click.option(
+                "--seen-from",
+                "side",
+                type=click.Choice(SIDES),
+                help="Where it looks from; default: below for --camera below, else above.",
             ),
             figure_option,
         )
@@ -87,7 +94,8 @@ def aim_of(where: Mapping[str, Any], image: Path | None = None) -> tuple[Place, 
         raise click.UsageError("Give -o FILE, or --trial TRIAL with --camera.")
     if (trial is None) != (name is None):
         raise click.UsageError("--trial and --camera go together.")
-    return place_for(out=out, trial=trial, name=name), task_of(where, image)
+    place = place_for(out=out, trial=trial, name=name, stated_side=where["side"])
+    return place, task_of(where, image)
 
 
 def task_of(where: Mapping[str, Any], image: Path | None = None) -> CameraTask:

@@ -55,7 +55,8 @@ def points(
     \b
     Example:
         zfcal camera points marks.csv --size 500x500 --trial trial --camera overhead
-        zfcal camera points marks.csv --lens below-lens.toml -o below.toml
+        zfcal camera points below-marks.csv --lens below-lens.toml \
+            -o below.toml --seen-from below
     """
     from zfcal.online.camera_points import Points, make_from_points
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .camera_options import SIDES
 from .durations import seconds
 from .options import EXISTING, PLACE, Command
 
@@ -25,6 +26,12 @@ _OPTIONS = (
         metavar='"X,Y X,Y X,Y X,Y"',
         help="Instead of --camera: pixels of the arena's lower left, lower right, upper right "
         "and upper left corner.",
+    ),
+    click.option(
+        "--seen-from",
+        "side",
+        type=click.Choice(SIDES),
+        help="Where the camera overhead looks from, if not from above.",
     ),
     click.option("--background", type=EXISTING, help="Image of the empty tank; default: learnt."),
     click.option(
@@ -69,6 +76,7 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
             source=given["overhead"],
             file=given["camera"],
             corners_px=_corners(given["corners"]),
+            side=given["side"],
         ),
         below=CameraChoice(source=given["below"], file=given["below_camera"]),
         tracker=TrackerOptions(

@@ -263,3 +263,68 @@ def test_a_lens_alone_is_no_camera_of_a_trial(zfcal, trial, tmp_path):
     done = zfcal("camera", "board", "a.png", *words)
     assert done.code == 1
     assert "not where the camera stands" in done.err
+
+
+MIRRORED = tuple(reversed(CORNERS))
+"""Upper left first, as images are read."""
+
+
+def mirrored_marks():
+    """Return marks whose metres count y down, as pixels do."""
+    rows = [line.split(",") for line in MARKS.splitlines()]
+    return "\n".join(
+        [",".join(rows[0]), *(f"{x},{y},{X},{100 - int(Y)}" for x, y, X, Y in rows[1:])]
+    )
+
+
+def test_corners_in_image_order_are_an_error_that_shows_the_right_one(zfcal, tmp_path):
+    """The numbers of its hint make the camera."""
+    words = ["--size", "500x500", "--bounds-m", "0,0,1,1", "-o", "c.toml"]
+    done = zfcal("camera", "corners", *MIRRORED, *words)
+    assert done.code == 1
+    assert "the arena is seen from below (mirrored), expected from above" in done.err
+    assert not (tmp_path / "c.toml").exists()
+    ready = done.err.partition("upright: '")[2].partition("'")[0].split()
+    assert tuple(ready) == CORNERS
+    assert zfcal("camera", "corners", *ready, *words).code == 0
+    there = read_camera(tmp_path / "c.toml").to_metres(np.array([50.0, 450.0]))
+    np.testing.assert_allclose(there, 0.0, atol=1e-6)
+
+
+def test_a_camera_below_mirrors_the_tank(zfcal, trial):
+    """By its name, or by what a person says; from above it would be wrong."""
+    words = ["--size", "500x500", "--trial", "trial", "--camera", "below"]
+    assert zfcal("camera", "corners", *MIRRORED, *words).code == 0
+    done = zfcal("camera", "corners", *CORNERS, *words)
+    assert done.code == 1
+    assert "seen from above (not mirrored), expected from below" in done.err
+    assert zfcal("camera", "corners", *CORNERS, *words, "--seen-from", "above").code == 0
+    words = ["--size", "500x500", "--bounds-m", "0,0,1,1", "-o", "c.toml"]
+    assert zfcal("camera", "corners", *MIRRORED, *words, "--seen-from", "below").code == 0
+
+
+@pytest.mark.parametrize("command", ["points", "import"])
+def test_points_that_count_y_down_are_an_error(zfcal, tmp_path, command):
+    """Unless the camera looks up through the floor."""
+    (tmp_path / "marks.csv").write_text(mirrored_marks())
+    rows = [line.split(",") for line in mirrored_marks().splitlines()[1:]]
+    points = "\n".join(
+        f"<point_{i}><xWorld>{X}</xWorld><yWorld>{Y}</yWorld>"
+        f"<xImage>{x}</xImage><yImage>{y}</yImage></point_{i}>"
+        for i, (x, y, X, Y) in enumerate(rows)
+    )
+    (tmp_path / "old.xml").write_text(OLD.format(points=points))
+    words = {"points": ["marks.csv", "--size", "500x500"], "import": ["old.xml"]}[command]
+    done = zfcal("camera", command, *words, "-o", "c.toml")
+    assert done.code == 1
+    assert "c.toml, by these points: the arena is seen from below (mirrored)" in done.err
+    assert "hint: Metres count y up" in done.err
+    assert not (tmp_path / "c.toml").exists()
+    assert zfcal("camera", command, *words, "-o", "c.toml", "--seen-from", "below").code == 0
+
+
+def test_a_lens_alone_looks_from_nowhere(zfcal):
+    """An option that cannot take effect is an error."""
+    words = ["--board", "9x6", "--square-mm", "25", "-o", "lens.toml", "--seen-from", "below"]
+    done = zfcal("camera", "board", "cli", *words)
+    assert done.code == 2

@@ -1,9 +1,16 @@
 """What the README and the samples promise."""
 
 import re
+import shlex
 import shutil
 
+import cv2
+import numpy as np
 import pytest
+
+from zfcal.artifacts.tables import read_tracks
+from zfcal.online.cameras import read_camera
+from zfcal.tracks import ROBOT
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +41,53 @@ def test_the_five_commands_run_on_the_samples(zfcal, readme, repository, tmp_pat
         done = zfcal(*line.replace("--budget 20s", "--budget 1s").split()[1:], "-q")
         assert done.code == 0, (line, done.err)
     assert (tmp_path / "trial" / "report" / "index.html").exists()
+
+
+@pytest.fixture
+def filmed(zfcal, tmp_path):
+    """Return a folder with what the README's cameras are asked about, and the truth of it."""
+    words = ["tank", "--arena", "two-rooms", "--fish", 4, "--robot", "--fps", 15]
+    assert zfcal("init", *words, "-q").code == 0
+    words = ["--model", "tank/models/000000.toml", "--duration", "15s", "--video-file", "day3.mp4"]
+    assert zfcal("simulate", "tank", *words, "-q").code == 0
+    x, y = np.meshgrid(np.linspace(0.06, 1.04, 5), np.linspace(0.06, 1.04, 5))
+    places = np.column_stack([x.ravel(), y.ravel()])
+    px = read_camera(tmp_path / "tank" / "cameras" / "below.toml").to_pixels(places)
+    rows = [f"{u:.1f},{v:.1f},{x:.3f},{y:.3f}" for (u, v), (x, y) in zip(px, places, strict=True)]
+    (tmp_path / "below-marks.csv").write_text("\n".join(["x_px,y_px,x_m,y_m", *rows]))
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_the_camera_commands_run_on_a_film_of_both_cameras(zfcal, readme, filmed):
+    """As they stand; the robot is told, and everybody is where the truth says, not mirrored."""
+    lines = commands_of(readme, "Camera images")
+    assert [line.split()[1] for line in lines] == ["init", "camera", "camera", "track"]
+    for line in lines:
+        done = zfcal(*shlex.split(line)[1:], "-q")
+        assert done.code == 0, (line, done.err)
+    assert cv2.imread(str(filmed / "worst.png")).shape[0] > 100
+    truth, found = (
+        read_tracks(filmed / name / "tracks" / "000000.parquet") for name in ("tank", "filmed")
+    )
+    away_m = [
+        np.hypot(*(np.array([truth.x_m[same], truth.y_m[same]]) - [[x], [y]])).min()
+        for x, y, same in zip(
+            found.x_m, found.y_m, found.frame[:, None] == truth.frame[None], strict=True
+        )
+    ]
+    assert np.quantile(away_m, 0.9) < 0.008
+    assert np.mean(found.kind == ROBOT) == pytest.approx(0.2, abs=0.03)
+
+
+def test_the_corners_in_the_documents_are_in_order(zfcal, repository):
+    """Every example makes a camera, of the one overhead and of the one below."""
+    assert zfcal("init", "trial", "--arena", "two-rooms", "--fish", 4, "--robot", "-q").code == 0
+    text = (repository / "docs" / "commands.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^    zfcal (camera corners .*--trial trial .*)$", text, re.MULTILINE)
+    assert len(lines) == 2
+    for line in lines:
+        assert zfcal(*line.split()).code == 0, line
 
 
 @pytest.mark.slow

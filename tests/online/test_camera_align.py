@@ -85,6 +85,17 @@ def test_a_dry_run_looks_at_no_image(trial):
     assert not (trial / "cameras" / "below-aligned.toml").exists()
 
 
+@pytest.mark.parametrize(("name", "found"), [("overhead", "below"), ("below", "above")])
+def test_a_camera_that_looks_from_the_wrong_side_is_refused(trial, name, found):
+    """A mirrored calibration cannot be turned into place."""
+    config = trial / "trial.toml"
+    other = {"overhead": "below", "below": "overhead"}[name]
+    text = config.read_text()
+    config.write_text(text.replace(f'"cameras/{name}.toml"', f'"cameras/{other}.toml"'))
+    with pytest.raises(InputError, match=rf"as the camera {name}: .* seen from {found}"):
+        aligned(trial)
+
+
 def test_a_trial_without_a_camera_says_what_to_do(trial):
     """Both have to be calibrated first."""
     config = trial / "trial.toml"

@@ -12,7 +12,7 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.errors import InputError
 from zfcal.online.camera_boards import BoardAt, BoardImages, make_from_boards
 from zfcal.online.camera_making import CameraTask, Place
-from zfcal.online.cameras import read_camera, read_lens
+from zfcal.online.cameras import read_camera, read_lens, stated_side
 from zfcal.online.events import LeftOut, Note, Result
 from zfcal.vision.boards import Board, draw_board
 from zfcal.vision.calibration import seen_from
@@ -100,6 +100,7 @@ def test_a_board_in_the_tank_gives_the_pose(shots, tmp_path, camera, face_down, 
     places = np.array([[0.05, 0.1], [0.15, 0.05], [0.1, 0.15]])
     np.testing.assert_allclose(found.to_metres(camera.to_pixels(places)), places, atol=1e-3)
     assert seen_from(found) == ("below" if face_down else "above")
+    assert stated_side(path) == ("below" if face_down else None)
 
 
 def test_images_without_a_board_or_damaged_are_named_and_left_out(shots, tmp_path):

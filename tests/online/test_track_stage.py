@@ -473,6 +473,43 @@ def test_a_calibration_of_another_camera_is_refused(new, film, tmp_path):
     assert not (root / "tracks").exists()
 
 
+MIRRORED = CORNERS[::-1]
+
+
+def test_corners_in_image_order_are_refused(new, film, paths):
+    """The tracks would be mirror images; with the side stated they are meant to be."""
+    root = new()
+    choice = CameraChoice(source=str(film), corners_px=MIRRORED)
+    with pytest.raises(InputError, match="seen from below") as caught:
+        track(root, TrackOptions(overhead=choice), say_nothing)
+    assert "'-0.5,199.5 199.5,199.5 199.5,-0.5 -0.5,-0.5'" in caught.value.hint
+    assert not (root / "tracks").exists()
+    stated = TrackOptions(overhead=replace(choice, side="below"), duration_s=6.0)
+    track(root, stated, say_nothing)
+    first = all_tracks(root)
+    x, y, _ = paths[0][0]
+    away_m = np.hypot(first.x_m[:3] - 0.002 * (x + 0.5), first.y_m[:3] - 0.002 * (y + 0.5))
+    assert away_m.min() < 0.002
+    assert read_lineage(root / "tracks" / "000000.parquet").options["seen_from"] == "below"
+
+
+@pytest.mark.parametrize(("said", "refused"), [(None, True), ("below", False)])
+def test_a_camera_file_that_mirrors_the_tank_is_refused(new, film, tmp_path, said, refused):
+    """Unless its lineage says that it looks up through the floor."""
+    path = tmp_path / "camera.toml"
+    camera = Homography(size_px=(200, 200), matrix=((0.002, 0, 0), (0, 0.002, 0), (0, 0, 1)))
+    lineage = Lineage(schema="zfcal.camera/1", command="camera", options={"seen_from": said})
+    write_camera(path, camera, lineage)
+    options = TrackOptions(overhead=CameraChoice(source=str(film), file=path), duration_s=6.0)
+    root = new()
+    if refused:
+        with pytest.raises(InputError, match=r"camera.toml, as the camera overhead: .*mirrored"):
+            track(root, options, say_nothing)
+    else:
+        track(root, options, say_nothing)
+    assert (root / "tracks").exists() != refused
+
+
 def test_more_blobs_than_fish_are_told_once(new, film, heard):
     """Two fish in trial.toml, three in the tank."""
     root = new(n_fish=2)

@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.frame_files import frame_segments
 from zfcal.artifacts.reading import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
-from zfcal.online.cameras import read_camera
+from zfcal.online.cameras import read_camera, stated_side
 from zfcal.online.events import Tell
 from zfcal.online.settled import settled
+from zfcal.online.rig import BELOW, OVERHEAD, check_view
 from zfcal.online.sources import source_of
 from zfcal.trial import Trial
 from zfcal.vision.alignment import Alignment, Spots, align_spots
@@ -90,6 +92,9 @@ def _align(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) ->
 
     def work() -> Calibration:
         overhead, below = read_camera(overhead_file), read_camera(below_file)
+        arena = load_arena(trial.arena, root)
+        check_view(overhead, overhead_file, OVERHEAD, arena)
+        check_view(below, below_file, BELOW, arena)
         blobs = overhead_spots(trial, sources["overhead"], overhead, recording)
         leds = below_spots(trial, sources["below"], below, recording)
         alignment = align_spots(blobs, leds)
@@ -100,7 +105,8 @@ def _align(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) ->
         options={"start_s": recording.start_s, "seconds": recording.seconds, "sources": sources},
         inputs=(overhead_file, below_file, *_files(sources.values())),
     )
-    place = Place(path=root / "cameras" / ALIGNED, root=root, name="below")
+    path = root / "cameras" / ALIGNED
+    place = Place(path=path, root=root, name=BELOW, stated_side=stated_side(below_file))
     make_camera(place, recipe, work, tell, task=task)
 
 

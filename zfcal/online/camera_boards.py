@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,7 @@ from zfcal.vision.boards import Board, draw_board, find_board
 from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_boards import LensCalibration, calibrate_lens
 from zfcal.vision.calibration_points import calibrate_pose
+from zfcal.vision.handedness import BELOW
 from zfcal.vision.lens import Floats, shown_size
 from zfcal.vision.pairs import Pairs
 from zfcal.vision.poses import View
@@ -96,6 +98,9 @@ def _from_boards(place: Place, given: BoardImages, tell: Tell, *, task: CameraTa
             hint="Write the lens with -o LENS.toml, then: zfcal camera points MARKS.csv --lens "
             "LENS.toml --trial TRIAL --camera ... (or say how a board lies: --lies).",
         )
+    if lies is not None and lies.face_down and place.stated_side is None and not place.name:
+        # Who sees its face looks up at it.
+        place = dataclasses.replace(place, stated_side=BELOW)
     board = given.board
     options: dict[str, Any] = {
         "board": [board.columns, board.rows],

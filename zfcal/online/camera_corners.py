@@ -11,7 +11,8 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.events import Tell
-from zfcal.vision.calibration import calibrate_corners
+from zfcal.vision.calibration import Calibration, calibrate_corners
+from zfcal.vision.handedness import check_corners
 
 Box = tuple[float, float, float, float]
 
@@ -58,7 +59,8 @@ def make_from_corners(place: Place, corners: Corners, tell: Tell, *, task: Camer
     Raises
     ------
     InputError
-        The corners do not determine a camera, or neither arena nor size is known.
+        The corners do not determine a camera or run the wrong way round, or neither arena nor
+        size is known.
     """
     bounds_m = _bounds(place, corners)
     size_px = size_of_images(corners.size_px, corners.image)
@@ -70,9 +72,13 @@ def make_from_corners(place: Place, corners: Corners, tell: Tell, *, task: Camer
             "size_px": list(size_px),
         },
     )
-    make_camera(
-        place, recipe, lambda: calibrate_corners(corners.px, bounds_m, size_px), tell, task=task
-    )
+
+    def work() -> Calibration:
+        found = calibrate_corners(corners.px, bounds_m, size_px)
+        check_corners(found.camera, corners.px, place.side)
+        return found
+
+    make_camera(place, recipe, work, tell, task=task)
 
 
 def size_of_images(size_px: tuple[int, int] | None, image: Path | None) -> tuple[int, int]:

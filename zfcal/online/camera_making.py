@@ -13,12 +13,13 @@ from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.settings import name_camera, read_trial
 from zfcal.errors import InputError
-from zfcal.online.cameras import write_camera
+from zfcal.online.cameras import SIDE_KEY, write_camera
 from zfcal.online.events import Made, Note, Result, Tell
 from zfcal.online.opening import Task, at_work, reason_to_make
 from zfcal.trial import CONFIG_NAME
 from zfcal.vision.calibration import Calibration
 from zfcal.vision.calibration_boards import LensCalibration
+from zfcal.vision.handedness import ABOVE, BELOW, check_side
 
 NAMES = ("overhead", "below")
 
@@ -54,16 +55,34 @@ class Place:
         The trial whose ``trial.toml`` is to name it; None for no trial.
     name
         What it is called there: ``overhead`` or ``below``.
+    stated_side
+        From where a person says that it looks: ``above`` or ``below``; None for no word.
     """
 
     path: Path
     root: Path | None = None
     name: str = ""
+    stated_side: str | None = None
 
     @property
     def base(self) -> Path:
         """What paths in the lineage are relative to."""
         return self.path.parent if self.root is None else self.root
+
+    @property
+    def side(self) -> str:
+        """From where it looks at the tank: as stated, or as its name says, or from above."""
+        return self.stated_side or usual_side(self.name)
+
+    @property
+    def unusual_side(self) -> str | None:
+        """From where it looks, if its name does not say so already."""
+        return None if self.side == usual_side(self.name) else self.side
+
+
+def usual_side(name: str) -> str:
+    """Return from where a camera of that name looks: ``below``, or ``above`` for any other."""
+    return BELOW if name == BELOW else ABOVE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,17 +103,19 @@ class Recipe:
     options: Mapping[str, JSON] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
 
-    def lineage(self, base: Path) -> Lineage:
+    def lineage(self, place: Place) -> Lineage:
         """Return the lineage of what it makes."""
         return Lineage(
             schema=SCHEMA,
             command=self.command,
-            options=self.options,
-            inputs=hash_inputs(base, self.inputs),
+            options={**self.options, SIDE_KEY: place.unusual_side},
+            inputs=hash_inputs(place.base, self.inputs),
         )
 
 
-def place_for(*, out: Path | None, trial: Path | None, name: str | None) -> Place:
+def place_for(
+    *, out: Path | None, trial: Path | None, name: str | None, stated_side: str | None = None
+) -> Place:
     """Return where a camera file goes: a path, or a trial's camera of that name.
 
     Raises
@@ -110,13 +131,14 @@ def place_for(*, out: Path | None, trial: Path | None, name: str | None) -> Plac
     if trial is None:
         if out is None or out.suffix != ".toml":
             raise InputError(f"{out}: a camera file is TOML.", hint="Let its name end in .toml.")
-        return Place(path=out)
+        return Place(path=out, stated_side=stated_side)
     if name not in NAMES:
         raise InputError(
             f"Which camera of {trial} is it?", hint=f"Give --camera with {' or '.join(NAMES)}."
         )
     read_trial(trial)
-    return Place(path=trial / "cameras" / f"{name}.toml", root=trial, name=name)
+    path = trial / "cameras" / f"{name}.toml"
+    return Place(path=path, root=trial, name=name, stated_side=stated_side)
 
 
 def make_camera(
@@ -137,11 +159,12 @@ def make_camera(
     task
         Whether to write, whether to do it again, and who draws the errors.
     """
-    lineage = recipe.lineage(place.base)
+    lineage = recipe.lineage(place)
     with nullcontext() if place.root is None else at_work(place.root, "camera", task):
         reason = reason_to_make(place.path, lineage, task, tell)
         if reason is not None:
             found = work()
+            _check_side(place, found)
             _write(place, found, lineage)
             tell(Made(path=place.path, reason=reason))
             if task.draw is not None:
@@ -149,6 +172,21 @@ def make_camera(
             _tell_result(found, tell)
         if place.root is not None and not task.dry_run:
             _name(place.root, place, tell)
+
+
+def _check_side(place: Place, found: Found) -> None:
+    if not isinstance(found, Calibration):
+        return
+    other = BELOW if place.side == ABOVE else ABOVE
+    look = "up through the floor" if other == BELOW else "down on the tank"
+    check_side(
+        found.camera,
+        place.side,
+        what=f"{place.path}, by these points",
+        near_px=found.pairs.px.mean(axis=0),
+        hint="Metres count y up, pixels y down: give the points' places in the arena's own axes. "
+        f"Or does this camera look {look}? Then say --seen-from {other}.",
+    )
 
 
 def _write(place: Place, found: Found, lineage: Lineage) -> None:
@@ -175,6 +213,8 @@ def _tell_result(found: Found, tell: Tell) -> None:
 def in_words(result: Mapping[str, Any]) -> str:
     """Return the errors of a calibration as a sentence."""
     parts = [f"{result['method']}, {result['n_points']} points"]
+    if "seen_from" in result:
+        parts.append(f"seen from {result['seen_from']}")
     for key, unit, words in (
         ("error_mm", "mm", "error"),
         ("left_out_mm", "mm", "of points left out"),

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from zfcal.artifacts.cameras import CameraFile, read_camera_file, write_camera_file
-from zfcal.artifacts.lineage import JSON, Lineage
-from zfcal.errors import InputError
+from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
+from zfcal.errors import DamagedError, InputError
 from zfcal.vision.camera import Camera, Homography
 from zfcal.vision.lens import Floats, Lens
 
 HOMOGRAPHY = "homography"
+
+SIDE_KEY = "seen_from"
+"""Option in the lineage of a camera that looks from another side than its name says."""
 
 
 def read_camera(path: Path) -> Camera | Homography:
@@ -61,6 +64,18 @@ def read_lens(path: Path) -> Lens:
         )
     with _named(path):
         return _lens_of(found)
+
+
+def stated_side(path: Path) -> str | None:
+    """Return from where a person said that a camera looks, when its file was made.
+
+    None where nothing was said, and for a file that was written by hand.
+    """
+    try:
+        said = read_lineage(path).options.get(SIDE_KEY)
+    except (DamagedError, InputError):
+        return None
+    return said if isinstance(said, str) else None
 
 
 def write_camera(

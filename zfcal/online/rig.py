@@ -12,11 +12,13 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.errors import InputError
-from zfcal.online.cameras import read_camera
+from zfcal.online.camera_making import usual_side
+from zfcal.online.cameras import read_camera, stated_side
 from zfcal.online.opening import OpenTrial
 from zfcal.online.sources import files_of, source_of
 from zfcal.vision.calibration import homography_from_corners
 from zfcal.vision.camera import Projection
+from zfcal.vision.handedness import check_corners, check_side
 from zfcal.vision.live import ArrivalClock
 from zfcal.vision.stamps import SAME_RATE, Shot, Source, check_rate, with_rate
 from zfcal.vision.video import is_live
@@ -40,11 +42,14 @@ class CameraChoice:
         Its calibration; None for that of ``trial.toml``.
     corners_px
         Pixels of the arena's four corners, in place of a calibration.
+    side
+        From where it looks: ``above`` or ``below``; None for what its file or its name says.
     """
 
     source: str | None = None
     file: Path | None = None
     corners_px: tuple[tuple[float, float], ...] | None = None
+    side: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,12 +66,15 @@ class View:
         Its calibration; None with corners.
     corners_px
         In place of a calibration.
+    side
+        From where it looks, as it was stated; None for what its file or its name says.
     """
 
     name: str
     source: str
     file: Path | None
     corners_px: tuple[tuple[float, float], ...] | None
+    side: str | None = None
 
     @property
     def is_live(self) -> bool:
@@ -93,11 +101,14 @@ class View:
         Raises
         ------
         InputError
-            The calibration is that of images of another size, or the corners make none.
+            The calibration is that of images of another size, or sees the tank from the wrong
+            side; or the corners make none.
         """
         if self.file is None:
             corners = np.array(self.corners_px, np.float64)
-            return homography_from_corners(corners, arena.outline.bounds, size_px)
+            found = homography_from_corners(corners, arena.outline.bounds, size_px)
+            check_corners(found, corners, self.side or usual_side(self.name))
+            return found
         camera = read_camera(self.file)
         if camera.size_px != size_px:
             has, got = (f"{w} x {h} px" for w, h in (camera.size_px, size_px))
@@ -106,7 +117,44 @@ class View:
                 f"{got}: it is the calibration of another camera, or of another setting.",
                 hint=f"Calibrate it with zfcal camera, or give its file with {_option(self)}.",
             )
+        check_view(camera, self.file, self.name, arena, side=self.side)
         return camera
+
+
+def check_view(
+    camera: Projection, file: Path, name: str, arena: Arena, *, side: str | None = None
+) -> None:
+    """Refuse a camera file by which the tank is mirrored and should not be, or the reverse.
+
+    Parameters
+    ----------
+    camera
+        What the file holds.
+    file
+        It, for the message and for the side that its lineage states.
+    name
+        ``overhead`` or ``below``.
+    arena
+        The tank.
+    side
+        From where it looks, as it was stated; None for what the file or the name says.
+
+    Raises
+    ------
+    InputError
+        It looks from the other side.
+    """
+    expected = side or stated_side(file) or usual_side(name)
+    again = f"zfcal camera corners or points, --camera {name}, says what is wrong"
+    stated = " --seen-from below, if it looks up through the floor." if name == OVERHEAD else ""
+    x, y = arena.outline.centroid.coords[0]
+    check_side(
+        camera,
+        expected,
+        what=f"{file}, as the camera {name}",
+        near_px=camera.to_pixels(np.array([x, y])),
+        hint=f"Tracks would be mirror images. Calibrate it again: {again}.{stated}",
+    )
 
 
 def _option(view: View) -> str:
@@ -141,7 +189,7 @@ def view_of(opened: OpenTrial, name: str, choice: CameraChoice) -> View | None:
             hint=f"Calibrate it with zfcal camera and set [cameras.{name}] file; or give "
             f"{'--camera FILE or --corners' if name == OVERHEAD else '--below-camera FILE'}.",
         )
-    return View(name=name, source=source, file=file, corners_px=choice.corners_px)
+    return View(name=name, source=source, file=file, corners_px=choice.corners_px, side=choice.side)
 
 
 def _placed(root: Path, source: str | None) -> str | None:

@@ -13,6 +13,7 @@ from zfcal.artifacts.tables import TRACKS
 from zfcal.errors import InputError
 from zfcal.online.opening import OpenTrial
 from zfcal.online.rig import BELOW, OVERHEAD, CameraChoice, View, view_of
+from zfcal.vision.handedness import ABOVE
 from zfcal.vision.robot import LedOptions
 from zfcal.vision.seen import TrackerOptions
 
@@ -123,6 +124,7 @@ class Plan:
             "start_s": options.start_s,
             "duration_s": options.duration_s,
             "corners_px": _pairs(self.overhead.corners_px),
+            "seen_from": None if self.overhead.side == ABOVE else self.overhead.side,
             "robot_as_fish": options.robot_as_fish or None,
             **_changed(options.tracker, TrackerOptions(n_agents=options.tracker.n_agents)),
             **{f"led_{key}": value for key, value in _changed(options.leds, LedOptions()).items()},

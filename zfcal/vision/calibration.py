@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zfcal.errors import InputError
-from zfcal.vision.camera import Camera, Homography, Projection
+from zfcal.vision.camera import Camera, Homography
+from zfcal.vision.handedness import seen_from
 from zfcal.vision.lens import Floats
 from zfcal.vision.pairs import Pairs
 
@@ -251,20 +252,6 @@ def calibrate_corners(
 ) -> Calibration:
     """Return `homography_from_corners` with what is known of its errors: nothing."""
     return calibrate_homography(_corner_pairs(corners_px, bounds_m, size_px))
-
-
-def seen_from(camera: Projection) -> str:
-    """Return ``above`` or ``below``: whether the arena's y runs up in the image or is mirrored.
-
-    It is judged in the middle of the image; ``unknown`` where that shows no part of the plane.
-    """
-    middle = np.array(camera.size_px) / 2
-    here, right, down = camera.to_metres(middle + np.array([[0, 0], [1, 0], [0, 1]]))
-    (a, b), (c, d) = right - here, down - here
-    turn = a * d - b * c
-    if np.isnan(turn):
-        return "unknown"
-    return "above" if turn < 0 else "below"
 
 
 def _corner_pairs(
