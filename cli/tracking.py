@@ -42,9 +42,13 @@ _OPTIONS = (
         help="shi-tomasi is the published one.",
     ),
     click.option("--harris", is_flag=True, help="Harris' corner measure."),
-    click.option("--light", is_flag=True, help="Fish are lighter than the tank."),
+    click.option("--light", "polarity", flag_value="light", help="Fish are lighter than the tank."),
+    click.option("--dark", "polarity", flag_value="dark", help="They are darker; default: learnt."),
+    click.option("--either", "polarity", flag_value="either", help="Some are, some are not."),
     click.option(
-        "--min-blob-px", type=click.FloatRange(min=0, min_open=True), help="Smallest blob."
+        "--min-blob-px",
+        type=click.FloatRange(min=0, min_open=True),
+        help="Smallest blob; default: learnt.",
     ),
     click.option("--led-hue", type=click.FloatRange(0, 360), help="Hue of the LEDs, in degrees."),
     click.option("--robot-as-fish", is_flag=True, help="No camera below: the robot is one more."),
@@ -70,7 +74,6 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
     from zfcal.vision.robot import LedOptions
     from zfcal.vision.seen import TrackerOptions
 
-    smallest = {} if given["min_blob_px"] is None else {"min_blob_px": given["min_blob_px"]}
     return TrackOptions(
         overhead=CameraChoice(
             source=given["overhead"],
@@ -80,7 +83,10 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
         ),
         below=CameraChoice(source=given["below"], file=given["below_camera"]),
         tracker=TrackerOptions(
-            method=given["method"], harris=given["harris"], light=given["light"], **smallest
+            method=given["method"],
+            harris=given["harris"],
+            polarity=given["polarity"],
+            min_blob_px=given["min_blob_px"],
         ),
         leds=LedOptions(hue_deg=given["led_hue"]),
         background=given["background"],

@@ -142,14 +142,97 @@ def test_light_that_fades_by_a_quarter_changes_nothing(drawn, tracker):
 
 
 def test_light_fish_in_a_dark_tank_are_tracked_where_that_is_said(drawn):
-    """The negative of a film, with light=True."""
+    """The negative of a film, with polarity="light"."""
     paths = drawn.circling(110)
-    tracker = FishTracker(TrackerOptions(n_agents=3, light=True), drawn.PROJECTION)
+    tracker = FishTracker(TrackerOptions(n_agents=3, polarity="light"), drawn.PROJECTION)
 
     told = [seen for _, seen in follow(tracker, drawn.frames(paths, tank=60.0, fish=160.0))]
 
     assert [len(seen) for seen in told] == [3] * 110
     assert max(errors_px(told[-1], paths[-1])) < 0.8
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_light_fish_are_tracked_as_dark_ones_are_without_a_word(drawn, method):
+    """The negative of a film: as sure, and at the same places to a fifth of a pixel."""
+    paths = drawn.circling(120)
+    dark = list(drawn.frames(paths))
+    light = [dataclasses.replace(frame, image=~frame.image) for frame in dark]
+    told = []
+    for frames, polarity in ((dark, "dark"), (light, "light")):
+        tracker = FishTracker(TrackerOptions(n_agents=3, method=method), drawn.PROJECTION)
+        told.append([seen for _, seen in follow(tracker, frames)])
+        assert tracker.polarity == polarity
+        assert tracker.take_bad_frames() == []
+    for one, other in zip(*told, strict=True):
+        assert len(one) == len(other) == 3
+        assert [s.confidence for s in other] == pytest.approx([s.confidence for s in one])
+        for a, b in zip(one, other, strict=True):
+            assert math.hypot(a.x_px - b.x_px, a.y_px - b.y_px) < 0.2
+
+
+def test_fish_of_both_kinds_are_tracked(drawn):
+    """One lighter than the tank, two darker: learnt, and found in every frame."""
+    paths = drawn.circling(120)
+    rng = np.random.default_rng(0)
+    frames = []
+    for number, bodies in enumerate(paths):
+        clean = 140.0 - 60.0 * drawn.coverage(bodies[:2]) + 60.0 * drawn.coverage(bodies[2:])
+        image = np.rint(clean + rng.normal(0, 1.5, clean.shape)).astype(np.uint8)
+        frames.append(Frame(number=number, time_s=number / 15, image=image))
+    tracker = FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION)
+    told = [seen for _, seen in follow(tracker, frames)]
+    assert tracker.polarity == "either"
+    assert [len(seen) for seen in told] == [3] * 120
+    assert max(errors_px(told[-1], paths[-1])) < 1.2
+
+
+@pytest.mark.parametrize(("fish", "wrong"), [(160.0, "dark"), (10.0, "light")])
+def test_nonsense_is_never_believed(drawn, fish, wrong):
+    """The wrong polarity was said: whatever is found, not one position is more than a guess."""
+    rng = np.random.default_rng(1)
+    paths = [
+        [(60 + 20 * math.cos(k / 9), 60 + 20 * math.sin(k / 9), k / 9 + 1.6), (140.0, y, 1.0)]
+        for k, y in enumerate(np.linspace(60, 140, 200) + rng.normal(0, 1, 200))
+    ]
+    options = TrackerOptions(n_agents=2, polarity=wrong)
+    tracker = FishTracker(options, drawn.PROJECTION)
+    frames = drawn.frames(paths, tank=60.0, fish=fish)
+    told = [s.confidence for _, seen in follow(tracker, frames) for s in seen]
+    assert tracker.learnt.polarity != tracker.polarity == wrong
+    assert max(told, default=0.0) < 0.5
+
+
+@pytest.mark.parametrize(("n_agents", "reason"), [(2, "unclaimed"), (4, "too few")])
+def test_another_number_of_animals_than_was_said_is_named_in_every_frame(drawn, n_agents, reason):
+    """Three in the tank; who is told is believed all the same."""
+    tracker = FishTracker(TrackerOptions(n_agents=n_agents), drawn.PROJECTION)
+    told = [seen for _, seen in follow(tracker, drawn.frames(drawn.circling(120)))]
+    bad = {b.number for b in tracker.take_bad_frames() if b.reason == reason}
+    assert bad == set(range(120))
+    assert min(s.confidence for seen in told[10:] for s in seen) == 1.0
+
+
+def test_a_fish_that_vanishes_into_another_s_blob_is_forced(drawn):
+    """Two tracks, and the blob of one: it is named, until the second one is given up."""
+    paths = [[(40.0 + k / 2, 100.0, 0.0), (160.0 - k / 2, 100.0, math.pi)] for k in range(118)]
+    paths += [[(99.0, 100.0, 0.0)]] * 6
+    tracker = FishTracker(TrackerOptions(n_agents=2), drawn.PROJECTION)
+    list(follow(tracker, drawn.frames(paths)))
+    bad = {b.number for b in tracker.take_bad_frames() if b.reason == "forced"}
+    assert {119, 120, 121} <= bad
+    assert min(bad) > 90
+
+
+@pytest.mark.parametrize("fish", [20.0, 160.0])
+def test_a_loaded_background_tells_at_the_first_sight(drawn, fish):
+    """Light or dark: the first frame with somebody in it is tracked at once."""
+    empty = background_of(drawn.image([], noise=0.0, tank=90.0))
+    tracker = FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION, background=empty)
+    paths = [[], [], *drawn.circling(5)]
+    told = [tracker.step(frame) for frame in drawn.frames(paths, tank=90.0, fish=fish)]
+    assert [len(seen) for seen in told[4:]] == [3] * 3
+    assert tracker.polarity == ("dark" if fish < 90 else "light")
 
 
 def test_with_a_loaded_background_the_first_frame_is_tracked_at_once(drawn):

@@ -19,6 +19,7 @@ from zfcal.errors import InputError
 from zfcal.online.below import Below
 from zfcal.online.drawing import Drawing
 from zfcal.online.events import Made, Progress, Tell
+from zfcal.online.learnt import LEARNT_KEY, as_before
 from zfcal.online.minutes import Minutes, Origins
 from zfcal.online.opening import Task
 from zfcal.online.outcome import Outcome, measured
@@ -94,7 +95,10 @@ class Following:
         self._minutes = Minutes(
             plan.opened,
             origins,
-            lambda tracks: measured(plan.opened.trial, tracks),
+            lambda tracks: {
+                **measured(plan.opened.trial, tracks),
+                LEARNT_KEY: dict(self._outcome.learnt),
+            },
             tell,
             task=task,
             revise=self._hindsight.revise,
@@ -127,8 +131,9 @@ class Following:
             overhead = open_feed(plan.opened, plan.overhead, self._clock)
             below = self._open_below()
             background = self._background(overhead)
+        options = as_before(plan.options.tracker, self._resumed.learnt)
         tracker = FishTracker(
-            plan.options.tracker,
+            options,
             overhead.projection,
             background=background,
             region=region_of(plan.opened.arena, overhead.projection),
@@ -139,6 +144,7 @@ class Following:
         try:
             for frame, seen in follow(tracker, self._frames(overhead, below, tracker)):
                 self._look_below(below, frame)
+                self._outcome.hear(tracker, asked=plan.options.tracker)
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
                 self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()), frame.time_s)
                 self._take(frame, seen, bad, drawing)

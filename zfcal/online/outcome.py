@@ -13,15 +13,19 @@ import numpy as np
 from zfcal.artifacts.lineage import JSON
 from zfcal.online.below import Below
 from zfcal.online.events import LeftOut, Note, Result, Tell
+from zfcal.online.learnt import learnt_by, notes_of
 from zfcal.online.rig import Feed
 from zfcal.online.stretch import NOISE_KEY
 from zfcal.online.track_plan import Plan
-from zfcal.online.tracker_noise import losses, tracker_noise
+from zfcal.online.tracker_noise import GUESS, losses, tracker_noise
 from zfcal.tracks import FISH, FramePoses, Tracks
 from zfcal.trial import Trial
 from zfcal.vision.frames import Frame, Image
+from zfcal.vision.learning import Learnt
 from zfcal.vision.robot import RobotSeen
+from zfcal.vision.seen import TrackerOptions
 from zfcal.vision.stamps import Tally
+from zfcal.vision.tracker import FishTracker
 
 _SAYS = {
     "black": "the image shows nothing (a lens cap, a lost signal, no light)",
@@ -36,6 +40,9 @@ _HINTS = {
     "too many": " Check n_fish and n_robots in trial.toml, or raise --min-blob-px.",
     "no LED": " Check their colour (--led-hue), and that the camera below sees the robot.",
 }
+_INEXACT = {"too few", "forced", "unclaimed"}
+"""Words of frames in which the animals were not all seen for themselves."""
+
 _NO_LED_S = 5.0
 _LATENCIES = 100_000
 """Latencies that are kept at most: two hours at 15 Hz."""
@@ -77,7 +84,11 @@ class Outcome:
         self._below: Below | None = None
         self._bad: Counter[str] = Counter()
         self._exact = 0
+        self._emitted = 0
+        self._guesses = self._rows = 0
+        self.learnt: Mapping[str, JSON] = {}
         self._told = 0
+        self._heard: Learnt | None = None
         self._before: Image | None = None
         self._last: tuple[int, float] | None = None
         self._led_s: float | None = None
@@ -89,6 +100,26 @@ class Outcome:
         self._feeds = [overhead] if below is None else [overhead, below.feed]
         self._tell_notes()
 
+    def hear(self, tracker: FishTracker, *, asked: TrackerOptions) -> None:
+        """Say what was learnt of the animals, once it is known or has become surer.
+
+        Parameters
+        ----------
+        tracker
+            Has learnt it.
+        asked
+            What a person said.
+        """
+        if tracker.learnt is None or tracker.learnt is self._heard:
+            return
+        self._heard = tracker.learnt
+        found = learnt_by(tracker, asked)
+        if found == self.learnt:
+            return
+        self.learnt = found
+        for note in notes_of(self._plan.overhead.source, found):
+            self._tell(note)
+
     def judge(
         self, frame: Frame, poses: FramePoses, bad: list[str], robot: RobotSeen | None
     ) -> tuple[str, ...]:
@@ -99,13 +130,26 @@ class Outcome:
         if self._last is not None and frame.number > self._last[0] + 1:
             words.append("after a gap")
         self._before, self._last = frame.image, (frame.number, frame.time_s)
-        self._exact += len(poses.agents) == self._plan.opened.trial.n_agents
+        self._weigh(poses, words)
         if self._leds_are_gone(frame, robot):
             words.append("no LED")
         for word in words:
             self._count(word, frame)
         self._tell_notes()
         return tuple(words)
+
+    def _weigh(self, poses: FramePoses, words: list[str]) -> None:
+        """Count a frame as exact where as many as there are were seen, each for itself.
+
+        As many rows are told as well of nonsense: those count whose blobs are as large as they
+        have to be, that are no guesses, and beside whom nothing like an animal is left over.
+        """
+        guesses = sum(agent.confidence < GUESS for agent in poses.agents)
+        self._rows += len(poses.agents)
+        self._guesses += guesses
+        emitted = len(poses.agents) == self._plan.opened.trial.n_agents
+        self._emitted += emitted
+        self._exact += emitted and not guesses and not _INEXACT & set(words)
 
     def took(self, seconds: float) -> None:
         """Note how long a frame took."""
@@ -121,9 +165,16 @@ class Outcome:
         self._tell(
             Note(
                 text=f"{name}: {self._tally}; {self._exact / frames:.1%} of them with exactly "
-                f"{n_agents} animals{'; ' if wrong else ''}{wrong}."
+                f"{n_agents} animals seen, none guessed or left over ({self._emitted / frames:.1%} "
+                f"with as many rows){'; ' if wrong else ''}{wrong}."
             )
         )
+        if self._guesses > self._rows / 2:
+            text = (
+                f"{name}: {self._guesses / self._rows:.0%} of the positions are guesses: what was "
+                "found is mostly not what animals look like. Look at --overlay or --contact-sheet."
+            )
+            self._tell(Note(text=text, warning=True))
         if self._bad["no background"]:
             text = (
                 f"{name}: no background was learnt, since no frame shows a tank: nobody was found. "
@@ -147,6 +198,9 @@ class Outcome:
             "gaps": self._tally.gaps,
             "duplicates": self._tally.duplicates,
             "exact": self._exact,
+            "as_many_rows": self._emitted,
+            "guesses": self._guesses,
+            "learnt": dict(self.learnt),
             "bad_frames": dict(self._bad),
             "leds": {} if self._below is None else dict(self._below.counts),
             "latency_ms": {

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.pose_files import read_clock
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import Note, Tell
+from zfcal.online.learnt import learnt_before
 from zfcal.online.minutes import Minutes, next_agent_of, pose_files, unfinished
 from zfcal.online.segments import STEP_S, segment_path, segment_starts
 from zfcal.tracks import FramePoses
@@ -28,11 +31,14 @@ class Resumed:
         Frames of the minutes that have poses and are not closed, by their start.
     next_agent
         The first agent id that is free.
+    learnt
+        What was known of the animals, as a closed segment has it; None for nothing.
     """
 
     started_unix_s: float | None = None
     minutes: dict[int, list[FramePoses]] | None = None
     next_agent: int = 0
+    learnt: Mapping[str, JSON] | None = None
 
     @property
     def last(self) -> tuple[int, float] | None:
@@ -52,7 +58,10 @@ def resume(root: Path, tell: Tell) -> Resumed:
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(started_s))
     tell(Note(text=f"{root}: goes on with the recording that began at {since}; anew with --force."))
     return Resumed(
-        started_unix_s=started_s, minutes=minutes, next_agent=next_agent_of(root, frames)
+        started_unix_s=started_s,
+        minutes=minutes,
+        next_agent=next_agent_of(root, frames),
+        learnt=learnt_before(root),
     )
 
 

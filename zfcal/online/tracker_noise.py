@@ -14,7 +14,7 @@ import numpy as np
 from zfcal.diagnose.noise import from_frames
 from zfcal.tracks import Tracks
 
-_GUESS = 0.5
+GUESS = 0.5
 _ALONE = 0.75
 """Confidence from which an animal was alone in its blob, and known for a while."""
 
@@ -71,5 +71,5 @@ def losses(tracks: Tracks, *, n_agents: int) -> dict[str, int]:
     return {
         "drops": int(np.maximum(n_agents - seen, 0).sum()),
         "suspected_swaps": int((tracks.frame[first] > frames[:1]).sum()),
-        "guesses": int((tracks.confidence < _GUESS).sum()),
+        "guesses": int((tracks.confidence < GUESS).sum()),
     }

@@ -1,6 +1,6 @@
 """The empty tank: learnt from frames or loaded, and what of a frame is not it.
 
-Fish are darker than the tank, or, where a tracker is told so, lighter: only one sign counts
+Fish are darker than the tank, or lighter, which `learning` tells: only one sign counts
 as foreground, so that the bright ghost left where a fish sat while the tank was learnt is
 none. The mixture of Gaussians is OpenCV's (Zivkovic 2004); once frozen, what it calls
 background is a range of greys per pixel, which is read off it by probing and costs a
@@ -25,6 +25,10 @@ Floats = NDArray[np.float32]
 LEARN_FRAMES = 100
 LEARN_RATE = 0.05
 """The published values."""
+
+DARK, LIGHT, EITHER = "dark", "light", "either"
+POLARITIES = (DARK, LIGHT, EITHER)
+"""What animals are, compared with the tank: darker, lighter, or one of both."""
 
 _BLACK = 12
 """A frame whose brightest hundredth is darker than this grey shows nothing."""
@@ -76,12 +80,36 @@ class Background:
             high=~self.low,
         )
 
+    def as_dark(self, polarity: str) -> Background:
+        """Return the tank in which animals of a polarity are dark, see `as_dark`."""
+        if polarity == LIGHT:
+            return self.inverted()
+        if polarity != EITHER:
+            return self
+        width = cv2.max(cv2.subtract(self.level, self.low), cv2.subtract(self.high, self.level))
+        white = np.full_like(self.level, 255)
+        low = cv2.subtract(white, width)
+        return Background(level=white, low=np.asarray(low, np.uint8), high=white)
+
     def gain(self, grey: Grey) -> float:
         """Return how much brighter than the empty tank an image is; 1 for equally bright.
 
         The median ratio over a coarse grid: fish cover less than half of a tank.
         """
         return median_ratio(whole(grey), whole(self.level), _GRID_PX // 2, _GRID_PX)
+
+
+def as_dark(grey: Grey, tank: Background, polarity: str) -> Grey:
+    """Return an image in which animals of a polarity are darker than the tank.
+
+    Its negative where they are lighter; where they are either, white less the difference.
+    """
+    if polarity == LIGHT:
+        return ~grey
+    if polarity == EITHER:
+        difference: Grey = np.asarray(cv2.absdiff(grey, tank.level), np.uint8)
+        return ~difference
+    return grey
 
 
 def whole(grey: Grey) -> Grey:
@@ -140,6 +168,7 @@ class BackgroundLearner:
         # The most frequent grey alone: beside it the mixture would count a fish that rests.
         self._mixture.setBackgroundRatio(0.5)
         self.samples: list[Grey] = []
+        self._probe: tuple[int, Background] | None = None
 
     @property
     def count(self) -> int:
@@ -172,28 +201,55 @@ class BackgroundLearner:
         self._count += 1
         return True
 
-    def freeze(self, *, light: bool = False) -> Background:
+    def freeze(self, polarity: str = DARK) -> Background:
         """Return what has been learnt.
 
         Parameters
         ----------
-        light
-            Whether fish are lighter than the tank.
+        polarity
+            What fish are, compared with the tank: one of `POLARITIES`.
 
         Raises
         ------
         InputError
             No frame was of use.
         """
+        if polarity == EITHER:
+            return self.usual()
+        light = polarity == LIGHT
+        learnt = self._learnt()
+        usual = _usual([self._some(sample) for sample in self.samples], light=light)
+        return _without_sitters(learnt, self._spread(usual, learnt.level), light=light)
+
+    def usual(self) -> Background:
+        """Return the tank as it was for half of the time, whatever the polarity of fish.
+
+        Raises
+        ------
+        InputError
+            No frame was of use.
+        """
+        learnt = self._learnt()
+        middle = len(self.samples) // 2
+        stack = np.stack([self._some(sample) for sample in self.samples])
+        level = self._spread(np.partition(stack, middle, axis=0)[middle], learnt.level)
+        low = cv2.subtract(level, cv2.subtract(learnt.level, learnt.low))
+        high = cv2.add(level, cv2.subtract(learnt.high, learnt.level))
+        return Background(
+            level=level, low=np.asarray(low, np.uint8), high=np.asarray(high, np.uint8)
+        )
+
+    def _learnt(self) -> Background:
+        """Return what the mixture calls the tank."""
         if not self.samples:
             raise InputError(
                 "No frame shows a tank to learn the background from.",
                 hint="All were black or of one grey; give an image with --background.",
             )
-        level = np.asarray(self._mixture.getBackgroundImage(), np.uint8)
-        usual = _usual([self._some(sample) for sample in self.samples], light=light)
-        learnt = self._whole(_probed(self._mixture, level))
-        return _without_sitters(learnt, self._spread(usual, learnt.level), light=light)
+        if self._probe is None or self._probe[0] != self._count:
+            level = np.asarray(self._mixture.getBackgroundImage(), np.uint8)
+            self._probe = self._count, self._whole(_probed(self._mixture, level))
+        return self._probe[1]
 
     def fits(self, grey: Grey) -> bool:
         """Return whether a frame is as large as the region and the frames before."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -67,8 +68,16 @@ def divide(
     for blob, trails, n, blob_areas in zip(blobs, thought, counts, areas, strict=True):
         for trail in trails:
             trail.crowd(blob_areas < _DOUBTED * len(trails))
-        found += _parts(blob, n, trails, usual, time_s)
+        parts = _parts(blob, n, trails, usual, time_s)
+        if _is_forced(blob_areas, n):
+            parts = (replace(part, is_forced=True) for part in parts)
+        found += parts
     return found
+
+
+def _is_forced(areas: float, n: int) -> bool:
+    """Return whether a blob is too small for n animals, or so large that it should hold more."""
+    return (n > 1 and areas < _DOUBTED * n) or areas >= n + 0.5
 
 
 def _areas(blob: Blob, trails: list[Trail], usual: Body) -> float:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from zfcal.vision.background import Background, Grey
 from zfcal.vision.detect import Blob, Contrast, Corners, Limits, compare, find_blobs
+from zfcal.vision.learning import Standing, pieces
 from zfcal.vision.seen import SILHOUETTE, TrackerOptions
 from zfcal.vision.usual import Body
 
@@ -39,6 +40,8 @@ class Finder:
         The empty tank, its negative where fish are light.
     region : ndarray of bool, shape (height, width), optional
         Where animals can be.
+    min_blob_px
+        Blobs of fewer pixels are dropped.
     """
 
     def __init__(
@@ -46,13 +49,17 @@ class Finder:
         options: TrackerOptions,
         background: Background,
         region: NDArray[np.bool_] | None = None,
+        *,
+        min_blob_px: float,
     ) -> None:
         self._options = options
+        self._min_blob_px = min_blob_px
         self.background = background
         self._region = None if region is None else (region * np.uint8(255)).astype(np.uint8)
         self._darkness = 0.0
         self._box = _box_of(background.low.shape, region)
         self._limits = Limits(outer=self._within(background.low), box=self._box)
+        self._lighter: Grey | None = None
 
     def find(self, grey: Grey, usual: Body) -> list[Blob]:
         """Return the blobs of an image that are dark enough for an animal.
@@ -68,10 +75,28 @@ class Finder:
             self._fit(usual.darkness)
         blobs = find_blobs(
             self._compared(grey),
-            min_blob_px=self._options.min_blob_px,
+            min_blob_px=self._min_blob_px,
             corners=self._corners,
         )
         return [blob for blob in blobs if not blob.darkness < _FAINT * usual.darkness]
+
+    def standing_out(self, grey: Grey) -> list[Standing]:
+        """Return what stands out of an image to either side as far as an animal has to.
+
+        Parameters
+        ----------
+        grey
+            As for `find`.
+        """
+        level, outer = self.background.level, self._limits.outer
+        if self._lighter is None:
+            limit = cv2.add(level, cv2.subtract(level, outer))
+            if self._region is not None:
+                limit = cv2.bitwise_or(limit, cv2.bitwise_not(self._region))
+            self._lighter = np.asarray(limit, np.uint8)
+        masks = cv2.compare(grey, outer, cv2.CMP_LT), cv2.compare(grey, self._lighter, cv2.CMP_GT)
+        found = [each for mask in masks for each in pieces(grey, level, np.asarray(mask, np.uint8))]
+        return [each for each in found if each.area_px >= self._min_blob_px]
 
     @property
     def _corners(self) -> Corners | None:
@@ -93,6 +118,7 @@ class Finder:
         if self._options.method == SILHOUETTE:
             inner = (level * (1 - _INNER * darkness)).astype(np.uint8)
         self._limits = Limits(outer=self._within(outer), inner=inner, box=self._box)
+        self._lighter = None
         self._darkness = darkness
 
 

@@ -158,7 +158,7 @@ class Trails:
         opening = self._next_id == 0
         taken = {match.detection for match in matches}
         for index, detection in enumerate(detections):
-            if index not in taken and self._is_animal(detection):
+            if index not in taken and self.is_animal(detection):
                 self._trails.append(Trail(self._new_id(), detection, time_s, opening=opening))
                 self._trails[-1].likeness = self._likeness(detection)
 
@@ -180,7 +180,8 @@ class Trails:
         area = min(area, 1 / area)
         return area * min(detection.blob.darkness / usual.darkness, 1.0)
 
-    def _is_animal(self, detection: Detection) -> bool:
+    def is_animal(self, detection: Detection) -> bool:
+        """Return whether a detection is as large and as dark as an animal has to be."""
         usual = self._bodies.usual
         small = detection.shape.area_px < _SMALL * usual.area_px
         return not small and not detection.blob.darkness < _FAINT * usual.darkness

@@ -10,13 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.errors import InputError
-from zfcal.vision.background import LEARN_FRAMES, LEARN_RATE
+from zfcal.vision.background import LEARN_FRAMES, LEARN_RATE, POLARITIES
 
 SHI_TOMASI = "shi-tomasi"
 SILHOUETTE = "silhouette"
 METHODS = (SHI_TOMASI, SILHOUETTE)
 
-Reason = Literal["no background", "black", "size", "light", "too many", "too few", "merged"]
+Reason = Literal[
+    "no background",
+    "black",
+    "size",
+    "light",
+    "too many",
+    "too few",
+    "merged",
+    "forced",
+    "unclaimed",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,11 +40,12 @@ class TrackerOptions:
     n_agents
         Fish and robots in the tank; None where that is not known.
     min_blob_px
-        Blobs of fewer pixels are dropped.
+        Blobs of fewer pixels are dropped; None to learn it from the first frames.
     harris
         Harris' corner measure in place of Shi and Tomasi's.
-    light
-        Whether fish are lighter than the tank.
+    polarity
+        What fish are, compared with the tank: ``dark``, ``light``, or ``either`` for animals of
+        both kinds; None to learn it from the first frames.
     learn_frames
         Frames from which the background is learnt.
     learn_rate
@@ -45,9 +56,9 @@ class TrackerOptions:
 
     method: str = SHI_TOMASI
     n_agents: int | None = None
-    min_blob_px: float = 12.0
+    min_blob_px: float | None = None
     harris: bool = False
-    light: bool = False
+    polarity: str | None = None
     learn_frames: int = LEARN_FRAMES
     learn_rate: float = LEARN_RATE
     coast_s: float = 1.0
@@ -58,7 +69,10 @@ class TrackerOptions:
         _require(
             self.n_agents is None or self.n_agents >= 1, "n_agents", "at least 1", self.n_agents
         )
-        _require(0 < self.min_blob_px < math.inf, "min_blob_px", "positive", self.min_blob_px)
+        smallest = self.min_blob_px
+        _require(smallest is None or 0 < smallest < math.inf, "min_blob_px", "positive", smallest)
+        known = self.polarity is None or self.polarity in POLARITIES
+        _require(known, "polarity", ", ".join(POLARITIES), self.polarity)
         _require(self.learn_frames >= 1, "learn_frames", "at least 1", self.learn_frames)
         _require(0 < self.learn_rate <= 1, "learn_rate", "in (0, 1]", self.learn_rate)
         _require(0 <= self.coast_s < math.inf, "coast_s", "0 or more seconds", self.coast_s)
@@ -136,7 +150,9 @@ class BadFrame:
     reason
         ``no background`` (none was learnt yet), ``black`` (the image shows nothing), ``size``
         (not the background's), ``light`` (far brighter or darker than the background),
-        ``too many`` or ``too few`` blobs, ``merged`` (several animals in one blob).
+        ``too many`` or ``too few`` blobs, ``merged`` (several animals in one blob), ``forced``
+        (a blob that was taken for more or fewer animals than it is large for), ``unclaimed`` (a
+        blob like an animal that belongs to none who is told).
     says
         What was found, in words.
     """

@@ -8,26 +8,32 @@ first frames, from which the background is learnt, are looked at twice (`follow`
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.vision.background import (
+    DARK,
+    LIGHT,
     Background,
     BackgroundLearner,
     Grey,
+    as_dark,
     grey_of,
     shows_nothing,
     whole,
 )
 from zfcal.vision.camera import Projection
+from zfcal.vision.detect import Blob
 from zfcal.vision.dividing import divide
+from zfcal.vision.doubting import Doubts
 from zfcal.vision.finding import Finder, soften
 from zfcal.vision.fitting import prepare
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
+from zfcal.vision.learning import Learnt, learn
 from zfcal.vision.plane import Plane
 from zfcal.vision.seen import BadFrame, Exchange, Reason, Seen, TrackerOptions
 from zfcal.vision.trail import Detection
@@ -40,6 +46,9 @@ _HELD = 500
 
 _SAME = 0.004
 """A change of brightness by half a grey is none."""
+
+_LOOK_EVERY = 15
+"""Frames from one look at what stands out to either side to the next."""
 
 _DARKEST, _LIGHTEST = 0.3, 3.0
 """Changes of brightness beyond which a frame is not compared with the background."""
@@ -58,6 +67,11 @@ class FishTracker:
         The empty tank; learnt from the first frames where it is None.
     region : ndarray of bool, shape (height, width), optional
         Where animals can be: what lies elsewhere, a reflection in a wall, is not looked at.
+
+    Attributes
+    ----------
+    learnt
+        What the first frames tell of the animals; None before they were looked at.
     """
 
     def __init__(
@@ -71,8 +85,14 @@ class FishTracker:
         self.options = options
         self._plane = Plane(projection, projection.size_px)
         self._region = region
+        self._is_loaded = background is not None
+        self._steps = 0
         self._learner = self._new_learner()
         self._finder: Finder | None = None
+        self._plain: Background | None = None
+        self._doubts = Doubts()
+        self._compared = 0
+        self.learnt: Learnt | None = None
         self._bodies = Bodies()
         self._trails = Trails(self._bodies, coast_s=options.coast_s, n_agents=options.n_agents)
         self._bad: list[BadFrame] = []
@@ -105,23 +125,59 @@ class FishTracker:
         """Take the background as it was learnt so far, where any frame was of use."""
         if self._finder is not None or not self._learner.count:
             return
-        light = self.options.light
-        finder = self._take(self._learner.freeze(light=light))
-        samples = [~grey if light else grey for grey in self._learner.samples]
+        samples = self._learner.samples
+        self._learn_from(samples, self._learner.usual())
+        background = self._learner.freeze(self.polarity)
+        finder = self._take(background)
+        samples = [as_dark(grey, background, self.polarity) for grey in samples]
         # The learner's frames are no longer needed: a second of them is as much as the rest.
         self._learner = self._new_learner()
         for _ in range(2):
             # Once for how dark animals are, and again with thresholds that fit.
             found = [finder.find(grey, self._bodies.usual) for grey in samples]
             self._bodies.start(found, self.options.n_agents)
+        for grey in samples:
+            self._doubts.look(finder.standing_out(grey))
+
+    @property
+    def polarity(self) -> str:
+        """What animals are taken for: as was said, or learnt, or darker where neither is known."""
+        told = self.options.polarity or (self.learnt and self.learnt.polarity)
+        return told or DARK
+
+    @property
+    def min_blob_px(self) -> float:
+        """The smallest blob: as was said, or learnt, or the usual one."""
+        if self.options.min_blob_px is not None:
+            return self.options.min_blob_px
+        return (self.learnt or Learnt()).min_blob_px
+
+    def _learn_from(self, frames: Sequence[Grey], tank: Background) -> None:
+        n = self.options.n_agents
+        self.learnt = learn(frames, tank, n_agents=n, region=self._region)
+
+    def _learn_on_sight(self, grey: Grey) -> None:
+        """Learn from a frame what animals are in a tank that was loaded, until one tells it."""
+        is_told = self.learnt is not None and self.learnt.polarity is not None
+        if self._plain is None or is_told or self._compared >= self.options.learn_frames:
+            return
+        if grey.shape == self._plain.level.shape and not shows_nothing(grey):
+            self._compared += 1
+            self._learn_from([soften(grey, self.options.method)], self._plain)
+            self._take(self._plain)
 
     def _new_learner(self) -> BackgroundLearner:
         options = self.options
         return BackgroundLearner(options.learn_frames, options.learn_rate, region=self._region)
 
     def _take(self, background: Background) -> Finder:
-        background = background.inverted() if self.options.light else background
-        self._finder = Finder(self.options, background, self._region)
+        self._plain = background
+        self._finder = Finder(
+            self.options,
+            background.as_dark(self.polarity),
+            self._region,
+            min_blob_px=self.min_blob_px,
+        )
         return self._finder
 
     def take_bad_frames(self) -> list[BadFrame]:
@@ -139,7 +195,9 @@ class FishTracker:
             self._note(frame, "no background", "the background is still being learnt")
             self.learn(frame)
             return []
-        grey = self._comparable(frame, self._finder.background)
+        if self._is_loaded:
+            self._learn_on_sight(whole(grey_of(frame.image)))
+        grey = self._comparable(frame)
         if grey is None:
             self._trails.forget(frame.time_s)
             return []
@@ -155,6 +213,9 @@ class FishTracker:
             time_s=frame.time_s,
         )
         self._trails.match(detections, frame.time_s)
+        if self._steps % _LOOK_EVERY == 0:
+            self._doubts.look(self._finder.standing_out(grey))
+        self._steps += 1
         seen = self._told(frame.time_s)
         self._judge(frame, detections, seen)
         return seen
@@ -164,8 +225,11 @@ class FishTracker:
             BadFrame(number=frame.number, time_s=frame.time_s, reason=reason, says=says)
         )
 
-    def _comparable(self, frame: Frame, background: Background) -> Grey | None:
+    def _comparable(self, frame: Frame) -> Grey | None:
         """Return a frame's grey as bright as the background; None where it cannot be."""
+        background, finder = self._plain, self._finder
+        if background is None or finder is None:
+            return None
         if frame.size_px != background.size_px:
             has, should = (f"{w} x {h}" for w, h in (frame.size_px, background.size_px))
             self._note(frame, "size", f"the image is {has} px, the background {should} px")
@@ -174,15 +238,17 @@ class FishTracker:
         if shows_nothing(grey):
             self._note(frame, "black", "the image shows nothing")
             return None
-        if self.options.light:
-            grey = ~grey
+        light = self.polarity == LIGHT
+        if light:
+            grey, background = ~grey, finder.background
         gain = background.gain(grey)
         if not _DARKEST < gain < _LIGHTEST:
             self._note(frame, "light", f"the image is {gain:.2g} times as bright as the background")
             return None
         if abs(gain - 1) >= _SAME:
             grey = np.asarray(cv2.convertScaleAbs(grey, alpha=1 / gain), np.uint8)
-        return soften(grey, self.options.method)
+        grey = soften(grey, self.options.method)
+        return grey if light else as_dark(grey, background, self.polarity)
 
     def _told(self, time_s: float) -> list[Seen]:
         seen = self._trails.told(time_s)
@@ -199,7 +265,7 @@ class FishTracker:
                 x_m=x_m,
                 y_m=y_m,
                 heading_rad=math.atan2(ahead_m[1] - y_m, ahead_m[0] - x_m),
-                confidence=trail.confidence(usual),
+                confidence=trail.confidence(usual) * self._trust(trail.blob),
                 x_px=trail.xy[0],
                 y_px=trail.xy[1],
                 contour_px=trail.blob.contour,
@@ -212,6 +278,13 @@ class FishTracker:
             if math.isfinite(x_m) and math.isfinite(y_m)
         ]
 
+    def _trust(self, blob: Blob) -> float:
+        """Return how far a blob can be believed to be more than noise."""
+        if self._finder is None:
+            return 1.0
+        columns, rows = blob.pixels.astype(np.intp).T
+        return self._doubts.trust(float(blob.shares @ self._finder.background.level[rows, columns]))
+
     def _judge(self, frame: Frame, detections: list[Detection], seen: list[Seen]) -> None:
         """Note what is not as it should be in a frame that could be looked at."""
         n = self.options.n_agents
@@ -222,6 +295,12 @@ class FishTracker:
         most = max((detection.shared for detection in detections), default=1)
         if most > 1:
             self._note(frame, "merged", f"{most} animals in one blob")
+        forced = sum(detection.is_forced for detection in detections)
+        if forced:
+            self._note(frame, "forced", f"{forced} animals in blobs that are not as large")
+        animals = sum(map(self._trails.is_animal, detections))
+        if n is not None and animals > len(seen):
+            self._note(frame, "unclaimed", f"{animals} blobs like animals, {len(seen)} are told")
 
 
 def follow(tracker: FishTracker, frames: Iterable[Frame]) -> Iterator[tuple[Frame, list[Seen]]]:

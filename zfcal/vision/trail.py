@@ -48,12 +48,15 @@ class Detection:
         How many animals are in that.
     own_darkness
         Of its part of a blob that others share; NaN where it was not told apart.
+    is_forced
+        Whether the blob is not as large as those are together who are taken to be in it.
     """
 
     shape: Shape
     blob: Blob
     shared: int = 1
     own_darkness: float = math.nan
+    is_forced: bool = False
 
     @property
     def darkness(self) -> float:
