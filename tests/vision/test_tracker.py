@@ -171,6 +171,20 @@ def test_light_fish_are_tracked_as_dark_ones_are_without_a_word(drawn, method):
             assert math.hypot(a.x_px - b.x_px, a.y_px - b.y_px) < 0.2
 
 
+@pytest.mark.parametrize("negative", [False, True])
+def test_fish_two_pixels_wide_are_tracked(drawn, negative):
+    """Opening would drop them, and twelve pixels are more than some have."""
+    paths, shape = drawn.circling(120), drawn.outline(length=9.0, width=1.5)
+    frames = list(drawn.frames(paths, shape=shape, noise=1.0))
+    if negative:
+        frames = [dataclasses.replace(frame, image=~frame.image) for frame in frames]
+    tracker = FishTracker(TrackerOptions(n_agents=3), drawn.PROJECTION)
+    told = [seen for _, seen in follow(tracker, frames)]
+    assert tracker.min_blob_px < 6
+    assert [len(seen) for seen in told] == [3] * 120
+    assert max(errors_px(told[-1], paths[-1])) < 1.2
+
+
 def test_fish_of_both_kinds_are_tracked(drawn):
     """One lighter than the tank, two darker: learnt, and found in every frame."""
     paths = drawn.circling(120)

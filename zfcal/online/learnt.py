@@ -22,8 +22,8 @@ LEARNT_KEY = "learnt"
 FILM, OPTION, BEFORE, DEFAULT = "film", "option", "before", "default"
 """How a value is known: by the first images, by a person, by an earlier segment, or not at all."""
 
-_SMALL_PX = 40.0
-"""Bodies of fewer pixels, two pixels wide, lose parts when the foreground is opened."""
+_SMALL_PX = 15.0
+"""Bodies of fewer pixels are hardly more than a blurred point: their axis is that of the noise."""
 
 _SAYS = {DARK: "darker than the tank", LIGHT: "lighter than the tank", EITHER: "of both kinds"}
 
@@ -134,6 +134,6 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
     if isinstance(learnt["area_px"], float) and learnt["area_px"] < _SMALL_PX:
         yield Note(
             text=f"{source}: animals are {learnt['area_px']:.0f} px small; below {_SMALL_PX:.0f} "
-            "px many are missed. Take images of a higher resolution.",
+            "px many are missed, and headings are a guess. Take images of a higher resolution.",
             warning=True,
         )

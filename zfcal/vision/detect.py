@@ -134,6 +134,8 @@ class Contrast:
         Left and top of that part.
     inner : ndarray of uint8, shape (height, width), optional
         What is darker surely is animal.
+    opened
+        Whether, without ``inner``, what does not outlast opening is noise.
     """
 
     grey: Grey
@@ -141,6 +143,7 @@ class Contrast:
     mask: Grey
     corner: tuple[int, int]
     inner: Grey | None = None
+    opened: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,12 +156,15 @@ class Limits:
         What is darker may be, if it hangs together with what surely is.
     inner : ndarray of uint8, shape (height, width), optional
         What is darker surely is; without, what is left of the foreground when it is opened.
+    opened
+        Whether it is opened; bodies less than three pixels wide would not outlast that.
     box
         Rows and columns that hold all of what may be, and two pixels more.
     """
 
     outer: Grey
     inner: Grey | None = None
+    opened: bool = True
     box: tuple[slice, slice] = (slice(None), slice(None))
 
 
@@ -175,6 +181,7 @@ def compare(grey: Grey, background: Background, limits: Limits) -> Contrast:
         mask=np.asarray(mask, np.uint8),
         corner=(limits.box[1].start or 0, limits.box[0].start or 0),
         inner=limits.inner,
+        opened=limits.opened,
     )
 
 
@@ -245,6 +252,8 @@ class _Piece:
 
     def _has_core(self, view: Contrast) -> bool:
         """Return whether something of it is surely not the tank; it is noise without."""
+        if view.inner is None and not view.opened:
+            return True
         if view.inner is None:
             left, top = view.corner
             return outlasts_opening(view.mask, self.inside, self.left - left, self.top - top)

@@ -42,6 +42,8 @@ class Finder:
         Where animals can be.
     min_blob_px
         Blobs of fewer pixels are dropped.
+    opened
+        Whether the foreground is opened, as is right for bodies three pixels wide.
     """
 
     def __init__(
@@ -51,14 +53,16 @@ class Finder:
         region: NDArray[np.bool_] | None = None,
         *,
         min_blob_px: float,
+        opened: bool = True,
     ) -> None:
         self._options = options
         self._min_blob_px = min_blob_px
+        self._opened = opened
         self.background = background
         self._region = None if region is None else (region * np.uint8(255)).astype(np.uint8)
         self._darkness = 0.0
         self._box = _box_of(background.low.shape, region)
-        self._limits = Limits(outer=self._within(background.low), box=self._box)
+        self._limits = Limits(outer=self._within(background.low), opened=opened, box=self._box)
         self._lighter: Grey | None = None
 
     def find(self, grey: Grey, usual: Body) -> list[Blob]:
@@ -117,7 +121,9 @@ class Finder:
         inner = None
         if self._options.method == SILHOUETTE:
             inner = (level * (1 - _INNER * darkness)).astype(np.uint8)
-        self._limits = Limits(outer=self._within(outer), inner=inner, box=self._box)
+        self._limits = Limits(
+            outer=self._within(outer), inner=inner, opened=self._opened, box=self._box
+        )
         self._lighter = None
         self._darkness = darkness
 

@@ -28,6 +28,9 @@ _SHARE_OF_BODY = 0.15
 _LEAST_PX = 4.0
 """A blob that a body leaves in one pixel, blurred; less cannot be told from noise."""
 
+_THIN_PX = 45.0
+"""Area of a body five times as long as wide, as zebrafish are from above, and three pixels wide."""
+
 _TOLD = 0.9
 """Share of what stands out that has to be of one sign."""
 
@@ -84,6 +87,11 @@ class Learnt:
     light_share: float = float("nan")
     area_px: float = float("nan")
     n_frames: int = 0
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether bodies are less than three pixels wide, so that opening would drop them."""
+        return self.area_px < _THIN_PX
 
     @property
     def min_blob_px(self) -> float:

@@ -177,6 +177,7 @@ class FishTracker:
             background.as_dark(self.polarity),
             self._region,
             min_blob_px=self.min_blob_px,
+            opened=not (self.learnt is not None and self.learnt.is_thin),
         )
         return self._finder
 
