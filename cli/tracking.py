@@ -42,9 +42,9 @@ _OPTIONS = (
         help="shi-tomasi is the published one.",
     ),
     click.option("--harris", is_flag=True, help="Harris' corner measure."),
-    click.option("--light", "polarity", flag_value="light", help="Fish are lighter than the tank."),
-    click.option("--dark", "polarity", flag_value="dark", help="They are darker; default: learnt."),
-    click.option("--either", "polarity", flag_value="either", help="Some are, some are not."),
+    click.option("--light", is_flag=True, help="Fish are lighter than the tank."),
+    click.option("--dark", is_flag=True, help="They are darker; default: learnt."),
+    click.option("--either", is_flag=True, help="Some are lighter, some darker."),
     click.option(
         "--min-blob-px",
         type=click.FloatRange(min=0, min_open=True),
@@ -85,7 +85,7 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
         tracker=TrackerOptions(
             method=given["method"],
             harris=given["harris"],
-            polarity=given["polarity"],
+            polarity=_polarity(given),
             min_blob_px=given["min_blob_px"],
         ),
         leds=LedOptions(hue_deg=given["led_hue"]),
@@ -96,6 +96,14 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
         record=given["record"],
         pictures=Pictures(overlay=given["overlay"], contact_sheet=given["contact_sheet"]),
     )
+
+
+def _polarity(given: dict[str, Any]) -> str | None:
+    """Return what fish are said to be, compared with the tank; None for no word."""
+    said = [name for name in ("light", "dark", "either") if given[name]]
+    if len(said) > 1:
+        raise click.UsageError(f"{' and '.join(f'--{name}' for name in said)}: give one of them.")
+    return said[0] if said else None
 
 
 def _corners(text: str | None) -> tuple[tuple[float, float], ...] | None:

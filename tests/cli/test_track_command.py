@@ -117,6 +117,24 @@ def test_corners_are_eight_numbers(zfcal, tank, film, corners):
     assert "eight numbers" in done.err
 
 
+def test_fish_are_said_to_be_one_thing(zfcal, tank, film):
+    """Of two words one could not take effect."""
+    done = zfcal(*words(film), "--light", "--dark")
+    assert done.code == 2
+    assert "--light and --dark: give one of them" in done.err
+
+
+def test_a_word_against_the_film_is_told(zfcal, tank, film):
+    """In a warning, and in the numbers; the word wins."""
+    document = json.loads(zfcal(*words(film), "--duration", "30s", "--light", "--json").out)
+    (numbers,) = document["results"]
+    assert numbers["learnt"]["polarity"] == "light"
+    assert numbers["learnt"]["film_polarity"] == "dark"
+    assert numbers["exact"] == 0
+    warned = " ".join(note["text"] for note in document["messages"] if note["level"] == "warning")
+    assert "--light was given, but the film shows animals that are darker" in warned
+
+
 def test_the_methods_are_those_of_the_tracker():
     """The command line knows them without loading it."""
     assert tracking.METHODS == METHODS
