@@ -27,7 +27,7 @@ _spec.loader.exec_module(driven)
 class Ear:
     """A line at whose end somebody notes what is said."""
 
-    is_open, n_opened = True, 1
+    is_open, is_guarded, n_opened = True, True, 1
 
     def __init__(self):
         self.heard = []
@@ -40,6 +40,9 @@ class Ear:
     def read(self):
         """Hear nothing."""
         return b""
+
+    def beat(self, until_s):
+        """Hear until when the robot may move."""
 
 
 @pytest.fixture(scope="module")

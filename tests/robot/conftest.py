@@ -12,6 +12,7 @@ class MemoryLine:
 
     def __init__(self):
         self.is_open = True
+        self.is_guarded = True
         self.n_opened = 1
         self.sent = []
         self.incoming = b""
@@ -26,6 +27,9 @@ class MemoryLine:
         """Return what was put into `incoming`."""
         said, self.incoming = self.incoming, b""
         return said
+
+    def beat(self, until_s):
+        """Hear until when the robot may move."""
 
     def close(self):
         """Close it."""

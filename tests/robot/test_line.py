@@ -13,7 +13,7 @@ import time
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.robot import events, lastword
+from zfcal.robot import events
 from zfcal.robot.body import Pose, Wheels
 from zfcal.robot.events import Said
 from zfcal.robot.faults import Complaints
@@ -171,7 +171,7 @@ def test_a_line_that_says_it_takes_bytes_and_takes_none_is_lost(monkeypatch):
         raise BlockingIOError
 
     with monkeypatch.context() as patch:
-        patch.setattr("zfcal.robot.port.os.write", take_none)
+        patch.setattr("zfcal.robot.lastword.os.write", take_none)
         assert not line.write(bytes(10))
     assert 1 <= len(tried) <= 10
     assert "timeout" in line.problem
@@ -270,9 +270,109 @@ def test_stop_is_the_last_word_of_a_driver_that_is_killed(start_virtual, until, 
     assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
 
 
-def test_the_last_word_is_stop():
-    """Written out there, since that process imports nothing."""
-    assert events.stop().encode() == lastword.STOP
+BEATING = """
+import sys, time
+from zfcal.robot.body import Wheels
+from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.port import SerialLine
+line = SerialLine(sys.argv[1])
+line.wait(5)
+bot = FishBot("F", line)
+with Watchdog(bot) as watchdog:
+    while True:
+        watchdog.fresh()
+        bot.send(bot.frame_for(Wheels(left_m_s=0.2, right_m_s=0.2)))
+        print("sent", flush=True)
+        time.sleep(0.05)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGTSTP])
+def test_a_driver_that_is_stopped_does_not_leave_the_wheels_turning(start_virtual, until, number):
+    """By Ctrl-Z or by SIGSTOP: STOP comes when the last pose expires; on SIGCONT it drives on."""
+    robot = start_virtual("--noise", "0", "--lag-s", "0")
+    words = [sys.executable, "-c", BEATING, str(robot.port)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, process_group=0) as process:
+        for _ in range(10):
+            process.stdout.readline()
+        moving = robot.control.ask("heard")
+        os.kill(process.pid, number)
+        first = []
+        assert until(lambda: first.extend(stops(robot)) or first, patience_s=2.0)
+        assert first[0] - moving["heard"][-1][0] < 0.6 + SLACK_S
+        assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
+        heard(robot)
+        time.sleep(0.35)
+        # Again and again: a command that was on its way lasts a tick.
+        assert set(found := heard(robot)) == {STOP}
+        assert 2 <= len(found) <= 5
+        os.kill(process.pid, signal.SIGCONT)
+        assert until(lambda: robot.control.ask("pose")["left_m_s"] == pytest.approx(0.2))
+        process.kill()
+
+
+SLACK_S = 0.1
+"""The helper is a process among others: it has to get a processor, as has the robot."""
+
+
+def stops(robot):
+    """Return the times at which a virtual robot has heard STOP."""
+    return [time_s for time_s, frame in robot.control.ask("heard")["heard"] if frame == STOP]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_helper_that_is_lost_is_missed_and_replaced(start_virtual, until, number):
+    """Killed, it is missed at the next look; one that hangs, in half a second. STOP is said."""
+    robot = start_virtual("--noise", "0", "--lag-s", "0")
+    line = connected(robot, until)
+    bot = FishBot("F", line)
+    assert drive(bot)
+    first = line._helper.pid
+    os.kill(first, number)
+    lost_s = time.monotonic()
+    assert until(lambda: not line.is_guarded, patience_s=2.0)
+    assert time.monotonic() - lost_s < (0.1 if number == signal.SIGKILL else 0.6) + SLACK_S
+    assert until(lambda: line.is_guarded)
+    assert line._helper.pid != first
+    assert until(lambda: STOP in heard(robot))
+    # The new one is as good as the first.
+    line.beat(time.monotonic() + 0.1)
+    assert drive(bot)
+    assert until(lambda: STOP in heard(robot))
+    bot.close()
+
+
+def test_a_helper_that_hears_no_driver_any_more_is_not_left_behind(start_virtual, until):
+    """Also one that is stopped itself when the line is closed."""
+    robot = start_virtual()
+    line = connected(robot, until)
+    helper = line._helper.pid
+    os.kill(helper, signal.SIGSTOP)
+    line.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(helper, 0)
+
+
+def test_wheel_speeds_are_not_sent_when_the_pose_expired_meanwhile(line):
+    """Between the decision and the write; if it expired during the write, STOP follows."""
+    now_s = [10.0]
+    bot = FishBot("F", line, clock=lambda: now_s[0])
+    bot.release(10.5)
+    frame = bot.frame_for(GO)
+    now_s[0] = 10.6
+    assert not bot.send(frame)
+    assert line.sent == []
+    bot.release(11.1)
+    write = line.write
+
+    def slow(data):
+        now_s[0] += 1.0
+        return write(data)
+
+    line.write = slow
+    assert bot.send(frame)
+    assert [data.hex() for data in line.sent] == [frame.encode().hex(), STOP]
+    assert bot.is_held
 
 
 def test_a_lost_supply_is_one_that_is_told_for_three_seconds():

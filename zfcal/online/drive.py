@@ -268,6 +268,7 @@ class _Loop:
         self._nothing = threading.Event()
         self._size = (-1, -1)
         self._searched_s = 0.0
+        self._looked_s = self._before_s = time.monotonic()
         self._first_s: float | None = None
         self._tell, self._told_s = tell, 0.0
         self._quiet_since_s = time.monotonic()
@@ -284,7 +285,8 @@ class _Loop:
                 self._check_logs(batch[-1].time_s)
             # On the poses' clock each frame has its own ticks; a live one has the newest frame's.
             for frames in [batch] if self._crew.clock.is_live else [[f] for f in batch]:
-                self._driver.take(frames, age_s=self._age_s() if frames else None)
+                age_s = self._age_s() if frames else None
+                self._driver.take(frames, age_s=age_s, looked_s=self._since_look_s())
                 self._driver.tick()
                 self._crew.log.flush()
                 self._step_virtual()
@@ -314,6 +316,7 @@ class _Loop:
     def _poll(self) -> list[Any]:
         """Read on where the file has grown; the folder is searched now and then."""
         now_s = time.monotonic()
+        self._before_s, self._looked_s = self._looked_s, now_s
         size = self._stat()
         if size == self._size and now_s - self._searched_s < _FOLDER_S:
             return []
@@ -341,6 +344,10 @@ class _Loop:
             # A clock that was set, or another computer's, says nothing.
             return max(0.0, age_s) if -0.1 < age_s < 5.0 else None
         return None
+
+    def _since_look_s(self) -> float:
+        """Return how long ago it was that what has come now was not there."""
+        return time.monotonic() - self._before_s if self._crew.clock.is_live else 0.0
 
     def _step_virtual(self) -> None:
         if self._virtual is not None and not self._crew.clock.is_live:

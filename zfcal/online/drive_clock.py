@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from typing import Protocol, final
 
 from zfcal.robot.motion import TICK_S
@@ -43,14 +44,24 @@ class DriveClock(Protocol):
     def rest_s(self) -> float:
         """Return how long to wait for the next tick; infinite where frames bring it."""
 
+    def steady_s(self) -> float:
+        """Return the time by which silence is measured."""
+
 
 @final
 class WallClock:
-    """The computer's clock, from the first frame on; it is never set back."""
+    """The computer's clock, from the first frame on; it is never set back.
+
+    Parameters
+    ----------
+    clock
+        In seconds; the monotonic one, but where time is made.
+    """
 
     is_live = True
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.steady_s = clock
         self.n_skipped = 0
         self._zero_s: float | None = None
         self._next_s = math.inf
@@ -58,12 +69,12 @@ class WallClock:
     def take_frame(self, time_s: float) -> None:
         """Take the first frame's time as now."""
         if self._zero_s is None:
-            self._zero_s = time.monotonic() - time_s
+            self._zero_s = self.steady_s() - time_s
             self._next_s = math.ceil(time_s / TICK_S - _SLACK_S) * TICK_S
 
     def now_s(self) -> float:
         """Return the second of the trial."""
-        return 0.0 if self._zero_s is None else time.monotonic() - self._zero_s
+        return 0.0 if self._zero_s is None else self.steady_s() - self._zero_s
 
     def due(self) -> list[float]:
         """Return the tick that is due, the last one of several."""
@@ -122,6 +133,10 @@ class PoseClock:
     def rest_s(self) -> float:
         """Return infinity: frames bring the ticks."""
         return math.inf
+
+    def steady_s(self) -> float:
+        """Return the time of the last frame: silence of nobody means nothing."""
+        return self._time_s
 
 
 def _on_grid(time_s: float) -> float:

@@ -41,6 +41,7 @@ class _NoLine:
     """A line on which nothing is said."""
 
     is_open = False
+    is_guarded = False
     n_opened = 0
 
     def write(self, data: bytes) -> bool:  # noqa: ARG002 - a line's signature
@@ -50,6 +51,9 @@ class _NoLine:
     def read(self) -> bytes:
         """Hear nothing."""
         return b""
+
+    def beat(self, until_s: float) -> None:
+        """Tell nobody."""
 
     def close(self) -> None:
         """Leave nothing."""

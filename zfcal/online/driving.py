@@ -25,6 +25,8 @@ _MOST_HISTORIES = 5
 _SAYS = {
     "stale-pose": "The robot has not been seen for 0.5 s: it was stopped.",
     "port-lost": "The port has gone: nothing can be sent until it is back.",
+    "helper-lost": "The process that stops a robot whose driver hangs has ended or hangs itself: "
+    "the robot was stopped until another one is there.",
     "power-down": "The robot has lost its supply (PowerDown for 3 s): it was stopped.",
     "obstacle": "The robot met an obstacle: it turns, and does not go on.",
     "refused": "A wheel speed was refused: it is beyond what the robot can do.",
@@ -83,7 +85,6 @@ class Driver:
         self._begun = False
         self._is_driving = False
         self._n_histories = 0
-        self._is_history_fresh = False
         self._seen_s = -math.inf
         self._held = ""
         self._n_bites = 0
@@ -100,7 +101,9 @@ class Driver:
         self.pilot.warm_up(self._model)
         self._crew.log.warm_up()
 
-    def take(self, frames: list[FramePoses], *, age_s: float | None = None) -> None:
+    def take(
+        self, frames: list[FramePoses], *, age_s: float | None = None, looked_s: float = 0.0
+    ) -> None:
         """Take frames that have come, oldest first.
 
         Parameters
@@ -109,6 +112,9 @@ class Driver:
             All of them: each step of the model that falls on one is done.
         age_s
             Seconds since the last one was written, where that is known.
+        looked_s
+            Seconds since it was not there yet: it may be so old, and no clock has to be right
+            for that.
         """
         if frames and not self._begun:
             self._begin(frames[0].time_s)
@@ -119,10 +125,11 @@ class Driver:
             self._count_late(frames)
         for poses in frames:
             self._crew.clock.take_frame(poses.time_s)
-            self._take(poses, fresh=True)
+            # The first ones of several have waited for longer.
+            waited_s = max(0.0, frames[-1].time_s - poses.time_s)
+            is_live = self._crew.clock.is_live
+            self._take(poses, old_s=looked_s + waited_s if is_live else 0.0)
             if age_s is not None:
-                # The first ones of several have waited for longer.
-                waited_s = frames[-1].time_s - poses.time_s
                 self._crew.log.measure(POSE_TO_STATE, age_s + waited_s)
 
     def _catch_up(self, frames: list[FramePoses], *, age_s: float | None) -> None:
@@ -133,16 +140,13 @@ class Driver:
         """
         n_due = self._n_due(frames)
         for poses in frames:
-            self._take(poses, fresh=False)
-        if frames:
-            self._is_history_fresh = age_s is not None and age_s <= PATIENCE_S
+            waited_s = max(0.0, frames[-1].time_s - poses.time_s)
+            self._take(poses, old_s=math.inf if age_s is None else age_s + waited_s)
         self._n_histories += 1
         if n_due > 1 and self._n_histories < _MOST_HISTORIES:
             return
         self._is_driving = True
         self._crew.clock.take_frame(self._time_of_frame_s or 0.0)
-        if self._is_history_fresh:
-            self._freshen()
 
     def tick(self) -> None:
         """Do the ticks that are due."""
@@ -156,7 +160,7 @@ class Driver:
 
     def listen(self) -> None:
         """Hear what the robot says."""
-        now_s = self._time_s()
+        now_s = self._crew.clock.steady_s()
         for said in self._crew.robot.listen():
             self._complaints.hear(said, now_s)
             if said.what == "described" and said.robot == self._letter and not self.is_answered:
@@ -187,7 +191,7 @@ class Driver:
         self._begun = True
         self._log_model(time_s, self._model, begins=True)
 
-    def _take(self, poses: FramePoses, *, fresh: bool) -> None:
+    def _take(self, poses: FramePoses, *, old_s: float) -> None:
         if self.pilot.is_due(poses.frame):
             self._look_for_model(poses.time_s)
         before, n_missed = self.pilot.pose, self.pilot.n_missed
@@ -195,8 +199,8 @@ class Driver:
         pose, self._time_of_frame_s = self.pilot.pose, poses.time_s
         self._tell_missed(poses.time_s, self.pilot.n_missed - n_missed, "no frame came in time")
         seen = pose is not None and pose is not before
-        if seen and fresh:
-            self._freshen()
+        if seen:
+            self._freshen(old_s)
         place: dict[str, float | None] = {"x_m": None, "y_m": None, "heading_rad": None}
         if seen and pose is not None:
             place = {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad}
@@ -227,15 +231,18 @@ class Driver:
             values = {"time_s": time_s, "steps": steps, "total": self.n_missed, "because": because}
             self._crew.tell(Note(text=text, warning=True, kind="missed", values=values))
 
-    def _freshen(self) -> None:
-        """Take what is known of the robot as known now."""
+    def _freshen(self, old_s: float) -> None:
+        """Take what is known of the robot as known so many seconds ago."""
+        at_s = self._crew.clock.steady_s() - old_s
+        if not at_s > self._seen_s or old_s > PATIENCE_S:
+            return
         watchdog = self._crew.watchdog
         if watchdog is not None:
             if math.isinf(self._seen_s):
                 # Before the first pose it held the robot, as it should.
                 self._n_bites = watchdog.n_bites
-            watchdog.fresh()
-        self._seen_s = self._time_s()
+            watchdog.fresh(at_s)
+        self._seen_s = at_s
 
     def _note(self, target: Target | None) -> None:
         if target is not None:
@@ -263,10 +270,13 @@ class Driver:
         """Return why the robot may not be driven on; empty if it may."""
         if not self._crew.robot.line.is_open:
             return "port-lost"
-        fault = self._complaints.fault(self._time_s())
+        if not self._crew.robot.line.is_guarded:
+            return "helper-lost"
+        now_s = self._crew.clock.steady_s()
+        fault = self._complaints.fault(now_s)
         if fault == "power-down":
             return fault
-        if self.pilot.pose is not None and self._time_s() - self._seen_s > PATIENCE_S:
+        if self.pilot.pose is not None and now_s - self._seen_s > PATIENCE_S:
             return "stale-pose"
         return fault
 
@@ -274,7 +284,10 @@ class Driver:
         watchdog = self._crew.watchdog
         if watchdog is not None and watchdog.n_bites != self._n_bites:
             self._n_bites = watchdog.n_bites
-            if held not in {"stale-pose", "port-lost"} and self.pilot.pose is not None:
+            if (
+                held not in {"stale-pose", "port-lost", "helper-lost"}
+                and self.pilot.pose is not None
+            ):
                 self._fault(time_s, "watchdog", _SAYS["watchdog"])
         if held == self._held:
             return
@@ -314,8 +327,3 @@ class Driver:
         values = {"time_s": time_s, "model": model.name, "sha256": model.sha256}
         text = f"{time_s:.1f} s: {model.name} drives."
         self._crew.tell(Note(text=text, kind="model", values=values))
-
-    def _time_s(self) -> float:
-        """Return the time by which silence is measured."""
-        clock = self._crew.clock
-        return time.monotonic() if clock.is_live else clock.now_s()

@@ -7,6 +7,7 @@ fresh again.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -35,6 +36,8 @@ class FishBot:
         Its name, A to J.
     line
         The way to it.
+    clock
+        In seconds, never set back; the monotonic one, by which its line's helper goes.
 
     Attributes
     ----------
@@ -44,10 +47,14 @@ class FishBot:
         Events that went over the line, without those of the watchdog.
     """
 
-    def __init__(self, letter: str, line: Line) -> None:
+    def __init__(
+        self, letter: str, line: Line, *, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         events.robot_index(letter)
         self.letter = letter
         self.line = line
+        self._clock = clock
+        self._until_s = math.inf
         self.is_held = False
         self.n_sent = 0
         self._lock = threading.Lock()
@@ -80,12 +87,20 @@ class FishBot:
         return events.stop()
 
     def send(self, frame: Frame) -> bool:
-        """Send wheel speeds or STOP; return whether they went: held robots get STOP alone."""
+        """Send wheel speeds or STOP; return whether they went.
+
+        STOP alone goes to a robot that is held, or of which nothing fresh is known at that
+        moment. Who was stopped between the look at the clock and the write looks again after it.
+        """
         with self._lock:
-            if self.is_held and frame.type != events.STOP:
+            moves = frame.type != events.STOP
+            if moves and (self.is_held or self._is_late()):
                 return False
             went = self.line.write(frame.encode())
             self.n_sent += went
+            if moves and self._is_late():
+                self.is_held = True
+                self.line.write(events.stop().encode())
             return went
 
     def hold(self) -> bool:
@@ -94,10 +109,12 @@ class FishBot:
             self.is_held = True
             return self.line.write(events.stop().encode())
 
-    def release(self) -> None:
-        """Let wheel speeds through again."""
+    def release(self, until_s: float) -> None:
+        """Let wheel speeds through again, until then; the line's helper hears of it."""
         with self._lock:
             self.is_held = False
+            self._until_s = until_s
+            self.line.beat(until_s)
 
     def avoid_obstacles(self, mode: int) -> None:
         """Set what the robot does at obstacles by itself: 0 nothing, 1 Braitenberg, 2 turn."""
@@ -117,6 +134,9 @@ class FishBot:
                 self.line.write(events.get_node_description(node).encode())
             said.append(heard)
         return said
+
+    def _is_late(self) -> bool:
+        return not self._clock() <= self._until_s
 
     def close(self) -> None:
         """Stop the robot and leave the line: STOP is the last thing sent."""
@@ -159,15 +179,21 @@ class Watchdog:
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self.n_bites = 0
 
-    def fresh(self) -> None:
-        """Say that what is known is fresh, now."""
-        self._fresh_s = self._clock()
-        self._robot.release()
+    def fresh(self, at_s: float | None = None) -> None:
+        """Say that what is known was fresh at a time of the clock; by default now."""
+        self._fresh_s = self._clock() if at_s is None else at_s
+        self._robot.release(self._fresh_s + self._patience_s)
 
     @property
     def age_s(self) -> float:
         """Seconds since it was fresh; infinite before the first time."""
         return float("inf") if self._fresh_s is None else self._clock() - self._fresh_s
+
+    def look(self) -> None:
+        """Hold the robot if nothing fresh is known of it."""
+        if self.age_s > self._patience_s and not self._robot.is_held:
+            self.n_bites += 1
+            self._robot.hold()
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -179,6 +205,4 @@ class Watchdog:
 
     def _watch(self) -> None:
         while not self._ended.wait(_LOOK_S):
-            if self.age_s > self._patience_s and not self._robot.is_held:
-                self.n_bites += 1
-                self._robot.hold()
+            self.look()

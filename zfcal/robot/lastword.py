@@ -1,27 +1,426 @@
-"""A process that waits until its parent has gone and then tells the robot to stop.
+"""Stops the robot when its driver cannot: a process beside it, and how both write to the line.
 
 It is run as a file, by itself, and therefore imports nothing but the standard library: it has
-to be there within a moment, and to last when the driver is killed.
+to be there within a moment, and to last when the driver is killed, stopped or hangs. The
+driver imports the same functions, so that both agree on what is on the line.
+
+An Aseba receiver cannot find the beginning of a frame by itself. So a frame is written in one
+piece, or what is missing of it is remembered; where nobody can know how much of it arrived,
+`RESYNC` brings any receiver to the beginning of a frame.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import fcntl
+import mmap
 import os
+import select
+import struct
 import sys
+import termios
+import time
+import weakref
+from typing import Protocol
 
 STOP = bytes.fromhex("00 00 00 00 01 00")
 """The frame that `zfcal.robot.events.stop` makes; a test compares them."""
 
+MOST_UNSENT = 32
+"""Bytes that may wait in the port's driver: at 115200 baud they are gone in 2.8 ms."""
+
+MOST_FRAME = 15
+"""Bytes of the longest frame that can be remembered; the longest that is sent has 12."""
+
+AGAIN_S = 0.1
+"""While nothing fresh is known STOP is said so often: a command that was late lasts a tick."""
+
+LOOK_S = 0.02
+NICENESS = -10
+
+DRIVER, HELPER = 0, 1
+STATE, FRAMES, DONE, CROWD = range(4)
+"""A writer's numbers: its state, how often it wrote, how many bytes of its last frame were taken,
+and how many bytes since nothing waited."""
+
+WHOLE, WRITING, CUT, UNKNOWN = range(4)
+"""States: no frame is cut, one is being written, one is cut at a known byte, nobody knows."""
+
+
+def _resync() -> bytes:
+    """Return bytes after which any receiver is at the beginning of a frame, and has heard STOP.
+
+    Zeros end the frame that was cut; from then on each six zeros are an empty frame, and only
+    where these begin is unknown. A one that is read as the first byte of a length makes that
+    frame a byte longer: of three ones, each at another place, every receiver that stood at
+    an odd place meets such a one and stands at an even one. Last come lengths that fall by
+    two with each word: whichever word is read as a length, the frame ends at the same byte.
+    """
+    longest = 6 + 516
+    # The same one may be read as the high byte of a length, 256: that frame ends before the next.
+    ones = 3 * (b"\x01" + bytes(265))
+    # No event has these numbers, wherever they are read as one.
+    words = struct.pack("<3H", 100, 98, 96)
+    return bytes(longest) + ones + bytes(1) + words + bytes(100) + STOP
+
+
+RESYNC = _resync()
+
+
+class Port(Protocol):
+    """Where bytes go to the robot."""
+
+    def write(self, data: bytes) -> int:
+        """Hand over bytes; return how many were taken, 0 where there is no room."""
+
+    def unsent(self) -> int:
+        """Return how many bytes wait here, as the port's driver says; 0 where it says nothing."""
+
+    def flush(self) -> int:
+        """Drop what waits here; return how many bytes that were, as the port's driver says."""
+
+
+class Descriptor:
+    """A terminal that is open.
+
+    Parameters
+    ----------
+    number
+        Its file descriptor, not blocking.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+
+    def write(self, data: bytes) -> int:
+        """Hand over bytes; return how many were taken."""
+        with contextlib.suppress(BlockingIOError):
+            return os.write(self._number, data)
+        return 0
+
+    def unsent(self) -> int:
+        """Return how many bytes wait in the port's driver."""
+        try:
+            found = fcntl.ioctl(self._number, termios.TIOCOUTQ, bytes(4))
+        except OSError as error:
+            if error.errno in {errno.ENOTTY, errno.EINVAL}:
+                return 0
+            raise
+        return int(struct.unpack("i", found)[0])
+
+    def flush(self) -> int:
+        """Drop what waits; held meanwhile, so that the count stays right where that is possible."""
+        with contextlib.suppress(termios.error):
+            termios.tcflow(self._number, termios.TCOOFF)
+        before = self.unsent()
+        with contextlib.suppress(termios.error):
+            termios.tcflush(self._number, termios.TCOFLUSH)
+        after = self.unsent()
+        with contextlib.suppress(termios.error):
+            termios.tcflow(self._number, termios.TCOON)
+        return max(0, before - after)
+
+
+class Slate:
+    """What driver and helper tell each other, in memory that both have.
+
+    Each number is written by one of them alone, and whole: eight bytes at a multiple of
+    eight. So it can be read at any time, whatever has become of the other.
+
+    Parameters
+    ----------
+    room
+        `SIZE` bytes, zero at first: a shared map, or any buffer where there is one process.
+    descriptor
+        Of the file that is mapped.
+    """
+
+    SIZE = 256
+    _SLOTS, _FIRST = 8, 128
+
+    def __init__(self, room: mmap.mmap | bytearray, descriptor: int = -1) -> None:
+        self.descriptor = descriptor
+        self._bytes = memoryview(room)
+        self._times = self._bytes[:16].cast("d")
+        self._numbers = self._bytes[16:80].cast("q")
+
+    @classmethod
+    def shared(cls) -> Slate:
+        """Make one whose descriptor can be handed to another process; it is closed with it."""
+        descriptor = os.memfd_create("zfcal-robot", os.MFD_CLOEXEC)
+        os.ftruncate(descriptor, cls.SIZE)
+        made = cls(mmap.mmap(descriptor, cls.SIZE), descriptor)
+        weakref.finalize(made, os.close, descriptor)
+        return made
+
+    @property
+    def until_s(self) -> float:
+        """Until when the robot may move, by the monotonic clock; 0 before anything was known."""
+        return self._times[0]
+
+    @until_s.setter
+    def until_s(self, value: float) -> None:
+        self._times[0] = value
+
+    @property
+    def alive_s(self) -> float:
+        """When the helper last looked."""
+        return self._times[1]
+
+    @alive_s.setter
+    def alive_s(self, value: float) -> None:
+        self._times[1] = value
+
+    def number(self, who: int, what: int) -> int:
+        """Return one of a writer's numbers: `STATE`, `FRAMES`, `DONE` or `CROWD`."""
+        return self._numbers[4 * who + what]
+
+    def put(self, who: int, what: int, value: int) -> None:
+        """Set one of a writer's numbers."""
+        self._numbers[4 * who + what] = value
+
+    def remember(self, frame: bytes, taken: int) -> None:
+        """Keep the driver's newest frame, of which so many bytes were taken, beside seven older."""
+        count = self.number(DRIVER, FRAMES)
+        at = self._FIRST + 16 * (count % self._SLOTS)
+        self._bytes[at : at + 16] = bytes([len(frame)]) + frame.ljust(MOST_FRAME, b"\0")
+        self.put(DRIVER, DONE, taken)
+        self.put(DRIVER, FRAMES, count + 1)
+
+    def frame(self, age: int) -> bytes:
+        """Return one of the driver's last frames, 0 for the newest; empty where it is forgotten."""
+        number = self.number(DRIVER, FRAMES) - 1 - age
+        if age >= self._SLOTS or number < 0:
+            return b""
+        at = self._FIRST + 16 * (number % self._SLOTS)
+        return bytes(self._bytes[at + 1 : at + 1 + self._bytes[at]])
+
+    def missing(self, dropped: int) -> bytes:
+        """Return what a receiver lacks of the frame that it is in, if so many bytes were dropped.
+
+        Nothing where they are more than is remembered.
+        """
+        lacks = dropped + len(self.frame(0)) - self.number(DRIVER, DONE)
+        for age in range(self._SLOTS):
+            frame = self.frame(age)
+            if 0 < lacks < len(frame):
+                return frame[-lacks:]
+            lacks -= len(frame)
+        return b""
+
+
+class Output:
+    """One of two writers to a port: it writes whole frames, and knows where one was cut.
+
+    Both may write at any time, since what is taken in one piece stays together.
+
+    Parameters
+    ----------
+    port
+        Where bytes go.
+    slate
+        What it shares with the other writer.
+    who
+        `DRIVER` or `HELPER`.
+    """
+
+    def __init__(self, port: Port, slate: Slate, who: int) -> None:
+        self._port = port
+        self._slate = slate
+        self._who = who
+        self._mended = (-1, -1)
+        self._stopped_at = -1
+        self._others = 0
+        self.is_lost = False
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether this writer's last frame is not whole on the line."""
+        return self._slate.number(self._who, STATE) != WHOLE
+
+    def begin(self) -> None:
+        """Stop, in place of what somebody else has left waiting in the port's driver."""
+        if self._port.unsent() > 0:
+            self._force()
+
+    def waiting(self) -> int:
+        """Return how many bytes wait in the port's driver, at most.
+
+        Some say a packet's length where a single byte waits (RFCOMM): what was written since
+        nothing waited is a limit as well.
+        """
+        unsent = self._port.unsent()
+        if unsent == 0:
+            self._slate.put(self._who, CROWD, 0)
+            return 0
+        return min(unsent, sum(self._slate.number(who, CROWD) for who in (DRIVER, HELPER)))
+
+    def has_room(self, frame: bytes) -> bool:
+        """Return whether a frame and each writer's STOP after it keep within `MOST_UNSENT`."""
+        return self.waiting() + len(frame) + 2 * len(STOP) <= MOST_UNSENT
+
+    def send(self, frame: bytes) -> bool:
+        """Write a frame of the driver's; return whether it went as a whole.
+
+        If not, and `is_cut`, `finish` goes on with it. Where the line is not known to be at the
+        beginning of a frame it is brought there first.
+        """
+        if (self.is_cut or self.is_lost) and not self.stop():
+            return False
+        self._others = self._slate.number(HELPER, FRAMES)
+        self._slate.put(DRIVER, STATE, WRITING)
+        taken = self._port.write(frame)
+        if taken:
+            self._slate.remember(frame, taken)
+        self._settle(taken, WHOLE if taken in {0, len(frame)} else CUT)
+        return taken == len(frame)
+
+    def finish(self) -> bool:
+        """Write what is missing of the driver's frame; return whether it is whole now."""
+        done = self._slate.number(DRIVER, DONE)
+        rest = self._slate.frame(0)[done:]
+        if self._was_disturbed():
+            self.stop()
+            return False
+        self._slate.put(DRIVER, STATE, WRITING)
+        taken = self._port.write(rest)
+        self._slate.put(DRIVER, DONE, done + taken)
+        self._settle(taken, WHOLE if taken == len(rest) else CUT)
+        if self._was_disturbed():
+            self._slate.put(DRIVER, STATE, UNKNOWN)
+            self.stop()
+            return False
+        return taken == len(rest)
+
+    def stop(self) -> bool:
+        """Write STOP, behind what is missing of a frame; return whether it is on its way.
+
+        Where the port takes no more, what waits is dropped first.
+        """
+        if self._is_doubtful():
+            data = self._slate.missing(0) + STOP + RESYNC
+        elif self._ends_in_stop() and self.waiting():
+            # One waits already, and nothing behind it.
+            return True
+        else:
+            data = STOP
+        taken = self._say(data)
+        return taken == len(data) or self._force(taken)
+
+    def _was_disturbed(self) -> bool:
+        """Return whether the helper has written since the driver's frame began."""
+        return self._slate.number(HELPER, FRAMES) != self._others
+
+    def _is_doubtful(self) -> bool:
+        """Return whether the line may be in the middle of a frame."""
+        if self.is_cut or self.is_lost:
+            return True
+        return self._who == HELPER and self._driver() not in {
+            (WHOLE, self._slate.number(DRIVER, FRAMES)),
+            self._mended,
+        }
+
+    def _driver(self) -> tuple[int, int]:
+        return self._slate.number(DRIVER, STATE), self._slate.number(DRIVER, FRAMES)
+
+    def _ends_in_stop(self) -> bool:
+        """Return whether STOP was the last that was written."""
+        return self._slate.frame(0) == STOP or self._stopped_at == self._driver()[1]
+
+    def _say(self, data: bytes, *, then: int = WHOLE) -> int:
+        """Write what ends in STOP; return how many bytes were taken: if all, the state is then."""
+        before, driver = self._slate.number(self._who, STATE), self._driver()
+        self._slate.put(self._who, STATE, WRITING)
+        if self._who == HELPER:
+            # Before it is written: the driver looks for it after each piece of its own.
+            self._slate.put(HELPER, FRAMES, self._slate.number(HELPER, FRAMES) + 1)
+        taken = self._port.write(data)
+        self._settle(taken, before if taken == 0 else UNKNOWN)
+        if taken == len(data):
+            if self._who == DRIVER:
+                self._slate.remember(STOP, len(STOP))
+            else:
+                self._stopped_at = driver[1]
+        if taken == len(data) and then == WHOLE:
+            self._slate.put(self._who, STATE, WHOLE)
+            self._mended, self.is_lost = driver, False
+        return taken
+
+    def _force(self, after: int = 0) -> bool:
+        """Drop what waits, and stop; return whether that was taken.
+
+        How much of what waited has left is known where the port's driver counts; as not all do,
+        `RESYNC` follows in any case.
+
+        Parameters
+        ----------
+        after
+            So many bytes of a STOP wait behind the driver's frames.
+        """
+        self._slate.put(self._who, STATE, UNKNOWN)
+        dropped = self._port.flush()
+        data = self._slate.missing(max(0, dropped - after)) + STOP
+        went = self._say(data, then=UNKNOWN) == len(data)
+        if went:
+            self._say(RESYNC)
+        return went
+
+    def _settle(self, taken: int, state: int) -> None:
+        """Count what was taken, and note how far that got."""
+        self._slate.put(self._who, CROWD, self._slate.number(self._who, CROWD) + taken)
+        self._slate.put(self._who, STATE, state)
+
+
+class Guard:
+    """Says STOP when nothing fresh is known of the robot, and again and again until it is.
+
+    Parameters
+    ----------
+    output
+        The helper's.
+    slate
+        What it shares with the driver.
+    """
+
+    def __init__(self, output: Output, slate: Slate) -> None:
+        self._output = output
+        self._slate = slate
+        self._said_s = -AGAIN_S
+
+    def look(self, now_s: float) -> float:
+        """Stop the robot if it is time; return how long to wait for the next look."""
+        self._slate.alive_s = now_s
+        until_s = self._slate.until_s
+        if until_s == 0.0:
+            return LOOK_S
+        if now_s < until_s:
+            self._said_s = -AGAIN_S
+            return min(LOOK_S, until_s - now_s)
+        if now_s - self._said_s >= AGAIN_S - LOOK_S / 2 and self.say():
+            self._said_s = now_s
+        return LOOK_S
+
+    def say(self) -> bool:
+        """Say STOP; return whether it is on its way."""
+        # A port that has gone is the driver's to open again, with another helper.
+        with contextlib.suppress(OSError):
+            return self._output.stop()
+        return False
+
 
 def main() -> None:
-    """Wait for the end of standard input, then write STOP to the descriptor that is named."""
-    descriptor = int(sys.argv[1])
-    while os.read(0, 64):
-        pass
+    """Watch the driver whose port and slate are named, until standard input ends; then stop."""
+    port, shared = (int(word) for word in sys.argv[1:3])
     with contextlib.suppress(OSError):
-        os.set_blocking(descriptor, False)
-        os.write(descriptor, STOP)
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    os.set_blocking(port, False)
+    slate = Slate(mmap.mmap(shared, Slate.SIZE))
+    guard = Guard(Output(Descriptor(port), slate, HELPER), slate)
+    rest_s = 0.0
+    while not (select.select([0], [], [], rest_s)[0] and not os.read(0, 64)):
+        rest_s = guard.look(time.monotonic())
+    guard.say()
 
 
 if __name__ == "__main__":

@@ -7,11 +7,11 @@ its own; who writes meanwhile is told at once that there is no line.
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, TypeVar, final
@@ -19,6 +19,7 @@ from typing import Protocol, TypeVar, final
 import serial
 
 from zfcal.robot import lastword
+from zfcal.robot.lastword import DRIVER, HELPER, STATE, STOP, WHOLE, Descriptor, Output, Slate
 
 T = TypeVar("T")
 
@@ -30,6 +31,15 @@ _WRITE_S = 0.05
 _PIECES = 5
 """In so many pieces a message goes at most; a line with room takes it in one."""
 
+_STUCK_S = 0.5
+"""Bytes that wait for longer than this will not go: a radio says a byte again for less long."""
+
+_SILENT_S = 0.5
+"""A helper that has not looked for so long hangs; it looks fifty times a second."""
+
+_STARTING_S = 5.0
+_LOOK_S = 0.005
+
 
 class Line(Protocol):
     """A way to the robot."""
@@ -37,6 +47,10 @@ class Line(Protocol):
     @property
     def is_open(self) -> bool:
         """Whether there is somebody to write to, as far as is known."""
+
+    @property
+    def is_guarded(self) -> bool:
+        """Whether somebody stops the robot if this process cannot."""
 
     @property
     def n_opened(self) -> int:
@@ -48,6 +62,9 @@ class Line(Protocol):
     def read(self) -> bytes:
         """Return what has come, maybe nothing; never wait."""
 
+    def beat(self, until_s: float) -> None:
+        """Say that the robot may move until then, by the monotonic clock."""
+
     def close(self) -> None:
         """Leave the line for good."""
 
@@ -56,8 +73,9 @@ class Line(Protocol):
 class SerialLine:
     """A serial port, 115200 baud, 8N1.
 
-    While it is open a small process holds the port as well, and says STOP when this one
-    ends, in whatever way.
+    While it is open a helper, a small process, holds the port as well. It says STOP when the
+    last `beat` runs out, and when this process ends, in whatever way. One that ends itself, or
+    hangs, is replaced.
 
     Parameters
     ----------
@@ -71,10 +89,12 @@ class SerialLine:
         self.problem = ""
         self._lock = threading.Lock()
         self._serial: serial.Serial | None = None
-        self._guardian: subprocess.Popen[bytes] | None = None
+        self._output: Output | None = None
+        self._helper: Helper | None = None
+        self._full_since_s = float("inf")
         self._closing = threading.Event()
-        self._lost = threading.Event()
-        self._lost.set()
+        self._wanted = threading.Event()
+        self._wanted.set()
         self._thread = threading.Thread(target=self._keep_open, daemon=True)
         self._thread.start()
 
@@ -82,6 +102,15 @@ class SerialLine:
     def is_open(self) -> bool:
         """Whether the port is open, as far as is known."""
         return self._serial is not None
+
+    @property
+    def is_guarded(self) -> bool:
+        """Whether the helper is at work; one that is not is replaced from now on."""
+        helper = self._helper
+        if helper is not None and helper.is_at_work:
+            return True
+        self._wanted.set()
+        return False
 
     def wait(self, patience_s: float) -> bool:
         """Wait until the port is open, or patience ends; return whether it is."""
@@ -93,19 +122,25 @@ class SerialLine:
         return self.is_open
 
     def write(self, data: bytes) -> bool:
-        """Send bytes; return whether they went."""
+        """Send a frame; return whether it went, or for STOP, whether it is on its way."""
         with self._lock:
-            return self._attempt(lambda port: _write(port, data)) == len(data)
+            return self._attempt(lambda port: self._write(port, data)) is True
 
     def read(self) -> bytes:
         """Return what has come, maybe nothing."""
         with self._lock:
             return self._attempt(lambda port: port.read(4096)) or b""
 
+    def beat(self, until_s: float) -> None:
+        """Tell the helper until when the robot may move."""
+        helper = self._helper
+        if helper is not None:
+            helper.slate.until_s = until_s
+
     def close(self) -> None:
         """Leave the port."""
         self._closing.set()
-        self._lost.set()
+        self._wanted.set()
         with self._lock:
             self._leave()
 
@@ -117,7 +152,7 @@ class SerialLine:
         except (OSError, serial.SerialException) as error:
             self.problem = str(error)
             self._leave()
-            self._lost.set()
+            self._wanted.set()
             return None
 
     def _leave(self) -> None:
@@ -125,72 +160,167 @@ class SerialLine:
             with contextlib.suppress(OSError, serial.SerialException):
                 self._serial.close()
             self._serial = None
-        if self._guardian is not None:
+        if self._helper is not None:
             # It sees that nobody is left, and has its last word.
-            if self._guardian.stdin is not None:
-                with contextlib.suppress(OSError):
-                    self._guardian.stdin.close()
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._guardian.wait(0.5)
-            self._guardian = None
+            self._helper.end()
+            self._helper = None
 
     def _keep_open(self) -> None:
         while not self._closing.is_set():
-            self._lost.wait()
+            self._wanted.wait()
             if self._closing.is_set():
                 return
-            if self._open():
-                self._lost.clear()
-            else:
+            self._wanted.clear()
+            if not (self._replace_helper() if self.is_open else self._open()):
                 self._closing.wait(RETRY_S)
+                self._wanted.set()
 
     def _open(self) -> bool:
         try:
             opened = serial.Serial(self.port, BAUD, timeout=0, write_timeout=0, exclusive=True)
+            descriptor = Descriptor(opened.fileno())
+            helper = Helper(opened.fileno(), Slate.shared())
         except (OSError, ValueError, serial.SerialException) as error:
             self.problem = str(error)
             return False
+        is_there = helper.wait(_STARTING_S)
+        output = Output(descriptor, helper.slate, DRIVER)
         with self._lock:
-            if self._closing.is_set():
+            if self._closing.is_set() or not is_there:
+                self.problem = "the process that stops the robot does not start"
                 opened.close()
+                helper.kill()
                 return False
-            self._guardian = _guardian_of(opened.fileno())
-            self._serial = opened
+            self._helper, self._output, self._serial = helper, output, opened
+            self._attempt(lambda _: output.begin())
             self.n_opened += 1
+        return self.is_open
+
+    def _replace_helper(self) -> bool:
+        """Start another helper where the one that there was is not at work any more."""
+        with self._lock:
+            port, output, before = self._serial, self._output, self._helper
+            if port is None or output is None or before is None or before.is_at_work:
+                return True
+            before.kill()
+            output.is_lost = before.slate.number(HELPER, STATE) != WHOLE
+            if not self._attempt(lambda _: output.stop()):
+                return False
+            before.slate.put(HELPER, STATE, WHOLE)
+            try:
+                made = Helper(port.fileno(), before.slate)
+            except OSError as error:
+                self.problem = str(error)
+                return False
+        # Not held up meanwhile: whoever drives goes on saying STOP.
+        is_there = made.wait(_STARTING_S)
+        with self._lock:
+            if self._helper is not before or not is_there:
+                made.kill()
+                return False
+            self._helper = made
         return True
 
+    def _write(self, port: serial.Serial, data: bytes) -> bool:
+        """Write all of it, or nothing where too much waits; raise if the line takes nothing.
 
-def _write(port: serial.Serial, data: bytes) -> int:
-    """Write all of it and return its length, or raise once the line has taken nothing for a while.
+        The write timeout of pyserial is by the clock: it would lose the line of a driver that was
+        itself held up, though every byte had gone.
+        """
+        output = self._output
+        if output is None:
+            return False
+        if data == STOP:
+            if output.stop():
+                return True
+            raise serial.SerialTimeoutException("Write timeout")
+        if not output.has_room(data):
+            return self._wait_for_room()
+        self._full_since_s = float("inf")
+        for _ in range(_PIECES):
+            # The second look is for a driver that was held up while it waited.
+            if not (_takes(port, _WRITE_S) or _takes(port, 0.0)):
+                break
+            if output.finish() if output.is_cut else output.send(data):
+                return True
+        raise serial.SerialTimeoutException("Write timeout")
 
-    The write timeout of pyserial is by the clock: it would lose the line of a driver that was
-    itself held up, though every byte had gone.
+    def _wait_for_room(self) -> bool:
+        """Leave a frame out while others wait; raise once that has lasted."""
+        now_s = time.monotonic()
+        self._full_since_s = min(self._full_since_s, now_s)
+        if now_s - self._full_since_s > _STUCK_S:
+            self._full_since_s = float("inf")
+            raise serial.SerialTimeoutException(f"no byte has gone for {_STUCK_S} s")
+        return False
+
+
+@final
+class Helper:
+    """The process that stops the robot when this one cannot.
+
+    Parameters
+    ----------
+    port
+        Descriptor of the port.
+    slate
+        What they share, such as `Slate.shared` makes.
     """
-    rest = data
-    for _ in range(_PIECES):
-        # The second look is for a driver that was held up while it waited.
-        if not (_takes(port, _WRITE_S) or _takes(port, 0.0)):
-            break
-        # Not by `port.write`, which tries for ever where a line that takes bytes takes none.
-        with contextlib.suppress(BlockingIOError):
-            rest = rest[os.write(port.fileno(), rest) :]
-        if not rest:
-            return len(data)
-    raise serial.SerialTimeoutException("Write timeout")
+
+    def __init__(self, port: int, slate: Slate) -> None:
+        self.slate = slate
+        slate.alive_s = 0.0
+        self._process = subprocess.Popen(  # noqa: S603 - this very Python, on a file of this package
+            [
+                *(sys.executable, "-I", "-S", str(Path(lastword.__file__))),
+                *(str(port), str(slate.descriptor)),
+            ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=[port, slate.descriptor],
+            # Neither Ctrl-C nor Ctrl-Z is for it.
+            start_new_session=True,
+        )
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    @property
+    def is_at_work(self) -> bool:
+        """Whether it is there, and has looked a moment ago."""
+        return self._process.poll() is None and (time.monotonic() - self.slate.alive_s < _SILENT_S)
+
+    def wait(self, patience_s: float) -> bool:
+        """Wait until it is at work, or patience ends; return whether it is."""
+        end_s = time.monotonic() + patience_s
+        pause = threading.Event()
+        while not self.is_at_work:
+            if self._process.poll() is not None or time.monotonic() > end_s:
+                return False
+            pause.wait(_LOOK_S)
+        return True
+
+    def end(self) -> None:
+        """Let it have its last word."""
+        if self._process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(0.5)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it without a last word."""
+        self._process.kill()
+        self._process.wait()
+        if self._process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
 
 
 def _takes(port: serial.Serial, patience_s: float) -> bool:
     """Wait until the line takes bytes, or patience ends; return whether it does."""
     return bool(select.select([], [port.fileno()], [], patience_s)[1])
-
-
-def _guardian_of(descriptor: int) -> subprocess.Popen[bytes]:
-    """Start the process that says STOP when this one has gone."""
-    return subprocess.Popen(  # noqa: S603 - this very Python, on a file of this package
-        [sys.executable, "-I", "-S", str(Path(lastword.__file__)), str(descriptor)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        pass_fds=[descriptor],
-        start_new_session=True,
-    )
