@@ -1,5 +1,6 @@
 """The driver in step with its poses: what it decides, logs and decides again."""
 
+import dataclasses
 import importlib.util
 import itertools
 import json
@@ -12,18 +13,22 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
+from zfcal.artifacts import pose_files
 from zfcal.artifacts.drive_files import LATENCY_KEY, drive_files, read_drive
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, write_model
 from zfcal.errors import InputError, LockedError
 from zfcal.online.drive import DriveOptions, drive
+from zfcal.online.drive_models import DriveModels
 from zfcal.online.drive_replay import replay
 from zfcal.online.events import LeftOut, Made, Note, Result, say_nothing
 from zfcal.online.opening import Task, at_work, open_trial
-from zfcal.online.pilot import Manner, Seats
+from zfcal.online.pilot import Manner, Pilot, Seats
 from zfcal.parameters import Parameters
 from zfcal.robot.confines import Confines
+from zfcal.robot.fishbot import FishBot
+from zfcal.robot.motion import Goal
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
@@ -334,3 +339,122 @@ def test_seats_are_kept_while_an_id_is_seen():
     crowded = seats.take([agent(n) for n in range(20, 40)])
     assert np.isfinite(crowded[:-1]).all()
     assert np.isnan(crowded[-1]).all()
+
+
+def changed(poses, *, agent=4, **changes):
+    """Return a frame in which one agent's pose is another."""
+    agents = tuple(
+        dataclasses.replace(a, **changes) if a.agent == agent else a for a in poses.agents
+    )
+    return dataclasses.replace(poses, agents=agents)
+
+
+BAD = {
+    "outside": {"x_m": 5.6},
+    "unsure": {"confidence": 0.0},
+    "nan": {"x_m": math.nan},
+    "infinite": {"y_m": -math.inf},
+    "huge": {"x_m": 1e308, "y_m": 1e308},
+}
+
+
+def redrive(root, frames, **options):
+    """Drive over other poses, maybe such as zfcal would not write; return all items of the log."""
+    for path in (root / "poses").iterdir():
+        path.unlink()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pose_files, "to_json", json.dumps)
+        driven.write_poses(root, frames)
+    return run(root, **options)
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_an_implausible_pose_of_the_robot_is_none(root, recorded, bad):
+    """Not driven by, told as a fault: STOP after half a second, as if it were not seen."""
+    frames = [changed(f, **BAD[bad]) if 4.0 <= f.time_s < 5.5 else f for f in recorded[1]]
+    items = redrive(root, frames)
+    held = {round(c["time_s"], 1): c for c in only(items, "command") if c["held"]}
+    assert set(held) == {round(k / 10, 1) for k in range(45, 56)}
+    assert {c["bytes"] for c in held.values()} == {"000000000100"}
+    assert {t["step"] for t in only(items, "target")} == set(range(40)) - set(range(20, 28))
+    faults = [(f["fault"], f["ended"]) for f in only(items, "fault")]
+    assert sorted(faults) == [
+        ("implausible-pose", False),
+        ("implausible-pose", True),
+        ("stale-pose", False),
+        ("stale-pose", True),
+    ]
+    assert replay(root, say_nothing).is_same
+
+
+def test_a_robot_that_was_lifted_is_found_after_five_frames(root, recorded):
+    """Put down half a metre away: four frames are left out, then it is driven from there."""
+    first = recorded[1][0].agents[4]
+    frames = [
+        changed(f, x_m=first.x_m, y_m=first.y_m + (0.0 if f.time_s < 4.0 else 0.2))
+        for f in recorded[1]
+    ]
+    items = redrive(root, frames)
+    seen = {p["frame"]: p["y_m"] for p in only(items, "pose")}
+    assert [seen[n] for n in range(60, 64)] == [None] * 4
+    assert seen[64] == pytest.approx(first.y_m + 0.2)
+    assert not [c for c in only(items, "command") if c["held"]]
+    says = [f["says"] for f in only(items, "fault")]
+    assert len(says) == 2
+    assert "too far to have driven" in says[0]
+    assert replay(root, say_nothing).is_same
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_implausible_fish_are_absent(root, recorded, bad):
+    """The same targets as if they were not there, and one warning."""
+    frames = recorded[1]
+    without = [
+        dataclasses.replace(f, agents=tuple(a for a in f.agents if a.agent != 1)) for f in frames
+    ]
+    wanted = only(redrive(root, without), "target")
+    heard = []
+    bad_ones = [changed(f, agent=1, **BAD[bad]) for f in frames]
+    items = redrive(root, bad_ones, force=True, tell=heard.append)
+    assert only(items, "target") == wanted
+    assert {p["agents"] for p in only(items, "pose")} == {3}
+    said = [
+        note.text for note in heard if isinstance(note, Note) and "counts as absent" in note.text
+    ]
+    assert len(said) == 1
+
+
+def test_frames_of_no_time_are_left_out_and_told(root, recorded):
+    """NaN, infinite, of another age, before the start: the others are driven by."""
+    times = {3: math.nan, 7: math.inf, 9: 1e308, 11: -1.0}
+    heard, as_json = [], pose_files._as_json
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            pose_files,
+            "_as_json",
+            lambda f: as_json(dataclasses.replace(f, time_s=times.get(f.frame, f.time_s))),
+        )
+        items = redrive(root, recorded[1], tell=heard.append)
+    frames = [p["frame"] for p in only(items, "pose")]
+    assert frames == [n for n in range(120) if n not in times]
+    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert "frame 3 is said to be of nan s" in left_out.problem
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("pattern", ["fish", "pid"])
+def test_a_goal_that_is_none_is_refused(root, recorded, pattern, value):
+    """The robot is stopped and told why; the next goal is driven to as if nothing had been."""
+    opened = open_trial(root)
+    model = DriveModels(opened).first()
+    pilots = [Pilot(opened, Manner(pattern=pattern), FishBot("F", None)) for _ in range(2)]
+    for pilot in pilots:
+        pilot.see(recorded[1][0], model)
+    sound = pilots[0]._target
+    pilots[0]._target = dataclasses.replace(sound, goal=Goal(x_m=value, y_m=0.1, speed_m_s=0.1))
+    command = pilots[0].tick(0.0)
+    assert (command.held, command.message.encode().hex()) == ("refused", "000000000100")
+    pilots[0]._target = dataclasses.replace(sound, goal=Goal(x_m=0.1, y_m=0.1, speed_m_s=value))
+    assert pilots[0].tick(0.1).held == "refused"
+    pilots[0]._target = sound
+    assert pilots[0].tick(0.2).wheels == pilots[1].tick(0.2).wheels

@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from zfcal.artifacts.drive_files import DRIVE, drive_files
 from zfcal.artifacts.freshness import hash_inputs
@@ -28,8 +27,10 @@ from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.online.pilot import Manner
 from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
 from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.plausible import is_frame
 from zfcal.robot.port import SerialLine
 from zfcal.robot.virtual_process import VirtualProcess
+from zfcal.tracks import FramePoses
 from zfcal.units import SEGMENT_S
 
 VIRTUAL = "virtual"
@@ -274,6 +275,7 @@ class _Loop:
         self._quiet_since_s = time.monotonic()
         self._asked_s = time.monotonic()
         self._is_waited_for = False
+        self._is_unsound = False
 
     def run(self) -> str:
         """Go on until it is over, and return why it is."""
@@ -301,7 +303,7 @@ class _Loop:
             self._tell(self._driver.status(self._options.duration_s))
             self._told_s = time.monotonic()
 
-    def _batches(self) -> Iterator[list[Any]]:
+    def _batches(self) -> Iterator[list[FramePoses]]:
         """Yield what has come, again and again; often nothing."""
         while True:
             frames = self._poll()
@@ -313,7 +315,7 @@ class _Loop:
             if not frames:
                 self._nothing.wait(min(_LOOK_S, self._crew.clock.rest_s()))
 
-    def _poll(self) -> list[Any]:
+    def _poll(self) -> list[FramePoses]:
         """Read on where the file has grown; the folder is searched now and then."""
         now_s = time.monotonic()
         self._before_s, self._looked_s = self._looked_s, now_s
@@ -322,11 +324,23 @@ class _Loop:
             return []
         self._size, self._searched_s = size, now_s
         try:
-            return self._follower.poll()
+            return self._sound(self._follower.poll())
         except DamagedError as error:
             path = self._follower.path or self._opened.trial.root / "poses"
             self._crew.tell(LeftOut(path=path, problem=str(error), hint=error.hint))
             return []
+
+    def _sound(self, frames: list[FramePoses]) -> list[FramePoses]:
+        """Return the frames that can be of a trial; of the others the first is told."""
+        found = [poses for poses in frames if is_frame(poses.time_s, poses.frame)]
+        if len(found) < len(frames) and not self._is_unsound:
+            self._is_unsound = True
+            path = self._follower.path or self._opened.trial.root / "poses"
+            bad = next(poses for poses in frames if not is_frame(poses.time_s, poses.frame))
+            problem = f"{path}: frame {bad.frame} is said to be of {bad.time_s} s."
+            hint = "Frames count from 0, seconds from the start of the trial; such are left out."
+            self._crew.tell(LeftOut(path=path, problem=problem, hint=hint))
+        return found
 
     def _stat(self) -> tuple[int, int]:
         try:

@@ -17,10 +17,12 @@ from zfcal.online.pilot import InForce, Manner, Pilot, Target, command_item, tar
 from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import PATIENCE_S, FishBot, Watchdog
 from zfcal.robot.motion import TICK_S
-from zfcal.tracks import FramePoses
+from zfcal.tracks import ROBOT, FramePoses
 
 _MOST_HISTORIES = 5
 """Looks at which more than one step is due, after which ticks begin even so: poses come in lots."""
+
+IMPLAUSIBLE = "implausible-pose"
 
 _SAYS = {
     "stale-pose": "The robot has not been seen for 0.5 s: it was stopped.",
@@ -87,6 +89,8 @@ class Driver:
         self._n_histories = 0
         self._seen_s = -math.inf
         self._held = ""
+        self._doubted_s = -math.inf
+        self._doubted: set[str] = set()
         self._n_bites = 0
         self.n_targets = 0
         self.n_commands = 0
@@ -204,10 +208,27 @@ class Driver:
         place: dict[str, float | None] = {"x_m": None, "y_m": None, "heading_rad": None}
         if seen and pose is not None:
             place = {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad}
-        agents = len(poses.agents) - seen
-        item = {"what": "pose", "time_s": poses.time_s, "frame": poses.frame, "agents": agents}
-        self._crew.log.add(item | place)
+        item = {"what": "pose", "time_s": poses.time_s, "frame": poses.frame}
+        self._crew.log.add(item | {"agents": self.pilot.n_others} | place)
+        self._tell_doubts(poses.time_s)
         self._note(target)
+
+    def _tell_doubts(self, time_s: float) -> None:
+        """Say who was left out: of the robot as a fault, of fish once for each reason."""
+        robots = [doubt for agent, doubt in self.pilot.doubts if agent.kind == ROBOT]
+        if robots:
+            if math.isinf(self._doubted_s):
+                says = f"The robot's pose is implausible and not driven by: {robots[0].says}."
+                self._fault(time_s, IMPLAUSIBLE, says)
+            self._doubted_s = time_s
+        elif time_s - self._doubted_s > PATIENCE_S and not math.isinf(self._doubted_s):
+            self._doubted_s = -math.inf
+            self._fault(time_s, IMPLAUSIBLE, f"No more {IMPLAUSIBLE}.", ended=True)
+        for agent, doubt in self.pilot.doubts:
+            if agent.kind != ROBOT and doubt.kind not in self._doubted:
+                self._doubted.add(doubt.kind)
+                text = f"{time_s:.1f} s: fish {agent.agent} counts as absent: {doubt.says}."
+                self._crew.tell(Note(text=text, warning=True))
 
     def _count_late(self, frames: list[FramePoses]) -> None:
         """Count steps that nobody swims by, since frames of the next one have come as well."""
@@ -256,7 +277,7 @@ class Driver:
         if sent and self._crew.clock.is_live:
             self._measure(time.perf_counter() - due_s)
         self.n_commands += 1
-        self._tell_changes(time_s, held)
+        self._tell_changes(time_s, command.held if command.held == "refused" else held)
         told = {"sent": sent, "n_sent": self._crew.robot.n_sent}
         self._crew.log.add(command_item(command, self._letter) | told)
 

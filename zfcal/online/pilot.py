@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.errors import InputError
 from zfcal.model.among import Among, Move
 from zfcal.model.kernels.world import Packed
 from zfcal.online.opening import OpenTrial
@@ -23,6 +24,7 @@ from zfcal.robot.body import RADIUS_M, Pose, Wheels, wheels_for
 from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import Gains, Goal, bearing, pattern_of
+from zfcal.robot.plausible import Doubt, Plausibility, Reach
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -125,6 +127,15 @@ class Pilot:
         How to drive.
     robot
         Puts wheel speeds into messages; nothing is sent from here.
+
+    Attributes
+    ----------
+    pose
+        Where the robot was last seen; None before that.
+    n_others
+        How many others the last frame showed.
+    doubts
+        Who of the last frame was left out, and why: implausible poses are no poses.
     """
 
     def __init__(self, opened: OpenTrial, manner: Manner, robot: FishBot) -> None:
@@ -142,7 +153,10 @@ class Pilot:
         self._among = Among(opened.arena, self._seats.kinds, dt_s=trial.dt_s)
         self._target: Target | None = None
         self._step: int | None = None
+        self._plausibility, self._reach = Plausibility(opened.arena), Reach()
         self.pose: Pose | None = None
+        self.n_others = 0
+        self.doubts: list[tuple[AgentPose, Doubt]] = []
         self.frame = 0
         self.n_missed = 0
 
@@ -177,7 +191,11 @@ class Pilot:
 
     def see(self, poses: FramePoses, model: InForce) -> Target | None:
         """Take the next frame; return the new target where a step is due and one is found."""
-        robot, others = self._tell_apart(poses)
+        robot, others = self._tell_apart(self._plausible(poses.agents))
+        if robot is not None and (doubt := self._reach.doubt(poses.time_s, robot.x_m, robot.y_m)):
+            self.doubts.append((robot, doubt))
+            robot = None
+        self.n_others = len(others)
         self.frame = poses.frame
         if robot is not None:
             heading = robot.heading_rad
@@ -208,19 +226,18 @@ class Pilot:
             Why the robot may not be driven on; empty if it may.
         """
         target, pose = self._target, self.pose
+        wheels, message = Wheels(), None
         if target is None or pose is None:
             held = held or "no-target"
-        if target is None or pose is None or held not in {"", TURNING}:
+        elif held in {"", TURNING}:
+            try:
+                wheels = self._wheels(pose, target.goal, time_s, turning=held == TURNING)
+                message = self._robot.frame_for(wheels)
+            except InputError:
+                wheels, held = Wheels(), "refused"
+        if message is None:
             self._pattern.reset()
-            wheels, message = Wheels(), self._robot.stop_frame()
-        elif held == TURNING:
-            # Not into what is in the way; the model's next targets lead elsewhere.
-            _, error = bearing(pose, target.goal)
-            wheels = wheels_for(0.0, self._manner.gains.turn_p * error)
-            message = self._robot.frame_for(wheels)
-        else:
-            wheels = self._pattern.command(pose, target.goal, time_s)
-            message = self._robot.frame_for(wheels)
+            message = self._robot.stop_frame()
         return Command(
             time_s=time_s,
             frame=self.frame,
@@ -230,16 +247,32 @@ class Pilot:
             message=message,
         )
 
-    def _tell_apart(self, poses: FramePoses) -> tuple[AgentPose | None, list[AgentPose]]:
+    def _wheels(self, pose: Pose, goal: Goal, time_s: float, *, turning: bool) -> Wheels:
+        """Return the wheel speeds towards a goal; raise an `InputError` where it is none."""
+        if not all(map(math.isfinite, (goal.x_m, goal.y_m, goal.speed_m_s))):
+            raise InputError(f"A goal is a finite place with a finite speed, got {goal}.")
+        if turning:
+            # Not into what is in the way; the model's next targets lead elsewhere.
+            _, error = bearing(pose, goal)
+            return wheels_for(0.0, self._manner.gains.turn_p * error)
+        return self._pattern.command(pose, goal, time_s)
+
+    def _plausible(self, agents: tuple[AgentPose, ...]) -> list[AgentPose]:
+        """Return those who can be where they are said to be, and note the others."""
+        found = [(agent, self._plausibility.doubt(agent)) for agent in agents]
+        self.doubts = [(agent, doubt) for agent, doubt in found if doubt is not None]
+        return [agent for agent, doubt in found if doubt is None]
+
+    def _tell_apart(self, agents: list[AgentPose]) -> tuple[AgentPose | None, list[AgentPose]]:
         """Return our robot, the one nearest to where it was, and all others."""
-        robots = [agent for agent in poses.agents if agent.kind == ROBOT]
+        robots = [agent for agent in agents if agent.kind == ROBOT]
         if not robots:
-            return None, list(poses.agents)
+            return None, agents
         here = self.pose
         own = robots[0]
         if here is not None and len(robots) > 1:
             own = min(robots, key=lambda r: math.hypot(r.x_m - here.x_m, r.y_m - here.y_m))
-        return own, [agent for agent in poses.agents if agent is not own]
+        return own, [agent for agent in agents if agent is not own]
 
     def _place(self, *, seen: bool) -> bool:
         """Put the model's agent where it is; return whether it is anywhere."""
@@ -260,7 +293,7 @@ class Pilot:
     def _aim(self, poses: FramePoses, step: int, model: InForce) -> Target | None:
         key = np.random.SeedSequence(self._seed, spawn_key=(DRAWS, step))
         move = self._among.step(model.packed, int(key.generate_state(1, np.uint64)[0]))
-        if move is None:
+        if move is None or not all(map(math.isfinite, (move.x_m, move.y_m, move.speed_m_s))):
             return None
         x, y, clamped = self._confines.clamp(move.x_m, move.y_m)
         return Target(
