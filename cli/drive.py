@@ -15,7 +15,7 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "e
 
 
 @click.command("drive")
-@click.argument("trial", type=PLACE)
+@click.argument("trial", type=PLACE, required=False)
 @click.option("--port", metavar="DEV|virtual", help="Serial port of the robot, or a virtual one.")
 @click.option(
     "--pattern",
@@ -64,10 +64,15 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "e
 )
 @click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
 @click.option("--force", is_flag=True, help="Remove what an earlier drive left.")
+@click.option(
+    "--stop",
+    is_flag=True,
+    help="Send STOP to --port and nothing else, at once; needs no trial.",
+)
 @speaks
 def command(
     out: Output,
-    trial: Path,
+    trial: Path | None,
     *,
     port: str | None,
     pattern: str,
@@ -81,6 +86,7 @@ def command(
     events: bool,
     replay: bool,
     force: bool,
+    stop: bool,
 ) -> None:
     r"""Drive the robot by the newest model while the poses grow.
 
@@ -95,7 +101,13 @@ def command(
         zfcal drive trial --port virtual --events
         zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
+        zfcal drive --stop --port /dev/rfcomm5
     """
+    if stop:
+        _stop(out, port)
+        return
+    if trial is None:
+        raise click.UsageError("Missing argument 'TRIAL'.")
     if replay:
         _replay(out, trial)
         return
@@ -126,6 +138,30 @@ def command(
     def work() -> None:
         with DriveVoice(out, events=events) as voice:
             voice.because = drive(trial, options, voice.hear, task=Task(force=force))
+
+    out.attempt(work)
+
+
+def _stop(out: Output, port: str | None) -> None:
+    """Stop the robot at a port, whoever drives it; nothing heavy is loaded for that."""
+    from zfcal.robot.stopping import stop_at
+
+    idle = (_DRIVING - {"port"}) | {"duration_s", "publish", "publish_zones", "replay"}
+    _refuse(idle, "--stop: it sends STOP and nothing else.")
+    if port is None:
+        raise click.UsageError("Missing option '--port': the serial port to stop.")
+    if port == "virtual":
+        raise click.UsageError("--stop is for a robot that is there: give its serial port.")
+
+    def work() -> None:
+        is_held = stop_at(port)
+        out.note(f"{port}: STOP was sent.")
+        if is_held:
+            out.note(
+                "Another process has the port: a drive goes on at its next tick. "
+                "End it with Ctrl-C, and say STOP again."
+            )
+        out.result({"port": port, "sent": "STOP", "is_held_by_another": is_held})
 
     out.attempt(work)
 

@@ -47,6 +47,7 @@ def seen(x_m, y_m, *, confidence=1.0, heading_rad=0.0):
         (seen(0.5, 0.5, confidence=NAN), "unsure"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_a_pose_is_finite_sure_and_in_the_tank(judge, pose, kind):
     """Within a tolerance of 3 cm; a heading may be unknown."""
     doubt = judge.doubt(pose)
