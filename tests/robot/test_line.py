@@ -398,3 +398,17 @@ def test_an_obstacle_clears_after_half_a_second():
     complaints.hear(Said(what="obstacle", robot="F"), 1.0)
     assert complaints.fault(1.49) == "obstacle"
     assert complaints.fault(1.51) == ""
+
+
+def test_a_port_that_is_opened_again_has_a_helper_that_knows_until_when(start_virtual, until):
+    """What it was told last holds, though no pose has come since."""
+    robot = start_virtual("--noise", "0", "--lag-s", "0")
+    line = connected(robot, until)
+    bot = FishBot("F", line)
+    bot.release(time.monotonic() + 2.0)
+    robot.control.ask("unplug")
+    assert until(lambda: not drive(bot))
+    robot.control.ask("plug")
+    assert until(lambda: drive(bot))
+    assert until(lambda: STOP in heard(robot))
+    bot.close()

@@ -278,8 +278,11 @@ class Pilot:
         """Put the model's agent where it is; return whether it is anywhere."""
         if self._manner.free_running and self._target is not None:
             goal = self._target.goal
-            self._among.place(goal.x_m, goal.y_m, self._target.move.heading_rad)
-            return True
+            if math.isfinite(goal.x_m + goal.y_m):
+                self._among.place(goal.x_m, goal.y_m, self._target.move.heading_rad)
+                if self._among.zone:
+                    return True
+            # No place in the tank: it begins anew at the robot.
         pose = self.pose
         if pose is None or not seen:
             return False

@@ -92,6 +92,7 @@ class SerialLine:
         self._output: Output | None = None
         self._helper: Helper | None = None
         self._full_since_s = float("inf")
+        self._until_s = 0.0
         self._closing = threading.Event()
         self._wanted = threading.Event()
         self._wanted.set()
@@ -133,6 +134,8 @@ class SerialLine:
 
     def beat(self, until_s: float) -> None:
         """Tell the helper until when the robot may move."""
+        # Kept as well: a port that is opened again has a helper that has heard nothing yet.
+        self._until_s = until_s
         helper = self._helper
         if helper is not None:
             helper.slate.until_s = until_s
@@ -192,6 +195,7 @@ class SerialLine:
                 helper.kill()
                 return False
             self._helper, self._output, self._serial = helper, output, opened
+            helper.slate.until_s = self._until_s
             self._attempt(lambda _: output.begin())
             self.n_opened += 1
         return self.is_open
