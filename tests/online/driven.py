@@ -1,5 +1,9 @@
-"""Trials with poses that grow, for tests of the driver."""
+"""Trials with poses that grow, for tests of the driver.
 
+`LivePoses.changes` is what is wrong with the robot's pose, and `fresh_s` when it last was right.
+"""
+
+import dataclasses
 import math
 import threading
 import time
@@ -74,6 +78,8 @@ class LivePoses:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._write, daemon=True)
         self.without = set()
+        self.changes = {}
+        self.fresh_s = 0.0
 
     def freeze(self):
         """Let no more frames come."""
@@ -97,8 +103,15 @@ class LivePoses:
                     writer.close()
                 start_s = minute
                 writer = PoseWriter(self._root / "poses" / f"{minute:06d}.mcap", LINEAGE)
-            agents = tuple(a for a in poses.agents if a.agent not in self.without)
+            agents = tuple(
+                dataclasses.replace(a, **self.changes) if a.kind == ROBOT else a
+                for a in poses.agents
+                if a.agent not in self.without
+            )
+            is_fresh = not self.changes and 4 not in self.without
             writer.add(FramePoses(time_s=poses.time_s, frame=poses.frame, agents=agents))
+            if is_fresh:
+                self.fresh_s = time.monotonic()
 
     def __enter__(self):
         self._thread.start()
