@@ -187,7 +187,8 @@ class World:
         self.helper_runs, self.helper_due_s, self.helper_wakes_s = True, math.inf, 0.0
         self.driver_runs, self.hangs_until_s = True, 0.0
         self.sees, self.wrong = True, None
-        self.fresh_s, self.late_until_s, self.deaf_until_s = -math.inf, 0.0, 0.0
+        self.written_s, self.fresh_s = -math.inf, -math.inf
+        self.late_until_s, self.deaf_until_s = 0.0, 0.0
         self.frame, self.pending, self.anchors = 0, [], []
         self.start_driver()
 
@@ -253,7 +254,8 @@ class World:
         if self.wrong != "lost":
             agents.append(AgentPose(agent=4, kind=ROBOT, **robot))
         if self.wrong is None or (self.wrong == "jumping" and self.is_in_reach(robot)):
-            self.fresh_s = self.now_s
+            # Fresh for whoever takes it; a driver that is stopped knows nothing of it.
+            self.written_s = self.now_s
             self.anchors.append((self.now_s, robot["x_m"], robot["y_m"]))
             del self.anchors[:-300]
         poses = FramePoses(time_s=frame / FPS, frame=frame, agents=tuple(agents))
@@ -273,6 +275,7 @@ class World:
         if self.now_s < self.hangs_until_s:
             return
         frames, self.pending = self.pending, []
+        self.fresh_s = self.written_s
         since_s, self.looked_s = self.now_s - self.looked_s, self.now_s
         self.driver.listen()
         self.driver.take(frames, age_s=STEP_S if frames else None, looked_s=since_s)
@@ -413,7 +416,7 @@ class Stops(RuleBasedStateMachine):
         world.pass_s(0.1)
 
     @precondition(lambda self: self.is_whole)
-    @rule(seconds=st.sampled_from([0.05, 0.3, 0.9]), late=st.booleans())
+    @rule(seconds=st.sampled_from([0.05, 0.7, 0.9]), late=st.booleans())
     def driver_is_stopped(self, seconds, late):
         """Ctrl-Z or SIGSTOP for a while; maybe between a look at the clock and a write."""
         world = self.world
@@ -520,7 +523,7 @@ def test_the_robot_stops_whatever_happens():
     """Some hundred steps; `make test-slow` does more than ten thousand."""
     COUNTED.clear()
     run_state_machine_as_test(
-        Stops, settings=settings(max_examples=12, stateful_step_count=30, **HOW)
+        Stops, settings=settings(max_examples=30, stateful_step_count=25, **HOW)
     )
     assert COUNTED["steps"] > 200
     assert COUNTED["checked while stale"] > 500
@@ -531,7 +534,7 @@ def test_the_robot_stops_whatever_happens_in_ten_thousand_steps():
     """And each way to be held was met, and each time it was driven on when all was well."""
     COUNTED.clear()
     run_state_machine_as_test(
-        Stops, settings=settings(max_examples=240, stateful_step_count=50, **HOW)
+        Stops, settings=settings(max_examples=215, stateful_step_count=50, **HOW)
     )
     assert COUNTED["steps"] >= 10_000
     assert COUNTED["driven on"] > 100
