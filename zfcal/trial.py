@@ -15,6 +15,9 @@ LOOP_NAME = "closed-loop.json"
 
 _DIGITS = 6
 
+NUMBER = "(?:[0-9]{6}|[1-9][0-9]{6,8})"
+"""How artifacts are numbered: each second has one name, up to thirty years."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
@@ -111,5 +114,5 @@ def second_of(path: Path, ending: str = ".parquet") -> int | None:
     >>> second_of(Path("tracks/000060.parquet"))
     60
     """
-    match = re.fullmatch(r"(\d{6,})" + re.escape(ending), path.name)
+    match = re.fullmatch(f"({NUMBER}){re.escape(ending)}", path.name)
     return int(match.group(1)) if match else None

@@ -41,14 +41,14 @@ def test_the_hash_is_that_of_the_bytes(place):
 
 def test_a_hash_follows_two_writes_within_one_tick_of_the_clock(place, monkeypatch):
     """A content of the same length, written at once in the same inode, has a hash of its own."""
-    tick_ns, exact = 20_000_000, reading._looks_of
+    tick_ns, exact = 20_000_000, reading.looks_of
 
     def coarse(path):
         device, inode, modified_ns, changed_ns, size = exact(path)
         ticks = (modified_ns // tick_ns * tick_ns, changed_ns // tick_ns * tick_ns)
         return (device, inode, *ticks, size)
 
-    monkeypatch.setattr(reading, "_looks_of", coarse)
+    monkeypatch.setattr(reading, "looks_of", coarse)
     for n in range(50):
         data = f"{n:03d}".encode()
         with place.open("r+b") as file:

@@ -111,7 +111,7 @@ def test_text_that_is_no_toml_is_damage(tmp_path, text, says):
         (b'{"a": NaN}', "NaN is not a number in JSON"),
         (b'{"a": -Infinity}', "-Infinity is not a number"),
         (b"\xff\xfe\x00", "no UTF-8 text"),
-        (b"[" * 100_000, "nest too deep"),
+        (b"[" * 100_000, "nests deeper than 100"),
         (b"", "the file is empty"),
     ],
 )

@@ -16,7 +16,8 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-from zfcal.artifacts.reading import check_contents, forget_content
+from zfcal.artifacts.places import check_inside
+from zfcal.artifacts.reading import check_contents, forget_content, open_to_write
 from zfcal.errors import StorageError
 
 _COUNTER = itertools.count()
@@ -32,6 +33,8 @@ _HINTS = {
     errno.EPERM: "You may not write there: change its permissions, or copy the trial.",
     errno.ENOTDIR: "A file stands where a folder is needed: move it away.",
     errno.EEXIST: "A file stands where a folder is needed: move it away.",
+    errno.ELOOP: "A symbolic link stands where the file is to go: move it away.",
+    errno.EXDEV: "Put a folder of its own there: nothing is written outside the trial.",
     errno.EISDIR: "A folder stands where the file is to go: move it away.",
 }
 # What a directory that cannot be flushed says: some network file systems have no such call.
@@ -64,8 +67,11 @@ def write_whole(path: Path, write: Callable[[Path], None], *, parents: bool = Tr
     part = _part_of(path)
     _IN_USE.add(part.name)
     try:
+        check_inside(path.parent)
         path.parent.mkdir(parents=parents, exist_ok=True)
         _remove_orphans(path)
+        # What stands there by chance or by intent, such as a link, is not written through.
+        part.unlink(missing_ok=True)
         write(part)
         _flush(part)
         check_contents()
@@ -107,7 +113,7 @@ def append_bytes(path: Path, data: bytes) -> None:
         The disk is full, or the place cannot be written.
     """
     try:
-        with path.open("ab") as file:
+        with open_to_write(path, append=True) as file:
             file.write(data)
         forget_content(path)
         _flush(path)

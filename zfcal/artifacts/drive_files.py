@@ -8,7 +8,6 @@ together lie in one chunk, which is flushed at once.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -25,9 +24,11 @@ from mcap_protobuf.schema import register_schema
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, to_json
 from zfcal.artifacts.mcap_files import Overview, read_messages
+from zfcal.artifacts.parsing import json_of
+from zfcal.artifacts.places import check_inside
 from zfcal.artifacts.pose_files import LIBRARY
-from zfcal.errors import DamagedError
-from zfcal.trial import second_of
+from zfcal.artifacts.reading import numbered_of, open_to_write
+from zfcal.errors import DamagedError, InputError
 
 DRIVE = "zfcal.drive/1"
 LATENCY_KEY = "zfcal.latency"
@@ -75,8 +76,9 @@ class DriveWriter:
         part = path.with_name(f".{path.name}.taken-up")
         try:
             # Not the trial itself: one that was moved away must not come into being again.
+            check_inside(path.parent)
             path.parent.mkdir(exist_ok=True)
-            self._file = part.open("wb")
+            self._file = open_to_write(part)
             self._writer = Writer(self._file, chunk_size=2**22)
             self._writer.start(profile="", library=LIBRARY)
             self._writer.add_metadata(LINEAGE_KEY, lineage.as_text())
@@ -171,14 +173,12 @@ def read_drive(path: Path) -> Iterator[Item]:
 
 def drive_files(root: Path) -> dict[int, Path]:
     """Return the files of a trial's drive by the second at which they start, in order."""
-    found = {second_of(path, ".mcap"): path for path in (root / "drive").glob("*.mcap")}
-    known = {second: path for second, path in found.items() if second is not None}
-    return dict(sorted(known.items()))
+    return numbered_of(root / "drive", ".mcap")
 
 
 def _item(path: Path, channel: Channel, message: Message) -> Item:
     try:
-        found = json.loads(message.data)
+        found = json_of(message.data)
         if TOPICS[found["what"]] == channel.topic:
             return dict(found)
     except (ValueError, KeyError, TypeError):
@@ -200,7 +200,7 @@ def _earlier(path: Path) -> list[tuple[str, int, bytes]]:
             for channel, message in read_messages(path, Overview())
             if channel.topic in known
         ]
-    except DamagedError:
+    except (DamagedError, InputError):
         return []
 
 

@@ -18,16 +18,22 @@ from typing import Any, Self, final
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
-from mcap.reader import make_reader
-from mcap.records import Channel, Message
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile, McapError
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, Message
+from mcap.summary import Summary
 from mcap.well_known import MessageEncoding
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
 from zfcal.artifacts.atomic import storage_error
+from zfcal.artifacts.limits import CHUNK_BYTES, largest
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, package_version
-from zfcal.artifacts.mcap_files import BROKEN, Overview, read_messages
-from zfcal.artifacts.reading import open_regular, unreadable
+from zfcal.artifacts.mcap_files import BROKEN, Overview, read_messages, records_of
+from zfcal.artifacts.pixels import check_pixels
+from zfcal.artifacts.places import check_inside
+from zfcal.artifacts.reading import numbered_of, open_regular, unreadable
 from zfcal.errors import DamagedError, InputError
 from zfcal.trial import second_of
 
@@ -102,6 +108,7 @@ class FrameWriter:
         self._last_ns = 0
         self._n_frames = 0
         try:
+            check_inside(path.parent)
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = self._new(path)
             # A chunk ends as soon as it holds anything; JPEG and PNG are as small as they get.
@@ -273,8 +280,7 @@ def read_frames(
 
 def frame_segments(folder: Path) -> list[Path]:
     """Return the image files of a folder by the second at which they start."""
-    found = ((second_of(path, ".mcap"), path) for path in folder.glob("*.mcap"))
-    return [path for second, path in sorted((s, p) for s, p in found if s is not None)]
+    return list(numbered_of(folder, ".mcap").values())
 
 
 def _read_folder(
@@ -305,10 +311,10 @@ def _indexed(
     """Return the messages from a second on by the file's index; None if it has none."""
     try:
         with open_regular(path) as file:
-            summary = make_reader(file).get_summary()
+            summary = SeekingReader(file, record_size_limit=largest(CHUNK_BYTES)).get_summary()
     except OSError as error:
         raise unreadable(path, error) from error
-    except BROKEN:
+    except (EndOfFile, *BROKEN):
         return None
     if summary is None or not summary.chunk_indexes:
         return None
@@ -316,20 +322,34 @@ def _indexed(
         schema = summary.schemas.get(channel.schema_id)
         found.schemas[channel.topic] = schema.name if schema else ""
     found.whole = True
-    return _seek(path, round(start_s * _NS), found)
+    return _seek(path, summary, round(start_s * _NS), found)
 
 
-def _seek(path: Path, start_ns: int, found: Overview) -> Iterator[tuple[Channel, Message]]:
-    with open_regular(path) as file:
-        reader = make_reader(file, validate_crcs=True)
-        messages = reader.iter_messages(starting_at=start_ns, log_time_order=False)
-        try:
-            for _, channel, message in messages:
-                found.counts[channel.topic] += 1
-                yield channel, message
-        except BROKEN as error:
-            found.whole = False
-            found.problem = f"a damaged record ({error})"
+def _seek(
+    path: Path, summary: Summary, start_ns: int, found: Overview
+) -> Iterator[tuple[Channel, Message]]:
+    try:
+        with open_regular(path) as file:
+            for index in summary.chunk_indexes:
+                if index.message_end_time < start_ns:
+                    continue
+                # Behind the kind and the length of the record.
+                file.seek(index.chunk_start_offset + 9)
+                for record in records_of(Chunk.read(ReadDataStream(file))):
+                    if isinstance(record, Message) and record.log_time >= start_ns:
+                        yield _counted(record, summary, found), record
+    except (EndOfFile, *BROKEN) as error:
+        found.whole = False
+        found.problem = f"a damaged record ({error})"
+
+
+def _counted(message: Message, summary: Summary, found: Overview) -> Channel:
+    channel = summary.channels.get(message.channel_id)
+    if channel is None:
+        text = f"a message of the unknown channel {message.channel_id}"
+        raise McapError(text)
+    found.counts[channel.topic] += 1
+    return channel
 
 
 def _decoded(path: Path, data: bytes) -> tuple[float, bytes]:
@@ -341,6 +361,7 @@ def _decoded(path: Path, data: bytes) -> tuple[float, bytes]:
             f"{path}: an image's message cannot be decoded ({error}).",
             hint=f"See how much of it can be read with: zfcal inspect {path}",
         ) from error
+    check_pixels(path, message.data)
     stamp = message.timestamp
     return stamp.seconds + stamp.nanos / _NS, message.data
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.artifacts.pixels import check_pixels
 from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError
 
@@ -29,7 +30,12 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     """
     data = read_bytes(path)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
+    check_pixels(path, data)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
+    except cv2.error:
+        # Its own limit on sizes, for the forms whose head is not read here.
+        image = None
     if image is None:
         raise DamagedError(
             f"{path}: is no image that can be read.",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import struct
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -17,7 +16,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias, Union
 
-from zfcal.artifacts.reading import open_regular, unreadable
+from zfcal.artifacts.parsing import json_of, toml_of
+from zfcal.artifacts.reading import open_regular, read_limited, unreadable
 from zfcal.errors import DamagedError, InputError
 
 JSON: TypeAlias = Union["Mapping[str, JSON]", "Sequence[JSON]", str, int, float, bool, None]
@@ -123,7 +123,7 @@ def read_lineage(path: Path) -> Lineage:
         return _from_dict(path, reader(path))
     except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
         raise unreadable(path, error) from error
-    except (OSError, ValueError, struct.error) as error:
+    except (OSError, ValueError, MemoryError, struct.error) as error:
         raise DamagedError(
             f"{path}: cannot be read whole ({first_line(error)}).",
             hint="Copy it again from where it was made, or remove it and make it anew.",
@@ -165,21 +165,20 @@ def _of_parquet(path: Path) -> Mapping[str, Any] | None:
     with open_regular(path) as file:
         metadata = pq.ParquetFile(file).metadata.metadata or {}
     text = metadata.get(LINEAGE_KEY.encode())
-    return None if text is None else _as_mapping(json.loads(text))
+    return None if text is None else _as_mapping(json_of(text))
 
 
 def _text_of(path: Path) -> str:
     # An artifact is asked where it comes from, not read: what it holds bears on nothing here.
-    with open_regular(path) as file:
-        return file.read().decode()
+    return read_limited(path).decode("utf-8-sig")
 
 
 def _of_toml(path: Path) -> Mapping[str, Any] | None:
-    return _of_document(tomllib.loads(_text_of(path)))
+    return _of_document(toml_of(_text_of(path)))
 
 
 def _of_json(path: Path) -> Mapping[str, Any] | None:
-    return _of_document(_as_mapping(json.loads(_text_of(path))))
+    return _of_document(_as_mapping(json_of(_text_of(path))))
 
 
 def _of_mcap(path: Path) -> Mapping[str, Any] | None:
@@ -189,7 +188,7 @@ def _of_mcap(path: Path) -> Mapping[str, Any] | None:
     if record is None:
         return None
     as_json = {"options", "inputs", "seed"}
-    return {key: json.loads(text) if key in as_json else text for key, text in record.items()}
+    return {key: json_of(text) if key in as_json else text for key, text in record.items()}
 
 
 def _of_document(document: Mapping[str, Any]) -> Mapping[str, Any] | None:

@@ -32,7 +32,9 @@ def lock(root: Path, command: str) -> Iterator[None]:
     """
     path = root / f".lock-{command}"
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        # A link is not followed: the file would come into being wherever it leads.
+        how = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+        descriptor = os.open(path, how, 0o666)
     except OSError as error:
         raise storage_error(path, error) from error
     try:

@@ -5,7 +5,9 @@ Decoding messages is the business of those who write them.
 
 from __future__ import annotations
 
+import dataclasses
 import io
+import os
 import struct
 from collections import Counter
 from collections.abc import Iterator
@@ -13,16 +15,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import zstandard
-from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.exceptions import EndOfFile, McapError, UnsupportedCompressionError
+from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 
+from zfcal.artifacts.limits import CHUNK_BYTES, largest
 from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError
-
-_RECORD_LIMIT = 2**28
-"""Bytes of the longest record that is believed: a damaged length asks for more."""
 
 BROKEN = (
     McapError,
@@ -156,6 +157,62 @@ def read_metadata(path: Path, name: str) -> dict[str, str] | None:
     return None
 
 
+def unpacked(source: Any, *, skip_magic: bool = False) -> Iterator[McapRecord]:
+    """Yield the records of an open file, and those of a chunk in its place.
+
+    Raises
+    ------
+    EndOfFile, or one of BROKEN
+        What is read is cut short, is damaged, or unpacks to more than is believed.
+    """
+    reader = StreamReader(
+        source,
+        skip_magic=skip_magic,
+        emit_chunks=True,
+        validate_crcs=True,
+        record_size_limit=largest(CHUNK_BYTES),
+    )
+    for record in reader.records:
+        if isinstance(record, Chunk):
+            yield from records_of(record)
+        else:
+            yield record
+
+
+def records_of(chunk: Chunk) -> list[McapRecord]:
+    """Return the records of a chunk, which unpacks to what it claims and to no more.
+
+    Raises
+    ------
+    EndOfFile, or one of BROKEN
+        It does not, or is damaged.
+    """
+    most = largest(CHUNK_BYTES)
+    if chunk.compression and chunk.uncompressed_size > most:
+        message = f"a chunk claims to unpack to {chunk.uncompressed_size} bytes, at most {most} are"
+        raise McapError(message)
+    plain = dataclasses.replace(chunk, compression="", data=_plain(chunk))
+    return breakup_chunk(plain, validate_crc=True)
+
+
+def _plain(chunk: Chunk) -> bytes:
+    """Return what a chunk holds; the library itself would unpack without end."""
+    size = chunk.uncompressed_size
+    if chunk.compression == "":
+        return chunk.data
+    if chunk.compression == "zstd":
+        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+            data = reader.read(size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    else:
+        raise UnsupportedCompressionError(chunk.compression)
+    if len(data) != size:
+        message = f"a chunk unpacks to another size than the {size} bytes that it claims"
+        raise McapError(message)
+    return bytes(data)
+
+
 class _Bounded:
     """An open file that ends a reading which asks for more than is there.
 
@@ -181,11 +238,10 @@ def _records(path: Path, found: Overview) -> Iterator[tuple[McapRecord, int]]:
     except OSError as error:
         raise unreadable(path, error) from error
     with file:
-        found.total_bytes = path.stat().st_size
+        found.total_bytes = os.fstat(file.fileno()).st_size
         _check_magic(path, file, found.total_bytes)
         bounded: Any = _Bounded(file, found.total_bytes)
-        reader = StreamReader(bounded, validate_crcs=True, record_size_limit=_RECORD_LIMIT)
-        for record in reader.records:
+        for record in unpacked(bounded):
             yield record, file.tell()
 
 

@@ -12,10 +12,11 @@ import tomlkit
 from zfcal.arena import Arena
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.reading import numbered_of
 from zfcal.artifacts.validation import check, descriptions_of, nearest, read_toml
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters, ZoneParameters
-from zfcal.trial import Trial, second_of
+from zfcal.trial import Trial
 
 SCHEMA = "zfcal.model/1"
 
@@ -155,14 +156,13 @@ def newest_model(trial: Trial) -> Path:
         There is none.
     """
     folder = trial.root / "models"
-    found = [(second_of(path, ".toml"), path) for path in folder.glob("*.toml")]
-    numbered = [(second, path) for second, path in found if second is not None]
-    if not numbered:
+    known = numbered_of(folder, ".toml")
+    if not known:
         raise InputError(
             f"{folder}: holds no numbered model.",
             hint=f"Make one with: zfcal calibrate {trial.root}",
         )
-    return max(numbered)[1]
+    return known[max(known)]
 
 
 def _parameters(document: dict[str, Any]) -> Parameters:

@@ -7,8 +7,9 @@ viewers. Log times are seconds since the start of the trial.
 
 from __future__ import annotations
 
-import json
 import math
+import os
+import time
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
@@ -23,15 +24,29 @@ from mcap_protobuf.schema import register_schema
 from zfcal.arena import Arena
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, to_json
+from zfcal.artifacts.parsing import json_of
+from zfcal.artifacts.places import check_inside
+from zfcal.artifacts.reading import Looks, looks_of, numbered_of, open_to_write
 from zfcal.artifacts.tailing import Tail
 from zfcal.errors import DamagedError, InputError
 from zfcal.tracks import KINDS, ROBOT, AgentPose, FramePoses
 from zfcal.trial import second_of
+from zfcal.units import SEGMENT_S
 
 POSES = "zfcal.poses/1"
 LIBRARY = "zfcal"
 CLOCK_KEY = "zfcal.clock"
 """Metadata record of a live recording: when the trial began, in seconds since 1970."""
+
+_AHEAD_S, _SILENT_S = 60.0, 5.0
+"""A frame that is so far ahead of the clock is left out, unless none but such come for so long."""
+
+_EDGE_S = 1.0
+"""A frame may lie so far outside the minute that its file's name states."""
+
+_FARTHEST_M = 1000.0
+_LARGEST_ID = 2**31 - 1
+_MOST_AGENTS = 10_000
 
 _FRAME_ID = "arena"
 _FISH_COLOUR = (0.0, 0.45, 0.7, 1.0)
@@ -73,8 +88,9 @@ class PoseWriter:
         self._arena = arena
         try:
             # Not the trial itself: one that was moved away must not come into being again.
+            check_inside(path.parent)
             path.parent.mkdir(exist_ok=True)
-            self._file = path.open("wb")
+            self._file = open_to_write(path)
             self._writer = Writer(self._file, chunk_size=2**22)
             self._writer.start(profile="", library=LIBRARY)
             self._writer.add_metadata(LINEAGE_KEY, lineage.as_text())
@@ -141,7 +157,7 @@ def read_poses(path: Path) -> Iterator[FramePoses]:
     DamagedError
         It is no file of poses, or a record is damaged.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         raise InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
     for _, data in Tail(path, "/agents").messages():
         yield _from_json(path, data)
@@ -168,8 +184,13 @@ class PoseFollower:
 
     def __init__(self, root: Path, *, newest: bool = False) -> None:
         self._folder = root / "poses"
-        self._tail: Tail | None = None
         self._newest = newest
+        self._tail: Tail | None = None
+        self._known = -1
+        self._bad: dict[Path, Looks | None] = {}
+        self._told: set[Path] = set()
+        self._problems: list[DamagedError] = []
+        self._clock = _Clock() if newest else None
 
     @property
     def path(self) -> Path | None:
@@ -179,7 +200,7 @@ class PoseFollower:
     @property
     def is_closed(self) -> bool:
         """Whether the file that is followed has its footer: only a later file can bring more."""
-        return self._tail is not None and self._tail.is_closed
+        return bool(self._bad) if self._tail is None else self._tail.is_closed
 
     def poll(self) -> list[FramePoses]:
         """Return the poses that were added since the last question, maybe none.
@@ -187,35 +208,109 @@ class PoseFollower:
         Raises
         ------
         DamagedError
-            A record is damaged.
+            A file cannot be read, or holds what cannot be: told once of each. The next
+            question goes on behind it.
         """
         found: list[FramePoses] = []
         while True:
             # Looked for before reading: what is added meanwhile is not passed over.
             later = self._later()
             if self._tail is not None:
-                found += self._added(self._tail, later)
-            if later is None:
-                return found
-            self._tail = Tail(later, "/agents")
+                found += self._added(self._tail)
+            if later is None or not self._begin(later, found):
+                break
+        if self._problems and not found:
+            raise self._problems.pop(0)
+        return found
 
-    def _added(self, tail: Tail, later: Path | None) -> list[FramePoses]:
+    def _begin(self, path: Path, found: list[FramePoses]) -> bool:
+        """Go on with a later file, and return whether to look for one behind it.
+
+        A file of which nothing can be read does not take the place of one that may grow.
+        """
+        tail = Tail(path, "/agents")
+        looks = looks_of(path)
+        added = self._added(tail)
+        if tail.is_begun:
+            self._tail, self._known = tail, second_of(path, ".mcap") or 0
+            found += added
+            return True
+        if path in self._told:
+            self._bad[path] = looks
+            return True
+        return False
+
+    def _added(self, tail: Tail) -> list[FramePoses]:
+        """Return what a file gives; what is wrong with it is kept for the next question."""
+        found = []
         try:
-            return [_from_json(tail.path, data) for _, data in tail.poll()]
-        except DamagedError:
-            if later is not None:
-                # The next question goes on with the next file.
-                self._tail = Tail(later, "/agents")
-            raise
+            for _, data in tail.messages():
+                try:
+                    found.append(self._checked(tail.path, data))
+                except DamagedError as error:
+                    self._note(tail.path, error)
+        except (DamagedError, InputError) as error:
+            self._note(tail.path, error)
+        return found
+
+    def _checked(self, path: Path, data: bytes) -> FramePoses:
+        poses = _from_json(path, data)
+        if self._clock is not None and not self._clock.is_passing(poses.time_s):
+            raise DamagedError(
+                f"{path}: a frame of {poses.time_s:.3f} s runs ahead of the clock.",
+                hint="Check the time stamps of the tracker that writes there.",
+            )
+        return poses
+
+    def _note(self, path: Path, error: DamagedError | InputError) -> None:
+        """Keep what is wrong with a file until it is asked; the first time only."""
+        if path not in self._told:
+            self._told.add(path)
+            self._problems.append(DamagedError(str(error), hint=error.hint))
 
     def _later(self) -> Path | None:
-        """Return the file after the one that is read; None if there is none."""
-        known = -1 if self._tail is None else second_of(self._tail.path, ".mcap") or 0
-        files = {second_of(path, ".mcap"): path for path in self._folder.glob("*.mcap")}
-        later = [second for second in files if second is not None and second > known]
+        """Return the next file that may be read; None if there is none."""
+        try:
+            files = numbered_of(self._folder, ".mcap")
+        except InputError as error:
+            self._note(self._folder, error)
+            return None
+        later = [second for second, path in files.items() if self._is_later(second, path)]
         if not later:
             return None
         return files[max(later) if self._newest and self._tail is None else min(later)]
+
+    def _is_later(self, second: int, path: Path) -> bool:
+        if second <= self._known:
+            return False
+        # One that was bad is tried again when another one lies there.
+        return path not in self._bad or self._bad[path] != looks_of(path)
+
+
+@final
+class _Clock:
+    """Tells frames that come from those that claim a time which has not come yet."""
+
+    def __init__(self) -> None:
+        self._lead_s: float | None = None
+        self._taken_s = 0.0
+
+    def is_passing(self, time_s: float) -> bool:
+        """Return whether a frame may be of now.
+
+        Frames of the past may come at once; so may those of a time that is no more than
+        `_AHEAD_S` ahead of how far the clock has gone since the frames before. Where for
+        `_SILENT_S` no others come, the tracker has a new clock, and its frames are taken.
+        """
+        now_s = time.monotonic()
+        lead_s = time_s - now_s
+        ahead = self._lead_s is not None and lead_s > self._lead_s + _AHEAD_S
+        if ahead and now_s - self._taken_s < _SILENT_S:
+            return False
+        # The lead that was furthest: a tracker may fall behind and catch up.
+        self._lead_s = lead_s if self._lead_s is None or ahead else max(self._lead_s, lead_s)
+        self._taken_s = now_s
+        return True
 
 
 def _register(writer: Writer) -> dict[str, int]:
@@ -253,14 +348,50 @@ def _as_json(poses: FramePoses) -> bytes:
 
 def _from_json(path: Path, data: bytes) -> FramePoses:
     try:
-        found = json.loads(data)
+        found = json_of(data)
+        if len(found["agents"]) > _MOST_AGENTS:
+            message = f"{len(found['agents'])} agents, expected at most {_MOST_AGENTS}"
+            raise ValueError(message)  # noqa: TRY301 - becomes a DamagedError with the others
         agents = tuple(_as_agent(agent) for agent in found["agents"])
-        return FramePoses(time_s=float(found["time_s"]), frame=int(found["frame"]), agents=agents)
-    except (ValueError, KeyError, TypeError) as error:
+        time_s, frame = float(found["time_s"]), int(found["frame"])
+        _check_frame(path, time_s, frame, agents)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise DamagedError(
-            f"{path}: a message of /agents is not of {POSES} ({error!r}).",
+            f"{path}: a message of /agents is not of {POSES} ({error!r:.200}).",
             hint="It was not made by zfcal, or by another version of it.",
         ) from error
+    return FramePoses(time_s=time_s, frame=frame, agents=agents)
+
+
+def _check_frame(path: Path, time_s: float, frame: int, agents: tuple[AgentPose, ...]) -> None:
+    """Refuse what no tracker sees; each limit is written so that NaN fails.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range, or an agent is there twice.
+    """
+    start_s = second_of(path, ".mcap")
+    low_s = 0.0 if start_s is None else start_s - _EDGE_S
+    high_s = 1e9 if start_s is None else start_s + SEGMENT_S + _EDGE_S
+    _check_range("time_s", time_s, low_s, high_s)
+    _check_range("frame", frame, 0, 2**53)
+    if len({agent.agent for agent in agents}) < len(agents):
+        message = "an agent stands twice in a frame"
+        raise ValueError(message)
+    for agent in agents:
+        _check_range("agent", agent.agent, 0, _LARGEST_ID)
+        _check_range("x_m", agent.x_m, -_FARTHEST_M, _FARTHEST_M)
+        _check_range("y_m", agent.y_m, -_FARTHEST_M, _FARTHEST_M)
+        _check_range("confidence", agent.confidence, 0.0, 1.0)
+        if not math.isnan(agent.heading_rad):
+            _check_range("heading_rad", agent.heading_rad, -100.0, 100.0)
+
+
+def _check_range(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        message = f"{name} is {value!r:.40}, expected {low:g} to {high:g}"
+        raise ValueError(message)
 
 
 def _as_agent(found: Mapping[str, Any]) -> AgentPose:

@@ -1,5 +1,8 @@
 """Reading files of a trial: regular ones only, and each with one content for one piece of work.
 
+A file that a symbolic link leads out of its trial is not opened (`places`), and one that is
+too large is not read (`limits`).
+
 An artifact states the SHA-256 of what it was made from. That is the hash of the bytes that
 were read, not of those that lie there later: within `one_content` every look at a file,
 be it a hash or the bytes themselves, must show the same content, and `check_contents` looks
@@ -21,18 +24,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, final
 
+from zfcal.artifacts.limits import check_size, most_bytes, too_large
+from zfcal.artifacts.places import KINDS, check_inside, numbered
 from zfcal.errors import ChangedError, InputError
 
 Looks: TypeAlias = tuple[int, ...]
 """What tells one content of a place from the next without reading it."""
-
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a named pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
 
 _HASHES: dict[Looks, tuple[Looks, str]] = {}
 """For each inode what its file looked like when it was hashed, and the hash."""
@@ -104,7 +101,7 @@ class Contents:
             One is gone, or holds something else than when it was read.
         """
         for place, looks in self.steady.items():
-            if _looks_of(place) != looks:
+            if looks_of(place) != looks:
                 raise _changed(place)
         for place, digest in self.digests.items():
             try:
@@ -168,17 +165,68 @@ def open_regular(path: Path) -> io.BufferedReader:
     Raises
     ------
     OSError
-        It is missing, no regular file, or cannot be opened; see `unreadable`.
+        It is missing, no regular file, lies outside the trial that its path names, or
+        cannot be opened; see `unreadable`.
     """
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY)
+    descriptor = _descriptor(path, os.O_RDONLY)
+    return os.fdopen(descriptor, "rb")
+
+
+def open_to_write(path: Path, *, append: bool = False) -> io.BufferedWriter:
+    """Open a file of a trial that grows in its place: a new one, or one that is a regular file.
+
+    Parameters
+    ----------
+    path
+        Its place. A symbolic link there is refused: what it leads to is another file.
+    append
+        Whether what is there stays.
+
+    Raises
+    ------
+    OSError
+        The place cannot be written, is no regular file, or lies outside the trial.
+    """
+    how = os.O_APPEND if append else os.O_TRUNC
+    descriptor = _descriptor(path, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | how)
+    return os.fdopen(descriptor, "ab" if append else "wb")
+
+
+def _descriptor(path: Path, flags: int) -> int:
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "a name cannot hold a zero byte", str(path))
+    check_inside(path)
+    descriptor = os.open(path, flags | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY, 0o666)
     kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
     if kind != stat.S_IFREG:
         os.close(descriptor)
         number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
-        text = f"expected a regular file, got {_KINDS.get(kind, 'something else')}"
+        text = f"expected a regular file, got {KINDS.get(kind, 'something else')}"
         raise OSError(number, text, str(path))
     os.set_blocking(descriptor, True)
-    return os.fdopen(descriptor, "rb")
+    return descriptor
+
+
+def read_limited(path: Path) -> bytes:
+    """Return what a regular file holds, unless that is more than a file of its kind may have.
+
+    Nothing is noted of it: see `read_bytes`.
+
+    Raises
+    ------
+    OSError
+        As `open_regular`.
+    DamagedError
+        It is too large.
+    """
+    most = most_bytes(path)
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        check_size(path, size)
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise too_large(path, len(data), most)
+    return data
 
 
 def read_bytes(path: Path) -> bytes:
@@ -188,12 +236,13 @@ def read_bytes(path: Path) -> bytes:
     ------
     InputError
         The file is missing, no regular one, or cannot be read.
+    DamagedError
+        It is too large.
     ChangedError
         The current piece of work has seen another content of it.
     """
     try:
-        with open_regular(path) as file:
-            data = file.read()
+        data = read_limited(path)
     except OSError as error:
         raise unreadable(path, error) from error
     seen = _CONTENTS.get()
@@ -233,11 +282,25 @@ def hold_steady(path: Path) -> None:
     """
     seen = _CONTENTS.get()
     if seen is not None:
-        looks = _looks_of(path)
+        looks = looks_of(path)
         if looks is None:
             raise unreadable(path, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)))
         seen.note_steady(path, looks)
         seen.note(path, _digest_of(path))
+
+
+def numbered_of(folder: Path, ending: str) -> dict[int, Path]:
+    """Return the artifacts of a folder by their number, in order; see `places.numbered`.
+
+    Raises
+    ------
+    InputError
+        The folder leads outside its trial, or cannot be listed.
+    """
+    try:
+        return numbered(folder, ending)
+    except OSError as error:
+        raise unreadable(folder, error) from error
 
 
 def sha256_of(path: Path) -> str:
@@ -259,23 +322,24 @@ def unreadable(path: Path, error: OSError) -> InputError:
     """Return the error for a file that cannot be opened for reading."""
     if isinstance(error, FileNotFoundError):
         return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
-    return InputError(
-        f"{path}: cannot be read ({error.strerror or error}).",
-        hint="Check that it is a file, and its permissions.",
-    )
+    hint = "Check that it is a file, and its permissions."
+    if error.errno == errno.EXDEV:
+        hint = "Put the file itself there, or name the trial in which it lies."
+    return InputError(f"{path}: cannot be read ({error.strerror or error}).", hint=hint)
 
 
-def _looks_of(path: Path | str) -> Looks | None:
+def looks_of(path: Path | str) -> Looks | None:
+    """Return what tells a file from another of the same name; None if there is none."""
     try:
         status = os.stat(path)  # noqa: PTH116 - asked so often that making a Path would tell
-    except OSError:
+    except (OSError, ValueError):
         return None
     times = (status.st_mtime_ns, status.st_ctime_ns)
     return (status.st_dev, status.st_ino, *times, status.st_size)
 
 
 def _digest_of(path: Path | str) -> str:
-    looks = _looks_of(path)
+    looks = looks_of(path)
     if looks is None:
         return sha256_of(Path(path))
     known = _HASHES.get(looks[:2])
@@ -283,7 +347,7 @@ def _digest_of(path: Path | str) -> str:
         return known[1]
     asked_ns = time.time_ns()
     digest = sha256_of(Path(path))
-    if looks == _looks_of(path) and abs(asked_ns - looks[3]) > _TICK_NS:
+    if looks == looks_of(path) and abs(asked_ns - looks[3]) > _TICK_NS:
         _HASHES[looks[:2]] = (looks, digest)
     return digest
 

@@ -5,9 +5,9 @@ What the columns are stands in the files of ``schemas/``; see `columns`.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +16,9 @@ import pyarrow.parquet as pq
 from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import write_whole
 from zfcal.artifacts.columns import TABLE_SCHEMAS, form_of, make_table, problem_of
+from zfcal.artifacts.limits import TABLE_BYTES, TABLE_ROWS, largest, too_large
 from zfcal.artifacts.lineage import JSON, LINEAGE_KEY, Lineage, first_line, to_json
+from zfcal.artifacts.parsing import json_of
 from zfcal.artifacts.reading import open_regular, read_bytes, unreadable
 from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.tracks import KINDS, Tracks
@@ -38,6 +40,14 @@ POPULATION = "zfcal.population/1"
 
 _EXTRA_KEY = b"zfcal.extra"
 _MAGIC = b"PAR1"
+_BROKEN = (
+    pa.ArrowException,
+    OSError,
+    ValueError,
+    KeyError,
+    NotImplementedError,
+    MemoryError,  # a damaged size
+)
 
 
 def write_table(
@@ -127,8 +137,8 @@ def read_extra(path: Path) -> dict[str, JSON]:
     _check_ends(path, "Make it again.")
     try:
         metadata = pq.ParquetFile(pa.py_buffer(read_bytes(path))).metadata.metadata or {}
-        extra: dict[str, JSON] = json.loads(metadata.get(_EXTRA_KEY, b"{}"))
-    except (pa.ArrowException, OSError, ValueError) as error:
+        extra: dict[str, JSON] = json_of(metadata.get(_EXTRA_KEY, b"{}"))
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         raise DamagedError(f"{path}: cannot be read whole ({first_line(error)}).") from error
     return extra
 
@@ -163,9 +173,33 @@ def read_parquet(path: Path, hint: str) -> pa.Table:
         source = pa.py_buffer(read_bytes(path))
         # Not read_table: it loads pyarrow.dataset and with it pandas, a fifth of a second.
         whole = pq.ParquetFile(source, page_checksum_verification=True)
+        _check_claims(path, whole.metadata, hint)
         return whole.read(use_threads=False)
-    except (pa.ArrowException, OSError, ValueError, KeyError, NotImplementedError) as error:
+    except (
+        pa.ArrowException,
+        OSError,
+        ValueError,
+        KeyError,
+        NotImplementedError,
+        MemoryError,
+    ) as error:
         raise DamagedError(f"{path}: is damaged ({first_line(error)}).", hint=hint) from error
+
+
+def _check_claims(path: Path, metadata: Any, hint: str) -> None:
+    """Refuse a table that says of itself that it is beyond all measure, before it is unpacked."""
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    rows = max(metadata.num_rows, sum(group.num_rows for group in groups))
+    if not 0 <= rows <= TABLE_ROWS:
+        raise DamagedError(f"{path}: claims {rows} rows, expected at most {TABLE_ROWS}.", hint=hint)
+    sizes = [
+        group.column(number).total_uncompressed_size
+        for group in groups
+        for number in range(group.num_columns)
+    ]
+    most = largest(TABLE_BYTES)
+    if min(sizes, default=0) < 0 or sum(sizes) > most:
+        raise too_large(path, sum(sizes), most)
 
 
 def _check_ends(path: Path, hint: str) -> None:
@@ -197,6 +231,6 @@ def schema_of(table: pa.Table) -> str:
     if text is None:
         return "none: it carries no lineage"
     try:
-        return str(json.loads(text)["schema"])
+        return str(json_of(text)["schema"])
     except (ValueError, KeyError, TypeError):
         return "none: its lineage is damaged"

@@ -14,16 +14,14 @@ from typing import final
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata
-from mcap.stream_reader import StreamReader
 
-from zfcal.artifacts.mcap_files import BROKEN
+from zfcal.artifacts.limits import CHUNK_BYTES, check_size, largest
+from zfcal.artifacts.mcap_files import BROKEN, unpacked
 from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import DamagedError
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")
-_RECORD_LIMIT = 2**28
-"""Bytes of the longest record that is believed: a damaged length asks for more."""
 
 
 @final
@@ -56,6 +54,11 @@ class Tail:
         self._offset = 0
         self._channels: set[int] = set()
 
+    @property
+    def is_begun(self) -> bool:
+        """Whether a record of it was read: it is an MCAP file."""
+        return self._offset > 0 or self.is_closed
+
     def poll(self) -> list[tuple[int, bytes]]:
         """Return what was added: the log time in nanoseconds, and the data of each message.
 
@@ -85,12 +88,14 @@ class Tail:
         """Read the whole records that were added."""
         try:
             with open_regular(self.path) as file:
-                if file.seek(0, io.SEEK_END) < self._offset:
+                size = file.seek(0, io.SEEK_END)
+                if size < self._offset:
                     # Written anew: the one that was read is gone.
                     self._offset = 0
                     self._channels.clear()
+                check_size(self.path, size - self._offset)
                 file.seek(self._offset)
-                added = file.read()
+                added = file.read(size - self._offset)
         except FileNotFoundError:
             return b""
         except OSError as error:
@@ -113,7 +118,7 @@ class Tail:
     def _end_of_records(self, added: bytes, place: int) -> int:
         while place + _HEAD.size <= len(added):
             opcode, length = _HEAD.unpack_from(added, place)
-            if length > _RECORD_LIMIT:
+            if length > largest(CHUNK_BYTES):
                 raise DamagedError(
                     f"{self.path}: a record is damaged (it claims {length} bytes).",
                     hint=f"See how much of it can be read with: zfcal inspect {self.path}",
@@ -127,9 +132,8 @@ class Tail:
         return place
 
     def _messages(self, whole: bytes) -> Iterator[tuple[int, bytes]]:
-        reader = StreamReader(io.BytesIO(whole), skip_magic=True, validate_crcs=True)
         try:
-            for record in reader.records:
+            for record in unpacked(io.BytesIO(whole), skip_magic=True):
                 if isinstance(record, Channel) and record.topic == self._topic:
                     self._channels.add(record.id)
                 elif isinstance(record, Metadata):

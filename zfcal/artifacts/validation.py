@@ -9,18 +9,18 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 from referencing import Registry, Resource
 
+from zfcal.artifacts.parsing import json_of, toml_of
 from zfcal.artifacts.reading import read_bytes
 from zfcal.errors import DamagedError, InputError, SchemaError
 
@@ -47,8 +47,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         It is empty or not TOML, and where.
     """
     try:
-        return tomllib.loads(_text_of(path))
-    except tomllib.TOMLDecodeError as error:
+        return toml_of(_text_of(path))
+    except ValueError as error:
         raise DamagedError(
             f"{path}: is not valid TOML: {_lower(str(error))}.",
             hint="Text stands in quotes, true and false in small letters, one key a line.",
@@ -66,14 +66,12 @@ def read_json(path: Path) -> dict[str, Any]:
         It is empty or not JSON, and where, or holds something else than an object.
     """
     try:
-        document = json.loads(_text_of(path), parse_constant=_refuse_constant)
+        document = json_of(_text_of(path))
     except ValueError as error:
         raise DamagedError(
             f"{path}: is not valid JSON: {_lower(str(error))}.",
             hint="Copy the file again, or open it at that line: a comma or a bracket is missing.",
         ) from error
-    except RecursionError as error:
-        raise DamagedError(f"{path}: is not a document: its brackets nest too deep.") from error
     if not isinstance(document, dict):
         raise DamagedError(f"{path}: expected an object in braces, got {_shown(document)}.")
     return document
@@ -165,11 +163,6 @@ def _text_of(path: Path) -> str:
     if not text.strip("\0 \t\r\n"):
         raise DamagedError(f"{path}: the file is empty.", hint="Copy it again, or make it anew.")
     return text
-
-
-def _refuse_constant(word: str) -> NoReturn:
-    message = f"{word} is not a number in JSON"
-    raise ValueError(message)
 
 
 def _most_telling(errors: list[ValidationError]) -> ValidationError:

@@ -13,6 +13,7 @@ from pathlib import Path
 from zfcal.arena import VOID
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.reading import numbered_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import make_table, write_table
 from zfcal.behaviour.located import Located, join
@@ -25,7 +26,6 @@ from zfcal.online.scoring import SCORINGS, Window, scores_of
 from zfcal.online.segments import Pooled, Segments, segment_hashes, segment_name
 from zfcal.online.settled import Items
 from zfcal.online.windows import starts_of, whole_segments, window_ends
-from zfcal.trial import second_of
 
 STATS = "zfcal.stats/1"
 SCORES = "zfcal.scores/1"
@@ -171,8 +171,8 @@ def _tell_oddities(run: _Run, ends: list[int]) -> None:
     if not ends:
         text = f"{tracks}: {n} whole segments of 60 s, and a window needs two; nothing to analyse."
         run.tell(Note(text=text))
-    found = {second_of(path) for path in (run.root / "stats").glob("*.parquet")}
-    for end in sorted(found.difference(ends, {None}), key=str):
+    found = numbered_of(run.root / "stats", ".parquet").keys()
+    for end in sorted(found - set(ends)):
         path = run.root / "stats" / f"{end:06d}.parquet"
         text = (
             f"{path}: {tracks} holds no whole window to {end} s any more; remove it if it is old."

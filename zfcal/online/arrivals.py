@@ -6,14 +6,18 @@ by two looks at it.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 from typing import TypeAlias, final
 
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import first_line
+from zfcal.artifacts.places import check_inside
+from zfcal.artifacts.reading import open_regular
 from zfcal.online.segments import STEP_S
 from zfcal.trial import CONFIG_NAME, second_of
 
@@ -182,24 +186,38 @@ def segment_ends(whole: dict[int, float]) -> dict[int, float]:
 
 
 def _files(root: Path) -> Iterator[tuple[str, Looks]]:
-    """Yield the files that bear on something, by their names in the trial."""
+    """Yield the files that bear on something, by their names in the trial.
+
+    Raises
+    ------
+    FileNotFoundError
+        The trial is gone.
+    """
     yield CONFIG_NAME, _looks(root / CONFIG_NAME)
     for folder in FOLDERS:
-        place = root / folder
         try:
-            names = [each.name for each in place.iterdir()]
+            check_inside(root / folder)
+            names = [each.name for each in (root / folder).iterdir()]
         except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError:
+            # Named with what is wrong with it, as a file would be.
+            yield folder, _looks(root / folder)
             continue
         for name in names:
             if not name.startswith("."):
                 try:
-                    yield f"{folder}/{name}", _looks(place / name)
+                    yield f"{folder}/{name}", _looks(root / folder / name)
                 except FileNotFoundError:
                     continue
 
 
 def _looks(path: Path) -> Looks:
-    status = path.stat()
+    """Return what a file looks like; where a link leads nowhere, the link."""
+    try:
+        status = path.stat()
+    except OSError:
+        status = path.lstat()
     return status.st_size, status.st_mtime_ns, status.st_ino
 
 
@@ -208,19 +226,29 @@ def _patience_s(name: str) -> float:
 
 
 def _problem(path: Path) -> str | None:
-    """Return why a Parquet file is not whole; None for a whole one, and for other files."""
-    if path.suffix != ".parquet":
-        return None
+    """Return why a file is not whole or none at all; None for a whole one."""
+    try:
+        check_inside(path)
+        if path.name in FOLDERS:
+            os.listdir(path)  # noqa: PTH208 - only whether it can be
+            return None
+        with open_regular(path) as file:
+            return _table_problem(file) if path.suffix == ".parquet" else None
+    except OSError as error:
+        return f"cannot be read ({error.strerror or error})"
+
+
+def _table_problem(file: BufferedReader) -> str | None:
+    """Return why a Parquet file is not whole."""
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 
+    size = file.seek(0, 2)
+    file.seek(max(0, size - len(_MAGIC)))
+    if file.read() != _MAGIC:
+        return f"is not whole: {size} bytes, and no footer"
     try:
-        with path.open("rb") as file:
-            size = file.seek(0, 2)
-            file.seek(max(0, size - len(_MAGIC)))
-            if file.read() != _MAGIC:
-                return f"is not whole: {size} bytes, and no footer"
-            pq.read_metadata(file)
-    except (OSError, ValueError, pa.ArrowException) as error:
+        pq.read_metadata(file)
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         return f"cannot be read ({first_line(error)})"
     return None

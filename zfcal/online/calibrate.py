@@ -16,6 +16,7 @@ from pathlib import Path
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
+from zfcal.artifacts.reading import numbered_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.baselines import random_search, unchanged
@@ -45,7 +46,6 @@ from zfcal.online.rounds import (
 from zfcal.online.settled import Items
 from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
-from zfcal.trial import second_of
 
 _INSTANT_S = 0.001
 
@@ -230,8 +230,7 @@ def window_span(end_s: int) -> tuple[int, int]:
 
 
 def _ends(run: _Run) -> list[int]:
-    found = (second_of(path) for path in (run.root / "stats").glob("*.parquet"))
-    ends = sorted(end for end in found if end is not None)
+    ends = list(numbered_of(run.root / "stats", ".parquet"))
     if not ends and run.task.ends_s is None:
         text = (
             f"{run.root / 'stats'}: no statistics to calibrate on; first: zfcal analyse {run.root}"

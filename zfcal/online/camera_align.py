@@ -18,8 +18,8 @@ from zfcal.errors import InputError
 from zfcal.online.camera_making import CameraTask, Place, Recipe, make_camera
 from zfcal.online.cameras import read_camera, stated_side
 from zfcal.online.events import Tell
-from zfcal.online.settled import settled
 from zfcal.online.rig import BELOW, OVERHEAD, check_view
+from zfcal.online.settled import settled
 from zfcal.online.sources import source_of
 from zfcal.trial import Trial
 from zfcal.vision.alignment import Alignment, Spots, align_spots

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.models import read_model_for
+from zfcal.artifacts.reading import Looks, looks_of, numbered_of, one_content, read_bytes
 from zfcal.errors import InputError, ZfcalError
 from zfcal.model.packing import pack
 from zfcal.online.opening import OpenTrial
 from zfcal.online.pilot import InForce
-from zfcal.trial import second_of
 
 
 @final
@@ -37,8 +37,8 @@ class DriveModels:
         self._opened, self._after_s = opened, after_s
         self._folder = opened.trial.root / "models"
         self._force: InForce | None = None
-        self._known: tuple[int, tuple[int, int, int]] | None = None
-        self._bad: dict[Path, tuple[int, int, int]] = {}
+        self._known: tuple[int, Looks] | None = None
+        self._bad: dict[Path, Looks | None] = {}
         self.problem = ""
 
     def first(self) -> InForce:
@@ -66,10 +66,10 @@ class DriveModels:
             Seconds since the trial began.
         """
         self.problem = ""
-        for second, path in sorted(self._files(), reverse=True):
+        for second, path in self._files():
             if second and second + self._after_s > now_s:
                 continue
-            sign = _sign(path)
+            sign = looks_of(path)
             if sign is None or self._bad.get(path) == sign:
                 continue
             if self._known is not None and self._known[0] > second:
@@ -77,7 +77,7 @@ class DriveModels:
             if self._known == (second, sign):
                 return None
             found = self._read(path)
-            if _sign(path) != sign:
+            if looks_of(path) != sign:
                 # Replaced while it was read: the next look has it.
                 continue
             if found is None:
@@ -88,16 +88,25 @@ class DriveModels:
         return None
 
     def _files(self) -> list[tuple[int, Path]]:
-        found = [(second_of(path, ".toml"), path) for path in self._folder.glob("*.toml")]
-        return [(second, path) for second, path in found if second is not None]
+        """Return the numbered models, the newest first."""
+        try:
+            found = numbered_of(self._folder, ".toml")
+        except InputError as error:
+            sign = looks_of(self._folder)
+            if self._bad.get(self._folder) != sign:
+                self._bad[self._folder] = sign
+                self.problem = str(error)
+            return []
+        return sorted(found.items(), reverse=True)
 
     def _read(self, path: Path) -> InForce | None:
         opened = self._opened
         try:
-            data = path.read_bytes()
-            model = read_model_for(path, opened.arena, dt_s=opened.trial.dt_s)
+            with one_content():
+                data = read_bytes(path)
+                model = read_model_for(path, opened.arena, dt_s=opened.trial.dt_s)
             packed = pack([model], opened.arena)
-        except (ZfcalError, OSError) as error:
+        except ZfcalError as error:
             self.problem = str(error)
             return None
         return InForce(
@@ -107,12 +116,3 @@ class DriveModels:
             parameters=model,
             packed=packed,
         )
-
-
-def _sign(path: Path) -> tuple[int, int, int] | None:
-    """Return by what another file of the same name is told; None if it has gone."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return (found.st_ino, found.st_mtime_ns, found.st_size)

@@ -12,7 +12,7 @@ from typing import TypeAlias, final
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
-from zfcal.artifacts.reading import check_contents
+from zfcal.artifacts.reading import check_contents, numbered_of, open_regular
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import LeftOut, Made, Note, Tell, UpToDate
@@ -262,7 +262,7 @@ def poses_reason(path: Path, lineage: Lineage) -> str | None:
 
 
 def _has_footer(path: Path) -> bool:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         file.seek(-8, 2)
         return file.read() == b"\x89MCAP0\r\n"
 
@@ -273,8 +273,7 @@ def _poses_path(root: Path, start_s: int) -> Path:
 
 def pose_files(root: Path) -> dict[int, Path]:
     """Return the files of poses of a trial by the second at which they start, in order."""
-    found = {int(p.stem): p for p in (root / "poses").glob("*.mcap") if p.stem.isdigit()}
-    return dict(sorted(found.items()))
+    return numbered_of(root / "poses", ".mcap")
 
 
 def unfinished(root: Path, tell: Tell, *, also: int) -> dict[int, list[FramePoses]]:

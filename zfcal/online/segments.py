@@ -14,7 +14,7 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
-from zfcal.artifacts.reading import hash_of, one_content
+from zfcal.artifacts.reading import hash_of, numbered_of, one_content
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool
@@ -23,7 +23,6 @@ from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.online.events import LeftOut, Tell
 from zfcal.online.opening import OpenTrial, open_trial
 from zfcal.tracks import Tracks
-from zfcal.trial import second_of
 from zfcal.units import SEGMENT_S
 
 STEP_S = int(SEGMENT_S)
@@ -63,8 +62,8 @@ def segment_starts(root: Path) -> list[int]:
 
     Segments start on whole minutes; other files in ``tracks/`` are none.
     """
-    found = (second_of(path) for path in (root / "tracks").glob("*.parquet"))
-    return sorted(second for second in found if second is not None and second % STEP_S == 0)
+    found = numbered_of(root / "tracks", ".parquet")
+    return [second for second in found if second % STEP_S == 0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.reading import numbered_of
 from zfcal.online.events import Note, Tell
 from zfcal.online.opening import Task
-from zfcal.trial import second_of
 
 SKIPPED = "zfcal.skipped/1"
 ENDING = ".skipped.json"
@@ -27,8 +27,7 @@ def skipped_path(root: Path, end_s: int) -> Path:
 
 def skipped_ends(root: Path) -> set[int]:
     """Return the ends of the windows that were passed over, in seconds."""
-    found = (second_of(path, ENDING) for path in (root / "models").glob(f"*{ENDING}"))
-    return {end for end in found if end is not None}
+    return set(numbered_of(root / "models", ENDING))
 
 
 def without_skipped(root: Path, ends: list[int], task: Task, tell: Tell) -> list[int]:

@@ -17,6 +17,7 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
+from zfcal.artifacts.reading import numbered_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
 from zfcal.behaviour.located import Located, locate
@@ -27,7 +28,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
 from zfcal.report.views import Course, CourseKey, Round, Source, TrialView
-from zfcal.trial import Trial, second_of
+from zfcal.trial import Trial
 from zfcal.units import SEGMENT_S
 
 Damage = Callable[[DamagedError], None]
@@ -69,9 +70,7 @@ class _Reader:
 
     def files(self, folder: str, ending: str) -> list[tuple[int, Path]]:
         """Return the artifacts of a folder by their second, in order."""
-        found = (self.trial.root / folder).glob("*" + ending)
-        numbered = ((second_of(path, ending), path) for path in found)
-        return sorted((second, path) for second, path in numbered if second is not None)
+        return list(numbered_of(self.trial.root / folder, ending).items())
 
 
 def input_files(root: Path) -> list[Path]:

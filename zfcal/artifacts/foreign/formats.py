@@ -18,6 +18,8 @@ from zfcal.artifacts.foreign.options import ImportOptions, given
 from zfcal.artifacts.foreign.sleap import read_sleap
 from zfcal.artifacts.foreign.trajectorytools import read_trajectorytools
 from zfcal.artifacts.foreign.trex import read_trex
+from zfcal.artifacts.limits import check_size
+from zfcal.artifacts.reading import open_regular, unreadable
 from zfcal.errors import InputError
 from zfcal.tracks import Tracks
 
@@ -195,4 +197,15 @@ def _chosen(path: Path, name: str) -> Format:
     chosen = FORMATS[name]
     if path.is_dir() and not chosen.folder:
         raise InputError(f"{path}: expected a file for format {name!r}, got a folder.")
+    if not path.is_dir():
+        _check_file(path)
     return chosen
+
+
+def _check_file(path: Path) -> None:
+    """Refuse what the readers, which take names, would wait for or be drowned by."""
+    try:
+        with open_regular(path) as file:
+            check_size(path, file.seek(0, 2))
+    except OSError as error:
+        raise unreadable(path, error) from error
