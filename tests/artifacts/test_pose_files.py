@@ -1,8 +1,10 @@
 """Poses: a message per frame, there at once, read back to the last digit."""
 
+import dataclasses
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +15,7 @@ from jsonschema import Draft202012Validator
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from zfcal.artifacts import pose_files
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.mcap_files import overview
@@ -250,3 +253,128 @@ def test_rows_of_tracks_are_those_of_the_poses():
     assert tracks.x_m[0] == frame(0).agents[0].x_m
     assert math.isnan(tracks.heading_rad[2])
     assert len(tracks_of([])) == 0
+
+
+def _special(path, kind):
+    """Put something that is no file of poses where one is to be."""
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "loop":
+        path.symlink_to(path.name)
+    elif kind == "noise":
+        path.write_bytes(b"\x89PNG\r\n\x1a\n and more")
+    else:
+        path.symlink_to("nowhere")
+
+
+def _drained(follower):
+    """Return the frames and the problems of a follower until nothing more comes."""
+    frames, problems = [], []
+    for _ in range(8):
+        try:
+            frames += [poses.frame for poses in follower.poll()]
+        except DamagedError as error:
+            problems.append(str(error))
+    return frames, problems
+
+
+@pytest.mark.parametrize("newest", [False, True])
+@pytest.mark.parametrize("kind", ["folder", "pipe", "loop", "noise", "dangling"])
+def test_a_follower_goes_on_behind_a_bad_file_and_names_it_once(
+    path, tmp_path, monkeypatch, kind, newest
+):
+    """What grows before it is read on, and the next good file comes next."""
+    monkeypatch.setattr(pose_files, "_AHEAD_S", math.inf)
+    follower = PoseFollower(tmp_path, newest=newest)
+    growing = PoseWriter(path, LINEAGE)
+    growing.add(frame(0))
+    bad = path.with_name("000060.mcap")
+    _special(bad, kind)
+    frames, problems = _drained(follower)
+    if kind == "dangling":
+        assert problems == []
+    else:
+        assert len(problems) == 1
+        assert "000060.mcap" in problems[0]
+    growing.add(frame(1))
+    frames += _drained(follower)[0]
+    write(path.with_name("000120.mcap"), [1800, 1801])
+    more, problems = _drained(follower)
+    assert (frames + more, problems) == ([0, 1, 1800, 1801], [])
+
+
+def test_a_bad_file_that_was_mended_is_read(path, tmp_path):
+    """A folder stood in its place."""
+    write(path, [0])
+    bad = path.with_name("000060.mcap")
+    bad.mkdir()
+    follower = PoseFollower(tmp_path)
+    assert _drained(follower)[0] == [0]
+    bad.rmdir()
+    write(bad, [900])
+    assert _drained(follower) == ([900], [])
+
+
+def _wrong(**changes):
+    known = frame(1)
+    agent = dataclasses.replace(known.agents[0], **changes)
+    return dataclasses.replace(known, agents=(agent, *known.agents[1:]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"x_m": 1e308}, "x_m is 1e\\+308"),
+        ({"y_m": -1001.0}, "y_m is -1001"),
+        ({"agent": 2**40}, "agent is 1099511627776"),
+        ({"confidence": 2.0}, "confidence is 2.0"),
+        ({"heading_rad": 1e9}, "heading_rad is 1000000000.0"),
+    ],
+)
+def test_a_frame_with_a_number_out_of_range_is_left_out(path, tmp_path, changes, says):
+    """Those before and behind it are taken; the file is named once."""
+    with PoseWriter(path, LINEAGE) as writer:
+        for poses in (frame(0), _wrong(**changes), _wrong(**changes), frame(2)):
+            writer.add(poses)
+    frames, problems = _drained(PoseFollower(tmp_path))
+    assert frames == [0, 2]
+    assert len(problems) == 1
+    assert re.search(says, problems[0])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b'{"agents":' * 50_000,
+        b'{"time_s": 1, "frame": 1, "agents": [5]}',
+        b'{"time_s": 1, "frame": 1e400, "agents": []}',
+        b'{"time_s": NaN, "frame": 1, "agents": []}',
+        b'{"time_s": 1, "frame": ' + b"9" * 5001 + b', "agents": []}',
+        b'{"time_s": 1e6, "frame": 1, "agents": []}',
+        b"[]",
+        b"\xff",
+    ],
+)
+def test_no_message_of_another_form_is_more_than_damage(path, data):
+    """Deep, long, not finite, of another minute, or no JSON."""
+    with pytest.raises(DamagedError, match="a message of /agents is not of"):
+        pose_files._from_json(path, data)
+
+
+def test_a_live_follower_leaves_frames_of_the_future_out(path, tmp_path, monkeypatch):
+    """It goes on with those of now; where none but such come, the tracker has a new clock."""
+    now_s = 100.0
+    monkeypatch.setattr(pose_files.time, "monotonic", lambda: now_s)
+    follower = PoseFollower(tmp_path, newest=True)
+    write(path, [0])
+    assert _drained(follower) == ([0], [])
+    write(path.with_name("1000020.mcap"), [15_000_300])
+    frames, problems = _drained(follower)
+    assert (frames, len(problems)) == ([], 1)
+    assert "a frame of 1000020.000 s runs ahead of the clock" in problems[0]
+    now_s = 105.1
+    with PoseWriter(path.with_name("1000080.mcap"), LINEAGE) as writer:
+        writer.add(frame(15_001_200))
+    assert _drained(follower) == ([15_001_200], [])

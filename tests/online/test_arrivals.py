@@ -156,3 +156,36 @@ def test_a_window_is_there_with_the_later_of_its_segments():
     """A minute that is missing keeps two windows waiting; odd seconds are no segments."""
     whole = {0: 1.0, 60: 5.0, 120: 3.0, 240: 9.0, 270: 1.0}
     assert segment_ends(whole) == {120: 5.0, 180: 5.0}
+
+
+@pytest.mark.parametrize("name", ["tracks/000240.parquet", "models/000120.toml"])
+@pytest.mark.parametrize("kind", ["pipe", "loop", "folder", "outside"])
+def test_what_is_no_file_of_the_trial_is_named_and_keeps_nobody_waiting(
+    trial, clock, tmp_path, name, kind
+):
+    """It is named once; the others count."""
+    path = trial / name
+    (tmp_path / "theirs").touch()
+    makes = {
+        "pipe": lambda: os.mkfifo(path),
+        "loop": lambda: path.symlink_to(path.name),
+        "folder": path.mkdir,
+        "outside": lambda: path.symlink_to(tmp_path / "theirs"),
+    }
+    makes[kind]()
+    arrivals = Arrivals(trial, clock)
+    found = [*arrivals.look()]
+    clock.now_s += SETTLED_S
+    found += arrivals.look()
+    assert [each.path for each in found if isinstance(each, Unfinished)] == [path]
+    assert list(arrivals.whole_s["tracks"]) == [0, 60, 120, 180]
+    assert not arrivals.unsettled
+
+
+def test_a_folder_that_leads_outside_is_named(trial, clock, tmp_path):
+    """The trial is not gone for that."""
+    (tmp_path / "theirs").mkdir()
+    (trial / "stats").symlink_to(tmp_path / "theirs")
+    arrivals = Arrivals(trial, clock)
+    look_again(arrivals, clock)
+    assert "leads outside the trial" in arrivals.unfinished["stats"]

@@ -1,6 +1,8 @@
 """Which model drives, and from when on: on a rig, and where rounds are done sooner than there."""
 
 import importlib.util
+import os
+import re
 from pathlib import Path
 
 import pytest
@@ -59,3 +61,33 @@ def test_the_starting_model_waits_for_nobody(opened):
     for second in (120, 180, 240):
         (opened.trial.root / "models" / f"{second:06d}.toml").unlink()
     assert names(DriveModels(opened, after_s=55.0), [0.0, 1.0]) == ["000000.toml", None]
+
+
+@pytest.mark.parametrize("kind", ["brackets", "digits", "large", "folder", "pipe", "loop", "nan"])
+def test_a_bad_model_is_named_once_and_the_one_before_drives(opened, kind):
+    """A good one behind it drives."""
+    models = DriveModels(opened)
+    assert models.first().name == "models/000240.toml"
+    bad = opened.trial.root / "models" / "000300.toml"
+    good = bad.with_name("000240.toml").read_bytes()
+    texts = {
+        "brackets": b"a = " + b"[" * 100_000,
+        "digits": b"a = " + b"9" * 5001,
+        "large": good + b"\n#" + b"x" * 30_000_000,
+        "nan": re.sub(rb"fov_rad = [0-9.]+", b"fov_rad = nan", good),
+    }
+    if kind in texts:
+        bad.write_bytes(texts[kind])
+    elif kind == "folder":
+        bad.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(bad)
+    else:
+        bad.symlink_to(bad.name)
+    assert models.look() is None
+    if kind != "loop":
+        assert "000300.toml" in models.problem
+    assert models.look() is None
+    assert models.problem == ""
+    bad.with_name("000360.toml").write_bytes(good)
+    assert models.look().name == "models/000360.toml"

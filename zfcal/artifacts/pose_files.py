@@ -217,14 +217,14 @@ class PoseFollower:
             later = self._later()
             if self._tail is not None:
                 found += self._added(self._tail)
-            if later is None or not self._begin(later, found):
+            if not any(self._begin(path, found) for path in later):
                 break
         if self._problems and not found:
             raise self._problems.pop(0)
         return found
 
     def _begin(self, path: Path, found: list[FramePoses]) -> bool:
-        """Go on with a later file, and return whether to look for one behind it.
+        """Go on with a later file, and return whether it has begun.
 
         A file of which nothing can be read does not take the place of one that may grow.
         """
@@ -237,7 +237,6 @@ class PoseFollower:
             return True
         if path in self._told:
             self._bad[path] = looks
-            return True
         return False
 
     def _added(self, tail: Tail) -> list[FramePoses]:
@@ -268,17 +267,15 @@ class PoseFollower:
             self._told.add(path)
             self._problems.append(DamagedError(str(error), hint=error.hint))
 
-    def _later(self) -> Path | None:
-        """Return the next file that may be read; None if there is none."""
+    def _later(self) -> list[Path]:
+        """Return the files that may be read next, those to be tried first in front."""
         try:
             files = numbered_of(self._folder, ".mcap")
         except InputError as error:
             self._note(self._folder, error)
-            return None
-        later = [second for second, path in files.items() if self._is_later(second, path)]
-        if not later:
-            return None
-        return files[max(later) if self._newest and self._tail is None else min(later)]
+            return []
+        later = [path for second, path in files.items() if self._is_later(second, path)]
+        return later[::-1] if self._newest and self._tail is None else later
 
     def _is_later(self, second: int, path: Path) -> bool:
         if second <= self._known:
