@@ -5,6 +5,7 @@ The computer that it lies on is looked at in `machine`.
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from collections import Counter
@@ -22,12 +23,13 @@ from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
-from zfcal.artifacts.reading import hash_of
+from zfcal.artifacts.places import check_inside, is_regular
+from zfcal.artifacts.reading import hash_of, open_regular, unreadable
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import POPULATION, SCORES, STATS, read_table, read_tracks
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError, ZfcalError
-from zfcal.trial import CONFIG_NAME, LOOP_NAME, Trial, second_of
+from zfcal.trial import CONFIG_NAME, LOOP_NAME, NUMBER, Trial, second_of
 from zfcal.units import SEGMENT_S
 
 OK, NOTE, WARNING, ERROR = "ok", "note", "warning", "error"
@@ -90,7 +92,7 @@ class _Place:
     def hash_of(self, source: str) -> str | None:
         if source not in self.hashes:
             origin = self.root / source
-            self.hashes[source] = hash_of(origin) if origin.is_file() else None
+            self.hashes[source] = hash_of(origin) if is_regular(origin) else None
         return self.hashes[source]
 
 
@@ -159,16 +161,38 @@ def _mistake(where: str, root: Path, error: ZfcalError) -> Finding:
 
 
 def _files(root: Path) -> Iterator[Path]:
-    """Yield all files of a trial, sorted by path; a folder whose name starts with a dot is left."""
+    """Yield all files of a trial, sorted by path; a folder whose name starts with a dot is left.
+
+    What is no file, or a folder that cannot be gone through, is yielded as well: to be named.
+    """
     for path in sorted(root.iterdir()):
-        if path.is_dir() and not path.name.startswith("."):
-            yield from _files(path)
-        elif path.is_file():
+        if not os.path.isdir(path):  # noqa: PTH112 - Path's own raises where one may not look
             yield path
+        elif not path.name.startswith("."):
+            is_named_as_file = path.suffix in {".parquet", ".mcap", ".toml", ".json"}
+            is_folder = _can_be_listed(path) and not is_named_as_file
+            yield from _files(path) if is_folder else [path]
+
+
+def _can_be_listed(folder: Path) -> bool:
+    """Return whether a folder lies in the trial, does not lead back, and can be looked into."""
+    try:
+        check_inside(folder)
+        os.listdir(folder)  # noqa: PTH208 - only whether it can be
+    except OSError:
+        return False
+    return folder.resolve() not in map(Path.resolve, folder.parents)
 
 
 def _file_findings(place: _Place, path: Path) -> Iterator[Finding]:
     name = path.relative_to(place.root).as_posix()
+    try:
+        open_regular(path).close()
+    except OSError as error:
+        mistake = unreadable(path, error)
+        if not path.name.startswith("."):
+            yield _mistake(name, place.root, mistake)
+        return
     if path.name.startswith("."):
         yield from _dot_file(place, path, name)
         return
@@ -327,14 +351,14 @@ def _table_checker(schema: str) -> Callable[[_Place, Path], Iterator[Finding]]:
 
 
 _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
-    r"tracks/\d{6,}\.parquet": _check_tracks,
-    r"stats/\d{6,}(-[a-z-]+)?\.parquet": _table_checker(STATS),
-    r"scores/\d{6,}(-[a-z-]+)?\.parquet": _table_checker(SCORES),
-    r"models/\d{6,}\.parquet": _table_checker(POPULATION),
+    rf"tracks/{NUMBER}\.parquet": _check_tracks,
+    rf"stats/{NUMBER}(-[a-z-]+)?\.parquet": _table_checker(STATS),
+    rf"scores/{NUMBER}(-[a-z-]+)?\.parquet": _table_checker(SCORES),
+    rf"models/{NUMBER}\.parquet": _table_checker(POPULATION),
     r"models/[^/]+\.toml": _check_model,
-    r"(poses|drive|frames/(overhead|below))/\d{6,}\.mcap": _check_mcap,
+    rf"(poses|drive|frames/(overhead|below))/{NUMBER}\.mcap": _check_mcap,
     r"cameras/[^/]+\.toml": _check_camera,
-    r"models/\d{6,}\.skipped\.json": _json_checker("skipped"),
+    rf"models/{NUMBER}\.skipped\.json": _json_checker("skipped"),
     r"diagnosis/([^/]+/)?findings\.json": _json_checker("findings"),
 }
 

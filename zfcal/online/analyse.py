@@ -23,7 +23,14 @@ from zfcal.online.control import ControlGroup
 from zfcal.online.events import LeftOut, Made, Note, Progress, Result, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, tell_reason
 from zfcal.online.scoring import SCORINGS, Window, scores_of
-from zfcal.online.segments import Pooled, Segments, segment_hashes, segment_name
+from zfcal.online.segments import (
+    Pooled,
+    Segments,
+    readable,
+    segment_hashes,
+    segment_name,
+    segment_path,
+)
 from zfcal.online.settled import Items
 from zfcal.online.windows import starts_of, whole_segments, window_ends
 
@@ -147,7 +154,7 @@ def analyse(
             task=task,
             tell=tell,
             segments=known_segments,
-            whole=tuple(whole_segments(opened.trial)),
+            whole=_readable_segments(opened, tell),
         )
 
     # First: where there is no trial no lock is to lie.
@@ -161,6 +168,14 @@ def analyse(
             path = items.run.opened.trial.path("scores", end, ".parquet")
             items.make(path, partial(_make_window, end_s=end))
             tell(Progress(stage="analyse", done=number, total=len(ends)))
+
+
+def _readable_segments(opened: OpenTrial, tell: Tell) -> tuple[int, ...]:
+    """Return the starts of the whole segments, save those that are no files."""
+    starts = {
+        segment_path(opened.trial.root, start): start for start in whole_segments(opened.trial)
+    }
+    return tuple(starts[path] for path in readable(starts, tell))
 
 
 def _tell_oddities(run: _Run, ends: list[int]) -> None:

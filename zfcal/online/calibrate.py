@@ -44,6 +44,7 @@ from zfcal.online.rounds import (
     write_round,
 )
 from zfcal.online.settled import Items
+from zfcal.online.segments import readable
 from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
 
@@ -230,7 +231,8 @@ def window_span(end_s: int) -> tuple[int, int]:
 
 
 def _ends(run: _Run) -> list[int]:
-    ends = list(numbered_of(run.root / "stats", ".parquet"))
+    places = {path: end for end, path in numbered_of(run.root / "stats", ".parquet").items()}
+    ends = [places[path] for path in readable(places, run.tell)]
     if not ends and run.task.ends_s is None:
         text = (
             f"{run.root / 'stats'}: no statistics to calibrate on; first: zfcal analyse {run.root}"

@@ -14,7 +14,13 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
-from zfcal.artifacts.reading import hash_of, numbered_of, one_content
+from zfcal.artifacts.reading import (
+    hash_of,
+    numbered_of,
+    one_content,
+    open_regular,
+    unreadable,
+)
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool
@@ -64,6 +70,23 @@ def segment_starts(root: Path) -> list[int]:
     """
     found = numbered_of(root / "tracks", ".parquet")
     return [second for second in found if second % STEP_S == 0]
+
+
+def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
+    """Return the files that can be opened; the others are told as left out.
+
+    Nobody looks at what they hold: a file that nothing is made from may change.
+    """
+    found = []
+    for path in paths:
+        try:
+            open_regular(path).close()
+        except OSError as error:
+            problem = unreadable(path, error)
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
+        else:
+            found.append(path)
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
