@@ -43,8 +43,8 @@ from zfcal.online.rounds import (
     summary_of,
     write_round,
 )
-from zfcal.online.settled import Items
 from zfcal.online.segments import readable
+from zfcal.online.settled import Items
 from zfcal.online.skipping import skipped_path, without_skipped
 from zfcal.online.windows import LENGTH_S
 
