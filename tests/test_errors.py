@@ -32,7 +32,7 @@ def test_every_error_of_the_module_is_of_the_tree():
     kinds = {kind for kind in made if issubclass(kind, Exception)}
 
     assert kinds == {
-        ZfcalError, InputError, SchemaError, DamagedError, StorageError, LockedError,
+        ZfcalError, InputError, SchemaError, DamagedError, StorageError, ChangedError, LockedError,
     }  # fmt: skip
     assert all(issubclass(kind, ZfcalError) for kind in kinds)
     assert not issubclass(OSError, ZfcalError)
