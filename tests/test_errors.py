@@ -8,6 +8,7 @@ import pytest
 
 from zfcal import errors
 from zfcal.errors import (
+    ChangedError,
     DamagedError,
     InputError,
     LockedError,

@@ -18,7 +18,9 @@ from zfcal.artifacts.reading import (
     read_bytes,
     sha256_of,
 )
+from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.errors import ChangedError, InputError
+from zfcal.trial import Trial
 
 
 def digest(data):
@@ -32,6 +34,21 @@ def place(tmp_path):
     path = tmp_path / "tracks.bin"
     path.write_bytes(b"old")
     return path
+
+
+@pytest.fixture
+def make_settings(tmp_path):
+    """Return what makes a trial of four fish."""
+
+    def make():
+        write_trial(
+            Trial(
+                root=tmp_path, arena="two-rooms", n_fish=4, n_robots=0, fps=15.0, dt_s=0.2, seed=1
+            )
+        )
+        return tmp_path
+
+    return make
 
 
 def test_the_hash_is_that_of_the_bytes(place):
@@ -112,6 +129,38 @@ def test_a_file_that_was_read_may_be_written_again_with_the_same_content(place):
         read_bytes(place)
         place.unlink()
         place.write_bytes(b"old")
+        check_contents()
+
+
+def test_a_link_that_is_made_to_a_film_is_no_change(place, tmp_path):
+    """A snapshot by hard links, or other permissions, write nothing."""
+    with one_content():
+        hold_steady(place)
+        (tmp_path / "snapshot").hardlink_to(place)
+        place.chmod(0o600)
+        check_contents()
+
+
+def test_of_settings_the_values_count(tmp_path, make_settings):
+    """A comment changes nothing, another value does, as soon as it is read again."""
+    root = make_settings()
+    path = root / "trial.toml"
+    with one_content():
+        read_trial(root)
+        path.write_text(path.read_text() + "# a word\n")
+        check_contents()
+        read_trial(root)
+        path.write_text(path.read_text().replace("n_fish = 4", "n_fish = 5"))
+        with pytest.raises(ChangedError):
+            read_trial(root)
+
+
+def test_what_a_part_of_the_work_writes_is_no_change_for_the_whole(place):
+    """The part may write what the whole has read."""
+    with one_content():
+        read_bytes(place)
+        with one_content():
+            write_bytes_whole(place, b"new")
         check_contents()
 
 

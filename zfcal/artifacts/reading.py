@@ -49,11 +49,17 @@ class Contents:
     digests
         SHA-256 by absolute path.
     steady
-        The looks of files that must not even be touched, by absolute path.
+        The looks of files that must not be written to, by absolute path.
+    values
+        What files say of which only the values count, not their comments, by absolute path.
+    outer
+        Of the work that this is a part of.
     """
 
     digests: dict[str, str] = field(default_factory=dict)
     steady: dict[str, Looks] = field(default_factory=dict)
+    values: dict[str, str] = field(default_factory=dict)
+    outer: Contents | None = None
 
     def take(self, other: Contents) -> None:
         """Note all that other work has seen.
@@ -67,6 +73,8 @@ class Contents:
             self.note(place, digest)
         for place, looks in other.steady.items():
             self.note_steady(place, looks)
+        for place, values in other.values.items():
+            self.note_values(place, values)
 
     def note(self, path: Path | str, digest: str) -> None:
         """Note the hash of a file that was looked at.
@@ -81,9 +89,19 @@ class Contents:
             raise _changed(place)
 
     def note_steady(self, path: Path | str, looks: Looks) -> None:
-        """Note a file that a library reads by its name: it must not be touched at all."""
+        """Note a file that a library reads by its name: nobody may write to it."""
         place = os.path.abspath(path)  # noqa: PTH100 - as above
         if self.steady.setdefault(place, looks) != looks:
+            raise _changed(place)
+
+    def note_values(self, path: Path | str, values: str) -> None:
+        """Note what a file says of which comments and order do not count.
+
+        It is not looked at again at the end: what is made states the values that it was made
+        with among its options.
+        """
+        place = os.path.abspath(path)  # noqa: PTH100 - as above
+        if self.values.setdefault(place, values) != values:
             raise _changed(place)
 
     def forget(self, path: Path) -> None:
@@ -91,6 +109,9 @@ class Contents:
         place = os.path.abspath(path)  # noqa: PTH100 - as above
         self.digests.pop(place, None)
         self.steady.pop(place, None)
+        self.values.pop(place, None)
+        if self.outer is not None:
+            self.outer.forget(path)
 
     def check(self) -> None:
         """Look at every file once more.
@@ -101,7 +122,7 @@ class Contents:
             One is gone, or holds something else than when it was read.
         """
         for place, looks in self.steady.items():
-            if looks_of(place) != looks:
+            if _written(looks_of(place)) != looks:
                 raise _changed(place)
         for place, digest in self.digests.items():
             try:
@@ -127,7 +148,8 @@ def one_content(known: Contents | None = None) -> Iterator[Contents]:
     known
         What was seen before on whose results this work builds, such as a trial's settings.
     """
-    outer, seen = _CONTENTS.get(), Contents()
+    outer = _CONTENTS.get()
+    seen = Contents(outer=outer)
     if known is not None:
         seen.take(known)
     token = _CONTENTS.set(seen)
@@ -137,6 +159,29 @@ def one_content(known: Contents | None = None) -> Iterator[Contents]:
         _CONTENTS.reset(token)
     if outer is not None:
         outer.take(seen)
+
+
+@contextmanager
+def values_alone() -> Iterator[None]:
+    """Read files of which the values count, which `note_values` then notes."""
+    token = _CONTENTS.set(None)
+    try:
+        yield
+    finally:
+        _CONTENTS.reset(token)
+
+
+def note_values(path: Path, values: str) -> None:
+    """Note what a file says, for the current piece of work.
+
+    Raises
+    ------
+    ChangedError
+        It said something else before.
+    """
+    seen = _CONTENTS.get()
+    if seen is not None:
+        seen.note_values(path, values)
 
 
 def check_contents() -> None:
@@ -269,20 +314,21 @@ def hash_of(path: Path | str) -> str:
 
 
 def hold_steady(path: Path) -> None:
-    """Note a file that a library is about to read by its name: until the end nobody may touch it.
+    """Note a file that a library is about to read by its name: until the end it stays as it is.
 
-    Its times tell, since nobody sees the bytes that the library reads.
+    The time of its last writing tells, since nobody sees the bytes that the library reads. A link
+    that is made to it, or other permissions, change nothing.
 
     Raises
     ------
     InputError
         The file is missing, no regular one, or cannot be read.
     ChangedError
-        It was touched since the current piece of work has seen it.
+        It was written to since the current piece of work has seen it.
     """
     seen = _CONTENTS.get()
     if seen is not None:
-        looks = looks_of(path)
+        looks = _written(looks_of(path))
         if looks is None:
             raise unreadable(path, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)))
         seen.note_steady(path, looks)
@@ -324,7 +370,10 @@ def unreadable(path: Path, error: OSError) -> InputError:
         return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
     hint = "Check that it is a file, and its permissions."
     if error.errno == errno.EXDEV:
-        hint = "Put the file itself there, or name the trial in which it lies."
+        hint = (
+            "Put the file itself there, or mount its disk there; films and images may lie anywhere "
+            "when trial.toml or an option names them."
+        )
     return InputError(f"{path}: cannot be read ({error.strerror or error}).", hint=hint)
 
 
@@ -350,6 +399,11 @@ def _digest_of(path: Path | str) -> str:
     if looks == looks_of(path) and abs(asked_ns - looks[3]) > _TICK_NS:
         _HASHES[looks[:2]] = (looks, digest)
     return digest
+
+
+def _written(looks: Looks | None) -> Looks | None:
+    """Return what tells one writing of a file from the next: all but the time of its status."""
+    return None if looks is None else (*looks[:3], *looks[4:])
 
 
 def _changed(place: str) -> ChangedError:

@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from zfcal.artifacts.atomic import write_text_whole
+from zfcal.artifacts.reading import note_values, values_alone
 from zfcal.artifacts.validation import check, descriptions_of, read_toml, written_by_people
 from zfcal.errors import InputError
 from zfcal.trial import CONFIG_NAME, Trial
@@ -58,8 +59,11 @@ def read_trial(root: Path) -> Trial:
             f"{root}: is not a trial (it has no {CONFIG_NAME}).",
             hint=f"Make one with: zfcal init {root} --arena two-rooms --fish 4",
         )
-    with written_by_people():
+    # What is made states the settings that it was made with: a comment, or a camera that another
+    # command names meanwhile, bears on nothing.
+    with written_by_people(), values_alone():
         document = read_toml(path)
+    note_values(path, repr(sorted({**document, "cameras": None}.items())))
     check(document, "trial", path)
     document.pop("schema")
     for key in ("fps", "dt_s"):

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.reading import sha256_of
+from zfcal.artifacts.reading import hash_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.diagnose.document import Findings, Sheet, read_document
 from zfcal.errors import InputError
@@ -94,7 +94,7 @@ class Book:
         """See to it that the page shows the findings, and tell of its files."""
         if self.draw is None:
             return
-        digest = sha256_of(self.path)
+        digest = hash_of(self.path)
         reason = self.draw.reason(self.folder, digest) or ("forced" if task.force else None)
         if reason is None:
             for path in self.draw.files(self.folder):
