@@ -28,14 +28,20 @@ _SHARE_OF_BODY = 0.15
 _LEAST_PX = 4.0
 """A blob that a body leaves in one pixel, blurred; less cannot be told from noise."""
 
+_LEAST_CONTRAST = 8.0
+"""Greys by which something stands out of the noise of a usual camera: four deviations of two."""
+
 _THIN_PX = 45.0
 """Area of a body five times as long as wide, as zebrafish are from above, and three pixels wide."""
 
 _TOLD = 0.9
-"""Share of what stands out that has to be of one sign."""
+"""Share of what stands out as an animal does that has to be of one sign."""
 
-_COMPARABLE = 0.5
-"""Share of a usual animal's mass from which on something else stands out as an animal does."""
+_MOST = 0.6
+"""Share that is enough where all animals are of that sign: reflections are beside them."""
+
+_ALIKE = 0.5, 4.0
+"""Shares of a usual animal's mass between which something else stands out as an animal does."""
 
 _SURROUNDINGS_PX = 3
 _KERNEL = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
@@ -76,9 +82,12 @@ class Learnt:
     polarity
         One of `zfcal.vision.background.POLARITIES`; None where the film does not tell it.
     light_share
-        Share of what stands out, by area and squared contrast, that is lighter; NaN for nothing.
+        Share of the pieces that stand out as an animal does that is lighter; NaN for nothing.
     area_px
         Pixels that differ from the tank where an animal is; NaN for nothing.
+    least_px
+        Pixels of the smallest piece that is usually there, as many as animals and one more, for a
+        robot that nobody told of; NaN where that is not known.
     n_frames
         Frames that were looked at.
     """
@@ -86,6 +95,7 @@ class Learnt:
     polarity: str | None = None
     light_share: float = float("nan")
     area_px: float = float("nan")
+    least_px: float = float("nan")
     n_frames: int = 0
 
     @property
@@ -98,7 +108,11 @@ class Learnt:
         """The smallest blob that may be an animal."""
         if not self.area_px > 0:
             return USUAL_MIN_BLOB_PX
-        return max(_SHARE_OF_BODY * self.area_px, _LEAST_PX)
+        smallest = max(_SHARE_OF_BODY * self.area_px, _LEAST_PX)
+        if smallest > USUAL_MIN_BLOB_PX and self.least_px > 0:
+            # What is usually there is not dropped for being smaller than something large.
+            return min(smallest, max(_SHARE_OF_BODY * self.least_px, USUAL_MIN_BLOB_PX))
+        return smallest
 
 
 def learn(
@@ -121,19 +135,20 @@ def learn(
     region : ndarray of bool, shape (height, width), optional
         Where animals can be.
     """
-    found = [_heaviest(standing_out(frame, tank, region), n_agents) for frame in frames]
-    all_found = [each for frame in found for each in frame]
-    if not all_found:
+    found = [standing_out(frame, tank, region) for frame in frames]
+    if not any(found):
         return Learnt(n_frames=len(frames))
-    energy = np.array([each.area_px * each.contrast**2 for each in all_found])
-    is_light = np.array([each.sign > 0 for each in all_found])
-    light_share = float(energy[is_light].sum() / energy.sum())
-    polarity = _polarity(found, light_share)
-    of_it = [each for each in all_found if polarity in {None, EITHER} or _is(each, polarity)]
+    n = n_agents or _number(found)
+    usual = _usual_mass(found, n)
+    alike = [[each for each in frame if _is_alike(each, usual)] for frame in found]
+    polarity, light_share = _polarity(alike, n)
+    signs = {DARK: {-1}, LIGHT: {1}}.get(polarity or EITHER, {-1, 1})
+    areas = [each.area_px for frame in alike for each in frame if each.sign in signs]
     return Learnt(
         polarity=polarity,
         light_share=light_share,
-        area_px=_usual_area(of_it),
+        area_px=float(np.median(areas)) if areas else float("nan"),
+        least_px=_least_area(found, n, signs),
         n_frames=len(frames),
     )
 
@@ -194,36 +209,68 @@ def _step(image: Grey, piece: NDArray[np.bool_], around: NDArray[np.bool_]) -> f
     return float(image[piece].mean() - np.median(image[around]))
 
 
-def _heaviest(found: list[Standing], n_agents: int | None) -> list[Standing]:
-    """Return as many as there are animals, or those that weigh a quarter of the heaviest."""
-    found = sorted(found, key=lambda each: -each.mass)
-    if n_agents is None:
-        return [each for each in found if each.mass > 0.25 * found[0].mass]
-    return found[:n_agents]
+def _ranked(values: Sequence[Sequence[float]], n: int) -> NDArray[np.float64]:
+    """Return the largest n of a frame, as they are in half of the frames; 0 for nothing.
+
+    A hand is in some of the frames, and one of many pieces in those.
+    """
+    rows = [(sorted(frame, reverse=True) + [0.0] * n)[:n] for frame in values]
+    return np.asarray(np.median(np.array(rows), axis=0), np.float64)
 
 
-def _is(each: Standing, polarity: str) -> bool:
-    return (each.sign > 0) == (polarity == LIGHT)
+def _masses(found: Sequence[Sequence[Standing]], sign: int) -> list[list[float]]:
+    return [[each.mass for each in frame if each.sign == sign] for frame in found]
 
 
-def _polarity(found: list[list[Standing]], light_share: float) -> str | None:
-    """Return the polarity that nearly all speaks for; either where both are there throughout."""
-    if light_share <= 1 - _TOLD:
-        return DARK
-    if light_share >= _TOLD:
-        return LIGHT
-    usual = float(np.median([each.mass for frame in found for each in frame]))
-    both = [
-        {each.sign for each in frame if each.mass >= _COMPARABLE * usual} == {-1, 1}
-        for frame in found
-    ]
-    if np.mean(both) > _TOLD:
-        return EITHER
-    return None
+def _number(found: Sequence[Sequence[Standing]]) -> int:
+    """Return after how many pieces the next is smallest beside the one before."""
+    most = max(map(len, found))
+    ranked = _ranked([[each.mass for each in frame] for frame in found], most + 1)
+    floor = _LEAST_PX * _LEAST_CONTRAST
+    return 1 + int(np.argmax(ranked[:-1] / np.maximum(ranked[1:], floor)))
 
 
-def _usual_area(found: list[Standing]) -> float:
-    """Return the area at which half of what stands out, by mass, is smaller."""
-    found = sorted(found, key=lambda each: each.area_px)
-    mass = np.cumsum([each.mass for each in found])
-    return found[int(np.searchsorted(mass, mass[-1] / 2))].area_px
+def _usual_mass(found: Sequence[Sequence[Standing]], n: int) -> float:
+    """Return the mass of the middle one of n animals, the smaller where n is even.
+
+    What is larger than animals are, such as a robot, is less than half of them, and so are those
+    that are hidden; of two the robot is the larger.
+    """
+    dark, light = (_ranked(_masses(found, sign), n) for sign in (-1, 1))
+    ranked = np.maximum(dark, light)[: n // 2 + 1]
+    some = ranked[ranked > 0]
+    return float(some[-1]) if len(some) else 0.0
+
+
+def _is_alike(each: Standing, usual: float) -> bool:
+    return _ALIKE[0] * usual <= each.mass <= _ALIKE[1] * usual
+
+
+def _polarity(alike: Sequence[Sequence[Standing]], n: int) -> tuple[str | None, float]:
+    """Return the polarity, where it is told, and the share of pieces that are lighter.
+
+    Pieces are counted, whatever their mass, n of a sign in a frame at most.
+    """
+    counts = np.array(
+        [[min(n, sum(e.sign == sign for e in frame)) for sign in (-1, 1)] for frame in alike]
+    )
+    total = counts.sum(axis=0)
+    if not total.any():
+        return None, float("nan")
+    share = total / total.sum()
+    major = int(np.argmax(total))
+    are_all_there = np.median(counts[:, major]) >= n
+    polarity = None
+    if share[major] >= _TOLD or (are_all_there and share[major] >= _MOST):
+        polarity = (DARK, LIGHT)[major]
+    elif np.mean((counts > 0).all(axis=1)) > _TOLD:
+        polarity = EITHER
+    return polarity, float(share[1])
+
+
+def _least_area(found: Sequence[Sequence[Standing]], n: int, signs: set[int]) -> float:
+    """Return the area of the smallest of n + 1 pieces that is a blob by the usual measure."""
+    areas = [[each.area_px for each in frame if each.sign in signs] for frame in found]
+    ranked = _ranked(areas, n + 1)
+    blobs = ranked[ranked > USUAL_MIN_BLOB_PX]
+    return float(blobs[-1]) if len(blobs) else float("nan")
