@@ -16,6 +16,7 @@ from pathlib import Path
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
+from zfcal.artifacts.places import is_regular
 from zfcal.artifacts.reading import numbered_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.statistics import Statistics
@@ -29,7 +30,17 @@ from zfcal.calibrate.search import Progress as Search
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.online.events import LeftOut, Made, Note, Planned, Progress, Result, Tell, UpToDate
+from zfcal.online.events import (
+    LeftOut,
+    Made,
+    Note,
+    Planned,
+    Progress,
+    Result,
+    Tell,
+    UpToDate,
+    say_nothing,
+)
 from zfcal.online.likelihood import estimate, track_files
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, tell_version
 from zfcal.online.rounds import (
@@ -135,7 +146,8 @@ class _Run:
         files = [places.stats, self.root / trial.model, *self.opened.arena_files]
         files += [previous] if previous is not None else []
         if self.options.seed_likelihood:
-            files += track_files(self.root, window_span(places.end_s))
+            # One that is no file is no input: it is told where the estimate is made.
+            files += readable(track_files(self.root, window_span(places.end_s)), say_nothing)
         options = calibrate_options(self.opened, self.options, generations=generations)
         inputs = hash_inputs(self.root, files)
         return Lineage(
@@ -200,14 +212,14 @@ def calibrate(
         for number, end in enumerate(ends):
             tell(Progress(stage="rounds", done=number, total=len(ends)))
             places = RoundPlaces(root=root, end_s=end)
-            if task.wants(end) or not places.population.exists():
+            if task.wants(end) or not is_regular(places.population):
                 work = partial(_make_round, places=places, previous=previous, shaken=planned)
                 found = items.make(places.model, work)
                 if found is None:
                     # Later rounds would start from another one than the next run's.
                     return
                 planned |= found
-            previous = places.population if places.population.exists() else previous
+            previous = places.population if is_regular(places.population) else previous
         tell(Progress(stage="rounds", done=len(ends), total=len(ends)))
 
 
@@ -313,7 +325,7 @@ def _warn_if_stale(run: _Run, places: RoundPlaces) -> None:
     """Say that tracks have changed since the statistics were taken: analyse comes first."""
     for name, known in read_lineage(places.stats).inputs.items():
         path = run.root / name
-        if path.exists() and set(hash_inputs(run.root, [path]).values()) != {known}:
+        if is_regular(path) and set(hash_inputs(run.root, [path]).values()) != {known}:
             text = f"{places.stats}: {name} has changed since; first: zfcal analyse {run.root}"
             run.tell(Note(text=text, warning=True))
 

@@ -17,7 +17,7 @@ from zfcal.model.likelihood import Fit, fit
 from zfcal.model.steps import steps_of
 from zfcal.online.events import LeftOut, Note, Tell
 from zfcal.online.opening import OpenTrial
-from zfcal.online.segments import STEP_S, segment_path, segment_starts
+from zfcal.online.segments import STEP_S, readable, segment_path, segment_starts
 from zfcal.parameters import Parameters, to_genes
 from zfcal.tracks import FISH, concatenate
 
@@ -111,6 +111,8 @@ def estimate(
     where = f"{trial.root}, {start_s} s to {end_s} s"
     if not files:
         tell(Note(text=f"{where}: no tracks, so no likelihood estimate joins the search."))
+        return None
+    if len(readable(files, tell)) < len(files):
         return None
     try:
         tracks = concatenate([read_tracks(path) for path in files])

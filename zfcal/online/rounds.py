@@ -13,6 +13,7 @@ from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import write_model
+from zfcal.artifacts.reading import read_limited
 from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
@@ -295,8 +296,8 @@ class Checkpoint:
             Generations that are asked for: one that is farther is of no use.
         """
         try:
-            progress = from_bytes(self._path.read_bytes(), key=self._key)
-        except (FileNotFoundError, DamagedError):
+            progress = from_bytes(read_limited(self._path), key=self._key)
+        except (OSError, DamagedError):
             # Starting anew ends in the same result, and the first save replaces the file.
             return None
         if progress is None or (at_most is not None and progress.state.generation > at_most):

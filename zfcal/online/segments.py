@@ -6,6 +6,7 @@ located is remembered, by the content of the file.
 
 from __future__ import annotations
 
+import os
 from collections import OrderedDict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.limits import check_size
 from zfcal.artifacts.reading import (
     hash_of,
     numbered_of,
@@ -73,20 +75,29 @@ def segment_starts(root: Path) -> list[int]:
 
 
 def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
-    """Return the files that can be opened; the others are told as left out.
+    """Return the files that can be opened and are not too large; the others are told as left out.
 
     Nobody looks at what they hold: a file that nothing is made from may change.
     """
     found = []
     for path in paths:
-        try:
-            open_regular(path).close()
-        except OSError as error:
-            problem = unreadable(path, error)
-            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
-        else:
+        problem = _problem_of(path)
+        if problem is None:
             found.append(path)
+        else:
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
     return found
+
+
+def _problem_of(path: Path) -> ZfcalError | None:
+    try:
+        with open_regular(path) as file:
+            check_size(path, file.seek(0, os.SEEK_END))
+    except OSError as error:
+        return unreadable(path, error)
+    except DamagedError as error:
+        return error
+    return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

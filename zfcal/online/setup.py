@@ -19,6 +19,8 @@ from zfcal.artifacts.arenas import (
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.places import is_regular
+from zfcal.artifacts.reading import read_limited
 from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.errors import InputError, ZfcalError
 from zfcal.online.events import Made, Note, Planned, Tell, UpToDate
@@ -142,7 +144,9 @@ def _reason(trial: Trial, document: str | None, task: Task) -> str | None:
         and getattr(found, field.name) != getattr(trial, field.name)
     ]
     place = trial.root / ARENA_FILE
-    if document is not None and not (place.exists() and place.read_text("utf-8") == document):
+    if document is not None and not (
+        is_regular(place) and read_limited(place) == document.encode()
+    ):
         changed.append(f"its {ARENA_FILE} is another")
     if changed:
         raise InputError(

@@ -12,6 +12,7 @@ from pathlib import Path
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.places import is_regular
 from zfcal.artifacts.reading import numbered_of
 from zfcal.online.events import Note, Tell
 from zfcal.online.opening import Task
@@ -72,7 +73,7 @@ def write_skipped(root: Path, end_s: int, *, went_on_with_s: int, because: str) 
         The disk is full, or the place cannot be written.
     """
     stats = root / "stats" / f"{end_s:06d}.parquet"
-    inputs = hash_inputs(root, [stats] if stats.exists() else [])
+    inputs = hash_inputs(root, [stats] if is_regular(stats) else [])
     origin = Lineage(schema=SKIPPED, command="watch", inputs=inputs).as_dict()
     del origin["schema"]
     document = {
