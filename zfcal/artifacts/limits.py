@@ -73,10 +73,13 @@ def check_size(path: Path, size: int) -> None:
         raise too_large(path, size, most)
 
 
-def too_large(path: Path, size: int, most: int) -> DamagedError:
-    """Return the error for a file that has more bytes than it may have."""
+def too_large(path: Path, size: int, most: int, *, unpacked: bool = False) -> DamagedError:
+    """Return the error for a file that has, or unpacks to, more bytes than it may have."""
+    what = "unpacks to too much" if unpacked else "is too large"
+    # Whoever unpacks stops at the limit.
+    more = "more than " if unpacked else ""
     return DamagedError(
-        f"{path}: is too large ({size / _MB:.1f} MB, expected at most {most / _MB:.1f} MB).",
+        f"{path}: {what} ({more}{size / _MB:.1f} MB, expected at most {most / _MB:.1f} MB).",
         hint=f"Check that it is the right file; if it is, set {VARIABLE} to a larger number.",
     )
 

@@ -16,6 +16,7 @@ from zfcal.artifacts.foreign.mot import read_mot
 from zfcal.artifacts.foreign.movement import read_movement
 from zfcal.artifacts.foreign.options import ImportOptions, given
 from zfcal.artifacts.foreign.sleap import read_sleap
+from zfcal.artifacts.foreign.text import check_unpacked
 from zfcal.artifacts.foreign.trajectorytools import read_trajectorytools
 from zfcal.artifacts.foreign.trex import read_trex
 from zfcal.artifacts.limits import check_size
@@ -209,3 +210,4 @@ def _check_file(path: Path) -> None:
             check_size(path, file.seek(0, 2))
     except OSError as error:
         raise unreadable(path, error) from error
+    check_unpacked(path)

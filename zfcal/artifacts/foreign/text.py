@@ -11,6 +11,7 @@ import gzip
 import itertools
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from zfcal.artifacts.arrays import array_of, numbers_of
 from zfcal.artifacts.foreign.raw import Floats, Ints
+from zfcal.artifacts.limits import TABLE_BYTES, largest, too_large
 from zfcal.errors import InputError
 
 MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
@@ -31,6 +33,10 @@ _NAMES = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 _BROKEN = (OSError, EOFError, zlib.error)
 # Parsed without threads of pyarrow: one that is just starting when the process ends aborts it.
 _ALONE_BYTES = 1 << 20
+_PART_BYTES = 1 << 20
+
+_LONGEST_LINE = 1 << 24
+"""Letters: a header that names a hundred animals' body parts has some 100,000."""
 
 
 def first_lines(path: Path, count: int) -> list[str]:
@@ -43,16 +49,46 @@ def first_lines(path: Path, count: int) -> list[str]:
     """
     try:
         with _open(path) as file:
-            lines = [line.rstrip("\r\n") for line in itertools.islice(file, count)]
+            lines = [_line_of(path, file) for _ in range(count)]
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a text file in UTF-8, got other bytes.") from error
     except _BROKEN as error:
         raise InputError(f"{path}: cannot be read ({error}).") from error
+    lines = [line.rstrip("\r\n") for line in lines if line]
     if not any(line.strip() for line in lines):
         raise InputError(f"{path}: the file is empty, expected a header line and rows.")
     if any("\0" in line for line in lines):
         raise InputError(f"{path}: expected a text file, got binary data.")
     return lines
+
+
+def check_unpacked(path: Path) -> None:
+    """Refuse a compressed text that unpacks to more than a table may have.
+
+    What is damaged is passed: whoever reads it says what is wrong.
+
+    Raises
+    ------
+    DamagedError
+        It is too large.
+    """
+    if path.suffix != ".gz":
+        return
+    most, size = largest(TABLE_BYTES), 0
+    with suppress(*_BROKEN), gzip.open(path, "rb") as file:
+        while size <= most and (part := file.read(_PART_BYTES)):
+            size += len(part)
+    if size > most:
+        raise too_large(path, size, most, unpacked=True)
+
+
+def _line_of(path: Path, file: TextIO) -> str:
+    """Return the next line with its end; '' where there is none."""
+    line = file.readline(_LONGEST_LINE)
+    if len(line) == _LONGEST_LINE:
+        message = f"{path}: expected lines of text, got one of more than {_LONGEST_LINE} letters."
+        raise InputError(message)
+    return line
 
 
 def header_of(path: Path, delimiter: str) -> tuple[str, ...]:
