@@ -1,6 +1,7 @@
 """Trials with poses that grow, for tests of the driver.
 
-`LivePoses.changes` is what is wrong with the robot's pose, and `fresh_s` when it last was right.
+`LivePoses.changes` is what is wrong with the robot's pose, `ahead_s` by how much the frames' stamps
+are, and `fresh_s` says when a pose last was right.
 """
 
 import dataclasses
@@ -79,6 +80,7 @@ class LivePoses:
         self._thread = threading.Thread(target=self._write, daemon=True)
         self.without = set()
         self.changes = {}
+        self.ahead_s = 0.0
         self.fresh_s = 0.0
 
     def freeze(self):
@@ -108,8 +110,9 @@ class LivePoses:
                 for a in poses.agents
                 if a.agent not in self.without
             )
-            is_fresh = not self.changes and 4 not in self.without
-            writer.add(FramePoses(time_s=poses.time_s, frame=poses.frame, agents=agents))
+            is_fresh = not (self.changes or self.ahead_s) and 4 not in self.without
+            time_s = poses.time_s + self.ahead_s
+            writer.add(FramePoses(time_s=time_s, frame=poses.frame, agents=agents))
             if is_fresh:
                 self.fresh_s = time.monotonic()
 

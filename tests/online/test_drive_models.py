@@ -85,9 +85,22 @@ def test_a_bad_model_is_named_once_and_the_one_before_drives(opened, kind):
     else:
         bad.symlink_to(bad.name)
     assert models.look() is None
-    if kind != "loop":
-        assert "000300.toml" in models.problem
+    assert "000300.toml" in models.problem
     assert models.look() is None
     assert models.problem == ""
     bad.with_name("000360.toml").write_bytes(good)
     assert models.look().name == "models/000360.toml"
+
+
+def test_bad_models_that_come_at_once_are_all_named(opened):
+    """Not the last one alone."""
+    models = DriveModels(opened)
+    models.first()
+    for second in (300, 360, 420):
+        (opened.trial.root / "models" / f"{second:06d}.toml").write_text("half of it = ")
+    assert models.look() is None
+    assert re.findall(r"000\d{3}\.toml", models.problem) == [
+        "000420.toml",
+        "000360.toml",
+        "000300.toml",
+    ]

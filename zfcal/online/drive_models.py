@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import final
 
@@ -30,7 +31,7 @@ class DriveModels:
     Attributes
     ----------
     problem
-        What is wrong with a file that was passed over at the last look; empty for nothing.
+        What is wrong with the files that were passed over at the last look; empty for nothing.
     """
 
     def __init__(self, opened: OpenTrial, *, after_s: float = -math.inf) -> None:
@@ -69,7 +70,7 @@ class DriveModels:
         for second, path in self._files():
             if second and second + self._after_s > now_s:
                 continue
-            sign = looks_of(path)
+            sign = _looks_of(path)
             if sign is None or self._bad.get(path) == sign:
                 continue
             if self._known is not None and self._known[0] > second:
@@ -77,7 +78,7 @@ class DriveModels:
             if self._known == (second, sign):
                 return None
             found = self._read(path)
-            if looks_of(path) != sign:
+            if _looks_of(path) != sign:
                 # Replaced while it was read: the next look has it.
                 continue
             if found is None:
@@ -95,7 +96,7 @@ class DriveModels:
             sign = looks_of(self._folder)
             if self._bad.get(self._folder) != sign:
                 self._bad[self._folder] = sign
-                self.problem = str(error)
+                self._note(error)
             return []
         return sorted(found.items(), reverse=True)
 
@@ -107,7 +108,7 @@ class DriveModels:
                 model = read_model_for(path, opened.arena, dt_s=opened.trial.dt_s)
             packed = pack([model], opened.arena)
         except ZfcalError as error:
-            self.problem = str(error)
+            self._note(error)
             return None
         return InForce(
             name=path.relative_to(opened.trial.root).as_posix(),
@@ -116,3 +117,16 @@ class DriveModels:
             parameters=model,
             packed=packed,
         )
+
+    def _note(self, error: ZfcalError) -> None:
+        self.problem = f"{self.problem} {error}".lstrip()
+
+
+def _looks_of(path: Path) -> Looks | None:
+    """Return what a file looks like; where a link leads nowhere, the link: it is named."""
+    looks = looks_of(path)
+    if looks is None and path.is_symlink():
+        with suppress(OSError):
+            status = path.lstat()
+            return (status.st_dev, status.st_ino, status.st_mtime_ns)
+    return looks
