@@ -204,6 +204,21 @@ def test_a_drawn_arena_is_read_with_all_that_it_states(written):
     assert arena.bins == Bins(distance_m=(0.0, 1.4), speed_m_s=(0.0, 0.3))
 
 
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"wall_zone_m": 1e308}, r"wall_zone_m is 1e\+308, more than 20 m"),
+        ({"wall_tolerance_m": 21}, "wall_tolerance_m is 21, more than 20 m"),
+        ({"bins": {"V": [0, 1e308]}}, r"bins of V end at 1e\+308, expected at most 10"),
+        ({"bins": {"D": [0, 41]}}, "bins of D end at 41, expected at most 40"),
+    ],
+)
+def test_lengths_and_speeds_of_no_tank_are_refused(written, change, says):
+    """They left no zone, or a search without an end."""
+    with pytest.raises(InputError, match=says):
+        read_arena(written(document(**change)))
+
+
 def test_an_arena_without_a_name_is_called_as_its_file(written):
     """tank.geojson is tank."""
     assert read_arena(written(document())).name == "tank"

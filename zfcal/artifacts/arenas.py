@@ -27,6 +27,9 @@ N_CORNERS = 256
 
 _BIN_NAMES = {"D": "distance_m", "W": "wall_distance_m", "V": "speed_m_s"}
 
+_LARGEST_BIN = {"D": 2 * LARGEST_M, "W": 2 * LARGEST_M, "V": 10.0}
+"""No tank has a longer diagonal, and no fish is faster: all would lie in one bin."""
+
 
 _BARE = ("Feature", "Polygon", "MultiPolygon", "LineString", "GeometryCollection")
 """What a drawing program may save instead of a collection."""
@@ -98,6 +101,9 @@ def arena_of(document: Document, *, name: str = "arena") -> Arena:
     outline = _only_outline(name, outlines)
     _check_size(name, outline)
     lengths = {key: document[key] for key in ("wall_zone_m", "wall_tolerance_m") if key in document}
+    for key, length_m in lengths.items():
+        if not length_m <= LARGEST_M:
+            raise InputError(f"Arena {name!r}: {key} is {length_m:g}, more than {LARGEST_M:g} m.")
     return make_arena(
         name=name,
         outline=outline,
@@ -315,5 +321,11 @@ def _check_size(name: str, outline: shapely.Polygon) -> None:
 
 
 def _bins(ranges: dict[str, list[float]]) -> Bins:
+    for key, (_, high) in ranges.items():
+        if not high <= _LARGEST_BIN[key]:
+            raise InputError(
+                f"The bins of {key} end at {high:g}, expected at most {_LARGEST_BIN[key]:g}.",
+                hint="Distances are in metres, speeds in metres a second.",
+            )
     pairs = {_BIN_NAMES[key]: (float(low), float(high)) for key, (low, high) in ranges.items()}
     return Bins(**pairs)

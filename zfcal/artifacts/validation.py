@@ -16,8 +16,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jsonschema import Draft202012Validator
+from jsonschema import Draft202012Validator, TypeChecker
 from jsonschema.exceptions import ValidationError, best_match
+from jsonschema.validators import extend
 from referencing import Registry, Resource
 
 from zfcal.artifacts.parsing import json_of, toml_of
@@ -129,6 +130,17 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"Did you mean {close[0]!r}? " if close else ""
 
 
+def _is_whole(_: TypeChecker, value: object) -> bool:
+    """Return whether a value is a whole number and written as one: 3.0 and 1e308 are none."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+_Validator = extend(  # type: ignore[no-untyped-call] # jsonschema states no types here
+    Draft202012Validator,
+    type_checker=Draft202012Validator.TYPE_CHECKER.redefine("integer", _is_whole),
+)
+
+
 @cache
 def _schemas() -> dict[str, Any]:
     """Return the JSON schemas by their ``$id``."""
@@ -149,7 +161,7 @@ def _validator(schema: str) -> Draft202012Validator:
     registry: Registry[Any] = Registry().with_resources(
         [(key, Resource.from_contents(document)) for key, document in _schemas().items()]
     )
-    return Draft202012Validator(_schema(schema), registry=registry)
+    return _Validator(_schema(schema), registry=registry)
 
 
 def _text_of(path: Path) -> str:
