@@ -352,6 +352,9 @@ def changed(poses, *, agent=4, **changes):
 BAD = {
     "outside": {"x_m": 5.6},
     "unsure": {"confidence": 0.0},
+    "far": {"x_m": 900.0, "y_m": -900.0},
+}
+NO_NUMBERS = {
     "nan": {"x_m": math.nan},
     "infinite": {"y_m": -math.inf},
     "huge": {"x_m": 1e308, "y_m": 1e308},
@@ -384,6 +387,23 @@ def test_an_implausible_pose_of_the_robot_is_none(root, recorded, bad):
         ("stale-pose", False),
         ("stale-pose", True),
     ]
+    assert replay(root, say_nothing).is_same
+
+
+@pytest.mark.parametrize("agent", [1, 4])
+@pytest.mark.parametrize("bad", NO_NUMBERS)
+def test_a_frame_with_a_place_that_is_no_number_is_left_out(root, recorded, bad, agent):
+    """Whoever has it: STOP after half a second without frames, and the file is named once."""
+    heard = []
+    changes = NO_NUMBERS[bad]
+    frames = [
+        changed(f, agent=agent, **changes) if 4.0 <= f.time_s < 5.5 else f for f in recorded[1]
+    ]
+    items = redrive(root, frames, tell=heard.append)
+    seen = [p["frame"] for p in only(items, "pose")]
+    assert seen == [*range(60), *range(83, 120)]
+    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert "a message of /agents" in left_out.problem
     assert replay(root, say_nothing).is_same
 
 
@@ -425,7 +445,7 @@ def test_implausible_fish_are_absent(root, recorded, bad):
 
 
 def test_frames_of_no_time_are_left_out_and_told(root, recorded):
-    """NaN, infinite, of another age, before the start: the others are driven by."""
+    """NaN, infinite, of another age, before the start: the others are driven by, all is told."""
     times = {3: math.nan, 7: math.inf, 9: 1e308, 11: -1.0}
     heard, as_json = [], pose_files._as_json
     with pytest.MonkeyPatch.context() as patch:
@@ -437,8 +457,10 @@ def test_frames_of_no_time_are_left_out_and_told(root, recorded):
         items = redrive(root, recorded[1], tell=heard.append)
     frames = [p["frame"] for p in only(items, "pose")]
     assert frames == [n for n in range(120) if n not in times]
-    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
-    assert "frame 3 is said to be of nan s" in left_out.problem
+    problems = sorted(event.problem for event in heard if isinstance(event, LeftOut))
+    assert len(problems) == 2
+    assert "a message of /agents" in problems[0]
+    assert "frame 11 is said to be of -1.0 s" in problems[1]
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])

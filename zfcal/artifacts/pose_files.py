@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -147,8 +147,17 @@ class PoseWriter:
         self.close()
 
 
-def read_poses(path: Path) -> Iterator[FramePoses]:
+def read_poses(
+    path: Path, *, left_out: Callable[[DamagedError], None] | None = None
+) -> Iterator[FramePoses]:
     """Yield the poses of a file, in its order; of one that was cut short, those before the cut.
+
+    Parameters
+    ----------
+    path
+        The file.
+    left_out
+        Hears of each frame that is none; such are left out then, as a follower does.
 
     Raises
     ------
@@ -160,7 +169,14 @@ def read_poses(path: Path) -> Iterator[FramePoses]:
     if not os.path.lexists(path):
         raise InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
     for _, data in Tail(path, "/agents").messages():
-        yield _from_json(path, data)
+        try:
+            poses = _from_json(path, data)
+        except DamagedError as error:
+            if left_out is None:
+                raise
+            left_out(error)
+        else:
+            yield poses
 
 
 def read_clock(path: Path) -> dict[str, str] | None:
@@ -221,6 +237,11 @@ class PoseFollower:
                 break
         if self._problems and not found:
             raise self._problems.pop(0)
+        return found
+
+    def take_problems(self) -> list[DamagedError]:
+        """Return what is wrong and was not told yet: where frames come all the time, in time."""
+        found, self._problems = self._problems, []
         return found
 
     def _begin(self, path: Path, found: list[FramePoses]) -> bool:

@@ -323,12 +323,16 @@ class _Loop:
         if size == self._size and now_s - self._searched_s < _FOLDER_S:
             return []
         self._size, self._searched_s = size, now_s
+        frames: list[FramePoses] = []
+        problems: list[DamagedError] = []
         try:
-            return self._sound(self._follower.poll())
+            frames = self._sound(self._follower.poll())
         except DamagedError as error:
-            path = self._follower.path or self._opened.trial.root / "poses"
+            problems.append(error)
+        path = self._follower.path or self._opened.trial.root / "poses"
+        for error in problems + self._follower.take_problems():
             self._crew.tell(LeftOut(path=path, problem=str(error), hint=error.hint))
-            return []
+        return frames
 
     def _sound(self, frames: list[FramePoses]) -> list[FramePoses]:
         """Return the frames that can be of a trial; of the others the first is told."""

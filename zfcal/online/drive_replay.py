@@ -215,9 +215,13 @@ class _Poses:
         return self._frames.get(number)
 
     def _of(self, path: Path) -> Iterator[FramePoses]:
+        problems: list[DamagedError] = []
         try:
-            yield from read_poses(path)
+            # The driver went on behind frames that are none, too.
+            yield from read_poses(path, left_out=problems.append)
         except DamagedError as error:
+            problems.append(error)
+        for error in problems[:1]:
             self._tell(LeftOut(path=path, problem=str(error), hint=error.hint))
 
 
