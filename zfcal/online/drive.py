@@ -330,8 +330,8 @@ class _Loop:
         except DamagedError as error:
             problems.append(error)
         path = self._follower.path or self._opened.trial.root / "poses"
-        for error in problems + self._follower.take_problems():
-            self._crew.tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+        for problem in problems + self._follower.take_problems():
+            self._crew.tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
         return frames
 
     def _sound(self, frames: list[FramePoses]) -> list[FramePoses]:

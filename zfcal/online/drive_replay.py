@@ -221,8 +221,8 @@ class _Poses:
             yield from read_poses(path, left_out=problems.append)
         except DamagedError as error:
             problems.append(error)
-        for error in problems[:1]:
-            self._tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+        for problem in problems[:1]:
+            self._tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
 
 
 def _manner_of(options: Any) -> Manner:
