@@ -534,7 +534,7 @@ def test_the_robot_stops_whatever_happens_in_ten_thousand_steps():
     """And each way to be held was met, and each time it was driven on when all was well."""
     COUNTED.clear()
     run_state_machine_as_test(
-        Stops, settings=settings(max_examples=260, stateful_step_count=50, **HOW)
+        Stops, settings=settings(max_examples=290, stateful_step_count=50, **HOW)
     )
     assert COUNTED["steps"] >= 10_000
     assert COUNTED["driven on"] > 100
