@@ -237,7 +237,13 @@ def _usual_mass(found: Sequence[Sequence[Standing]], n: int) -> float:
     that are hidden; of two the robot is the larger.
     """
     dark, light = (_ranked(_masses(found, sign), n) for sign in (-1, 1))
-    ranked = np.maximum(dark, light)[: n // 2 + 1]
+    middle = n // 2
+    for one, other in ((dark, light), (light, dark)):
+        are_all_there = one[n - 1] >= _ALIKE[0] * one[middle] > 0
+        if are_all_there and not other[n - 1] > 0 and other[middle] <= _ALIKE[1] * one[middle]:
+            # Of the other sign there are fewer than animals: reflections.
+            return float(one[middle])
+    ranked = np.maximum(dark, light)[: middle + 1]
     some = ranked[ranked > 0]
     return float(some[-1]) if len(some) else 0.0
 
