@@ -1,0 +1,277 @@
+"""Every kind of file of a trial x every kind of badness x every command that reads it.
+
+Whatever lies there, a command ends in time, without a traceback, with one of its exit
+codes, and has touched nothing outside the trial.
+"""
+
+import math
+import os
+import shutil
+import signal
+import socket
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.pose_files import POSES, PoseWriter
+from zfcal.report import page
+from zfcal.tracks import FISH, AgentPose, FramePoses
+from zfcal_cli.main import run
+
+pytestmark = pytest.mark.slow
+
+PATIENCE_S = 60
+"""A command on such a trial takes a second; one that waits for a pipe takes for ever."""
+
+FILES = (
+    "trial.toml",
+    "arena.geojson",
+    "models/000000.toml",
+    "models/000120.toml",
+    "models/000120.parquet",
+    "models/000180.skipped.json",
+    "models/.000120.checkpoint",
+    "tracks/000120.parquet",
+    "stats/000120.parquet",
+    "scores/000120.parquet",
+    "scores/000120-model.parquet",
+    "poses/000060.mcap",
+    "frames/overhead/000000.mcap",
+    "cameras/overhead.toml",
+    "drive/000000.mcap",
+    "diagnosis/findings.json",
+    "report/index.html",
+    ".lock-analyse",
+    ".lock-calibrate",
+)
+FOLDERS = ("tracks", "stats", "scores", "models", "poses", "report", "drive", "diagnosis")
+
+
+def _special(make):
+    def spoil(path, outside):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        path.unlink(missing_ok=True)
+        make(path, outside)
+
+    return spoil
+
+
+def _bytes(of):
+    def spoil(path, _):
+        data = path.read_bytes() if path.exists() else b""
+        path.unlink(missing_ok=True)
+        path.write_bytes(of(data))
+
+    return spoil
+
+
+def _socket(path, _):
+    end = socket.socket(socket.AF_UNIX)
+    # Its name may have no more than 107 bytes.
+    with _standing_in(path.parent):
+        end.bind(path.name)
+    end.close()
+
+
+def _within(path, _):
+    """Let the file lie elsewhere in the trial, as people do to save room."""
+    elsewhere = path.with_name(f"elsewhere-{path.name.strip('.')}")
+    elsewhere.touch()
+    path.symlink_to(elsewhere.name)
+
+
+def _huge(path, _):
+    with path.open("wb") as file:
+        file.truncate(11 * 10**8)
+
+
+@contextmanager
+def _standing_in(folder):
+    here = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(here)
+
+
+BADNESS = {
+    "absent": _special(lambda *_: None),
+    "empty": _bytes(lambda _: b""),
+    "cut": _bytes(lambda data: data[: len(data) // 2]),
+    "noise": _bytes(lambda data: bytes(range(256)) * 8 + data),
+    "middle": _bytes(lambda data: data[: len(data) // 3] + b"\xff" * 40 + data[len(data) // 3 :]),
+    "zeros": _bytes(lambda data: bytes(len(data))),
+    "brackets": _bytes(lambda _: b"a = " + b"[" * 100_000),
+    "braces": _bytes(lambda _: b'{"a":' * 100_000),
+    "long number": _bytes(lambda data: b"n_fish = " + b"9" * 5001 + b"\n" + data),
+    "large number": _bytes(lambda data: data.replace(b"1", b"1" + b"0" * 30, 1)),
+    "nan": _bytes(lambda data: _numbers(data, b"nan")),
+    "infinite": _bytes(lambda data: _numbers(data, b"inf")),
+    "far": _bytes(lambda data: _numbers(data, b"1e308")),
+    "folder": _special(lambda path, _: path.mkdir()),
+    "pipe": _special(lambda path, _: os.mkfifo(path)),
+    "socket": _special(_socket),
+    "dangling": _special(lambda path, _: path.symlink_to("nowhere")),
+    "loop": _special(lambda path, _: path.symlink_to(path.name)),
+    "outside": _special(lambda path, outside: path.symlink_to(outside / "file")),
+    "device": _special(lambda path, _: path.symlink_to("/dev/zero")),
+    "within": _special(_within),
+    "huge": _special(_huge),
+}
+OF_FOLDERS = {
+    "pipe": BADNESS["pipe"],
+    "file": _special(lambda path, _: path.write_bytes(b"x")),
+    "loop": BADNESS["loop"],
+    "dangling": BADNESS["dangling"],
+    "outside": _special(lambda path, outside: path.symlink_to(outside)),
+}
+QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--seed", "1")
+MODEL = "trial/models/000120.toml"
+COMMANDS = {
+    "analyse": ("analyse", "trial", "--force"),
+    "calibrate": ("calibrate", "trial", "--force", *QUICK, "--no-seed-likelihood"),
+    "estimate": ("calibrate", "trial", "--dry-run", *QUICK),
+    "report": ("report", "trial", "--force"),
+    "check": ("check", "trial"),
+    "simulate": ("simulate", "new", "--model", MODEL, "--duration", "1min", "-n"),
+    "replay": ("drive", "trial", "--replay"),
+    "inspect": ("inspect",),
+}
+"""What follows ``zfcal``; `inspect` is given the very file."""
+
+READ_BY = {
+    "trial.toml": ("analyse", "calibrate", "report", "check", "replay", "inspect"),
+    "arena.geojson": ("analyse", "calibrate", "report", "check", "inspect"),
+    "tracks": ("analyse", "estimate", "check", "report", "inspect"),
+    "stats": ("analyse", "calibrate", "check", "report", "inspect"),
+    "scores": ("analyse", "calibrate", "check", "report", "inspect"),
+    "models": ("calibrate", "check", "report", "simulate", "inspect"),
+    "drive": ("check", "replay", "inspect"),
+    "diagnosis": ("check", "report", "inspect"),
+    "report": ("check", "report", "inspect"),
+    ".lock-analyse": ("analyse", "check"),
+    ".lock-calibrate": ("calibrate", "check"),
+}
+"""By folder or file; the others are read by these."""
+
+OTHERS = ("check", "inspect")
+
+
+def readers_of(name):
+    """Return the commands that read a file."""
+    return READ_BY.get(name, READ_BY.get(name.partition("/")[0], OTHERS))
+
+
+def _numbers(data, word):
+    """Put a word in place of the first number with a point, as people and tables write it."""
+    head, sep, rest = data.partition(b".")
+    begin = len(head) - len(head[::-1].lstrip(b"0123456789"[::-1])) if sep else 0
+    start = len(head) - begin
+    tail = rest.lstrip(b"0123456789")
+    return head[:start] + word + tail if sep and begin else data
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory, write_tracks):
+    """Return a trial with an artifact of every kind."""
+    place = tmp_path_factory.mktemp("whole")
+    with _standing_in(place):
+        write_tracks(place / "tracks.csv", seconds=200)
+        words = ["--side-m", "1", "--fish", "3", "--robot", "--fps", "5"]
+        assert run(["init", "trial", *words, "-q"]) == 0
+        assert run(["import", "tracks.csv", "trial", "--format", "csv", "-q"]) == 0
+        assert run(["analyse", "trial", "-q"]) == 0
+        assert run(["calibrate", "trial", *QUICK, "--no-seed-likelihood", "-q"]) == 0
+    root = place / "trial"
+    for name in ("report", "poses", "frames/overhead", "cameras", "drive", "diagnosis"):
+        (root / name).mkdir(parents=True, exist_ok=True)
+    _write_poses(root / "poses" / "000060.mcap")
+    return root
+
+
+def _write_poses(path):
+    with PoseWriter(path, Lineage(schema=POSES, command="track")) as writer:
+        for frame in range(300, 600):
+            place = {"x_m": 0.5, "y_m": 0.5, "heading_rad": math.nan, "confidence": 1.0}
+            agents = (AgentPose(agent=0, kind=FISH, **place),)
+            writer.add(FramePoses(time_s=frame / 5, frame=frame, agents=agents))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_drawing():
+    """Let a report be read for, but not drawn: that takes ten seconds, and reads nothing."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "_drawer", lambda _: lambda part: part.write_bytes(b"drawn"))
+        patch.setattr(page, "render_page", lambda *_: "drawn")
+        yield
+
+
+@contextmanager
+def in_time():
+    """Raise where a command takes too long."""
+
+    def late(*_):
+        # No `Exception`: a command that goes on after one would hide that it has waited.
+        pytest.fail("it waits for ever")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(PATIENCE_S)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture
+def spoilt(template, tmp_path, monkeypatch, zfcal):
+    """Return what spoils a file of a fresh copy and runs a command on it."""
+    outside = tmp_path / "outside"
+
+    def call(name, spoil, command):
+        root = tmp_path / "trial"
+        for folder in (root, outside):
+            shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(template, root)
+        outside.mkdir()
+        (outside / "file").write_bytes(b"of somebody else")
+        spoil(root / name, outside)
+        words = COMMANDS[command]
+        with in_time():
+            done = zfcal(*words, *([root / name] if command == "inspect" else []))
+        assert sorted(path.name for path in outside.iterdir()) == ["file"]
+        assert (outside / "file").read_bytes() == b"of somebody else"
+        return done
+
+    return call
+
+
+def problems_of(done, command):
+    """Return what is wrong with how a command ended; empty for nothing."""
+    # These are given a file by its name: that it is not there is a mistake in the command line.
+    allowed = {0, 1, 2, 3} if command in {"inspect", "simulate"} else {0, 1, 3}
+    said = done.err + done.out
+    found = [] if done.code in allowed else [f"code {done.code}"]
+    return found + [word for word in ("bug in zfcal", "Traceback") if word in said]
+
+
+@pytest.mark.parametrize("badness", BADNESS)
+@pytest.mark.parametrize("name", FILES)
+def test_no_bad_file_ends_a_command_badly(spoilt, name, badness):
+    """For each command; `inspect` is given the very file."""
+    for command in readers_of(name):
+        done = spoilt(name, BADNESS[badness], command)
+        assert not problems_of(done, command), f"{command}: {done.code}: {done.err[-400:]}"
+
+
+@pytest.mark.parametrize("badness", OF_FOLDERS)
+@pytest.mark.parametrize("name", FOLDERS)
+def test_no_bad_folder_ends_a_command_badly(spoilt, name, badness):
+    """A folder that leads outside is neither read nor written."""
+    for command in set(readers_of(name)) - {"inspect"}:
+        done = spoilt(name, OF_FOLDERS[badness], command)
+        assert not problems_of(done, command), f"{command}: {done.code}: {done.err[-400:]}"
