@@ -69,6 +69,11 @@ _DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "e
     is_flag=True,
     help="Send STOP to --port and nothing else, at once; needs no trial.",
 )
+@click.option(
+    "--resync",
+    is_flag=True,
+    help="With --stop, for a robot that does not obey: also what brings its receiver back.",
+)
 @speaks
 def command(
     out: Output,
@@ -87,6 +92,7 @@ def command(
     replay: bool,
     force: bool,
     stop: bool,
+    resync: bool,
 ) -> None:
     r"""Drive the robot by the newest model while the poses grow.
 
@@ -104,8 +110,10 @@ def command(
         zfcal drive --stop --port /dev/rfcomm5
     """
     if stop:
-        _stop(out, port)
+        _stop(out, port, resync=resync)
         return
+    if resync:
+        raise click.UsageError("--resync is for --stop: a drive says it by itself.")
     if trial is None:
         raise click.UsageError("Missing argument 'TRIAL'.")
     if replay:
@@ -142,7 +150,7 @@ def command(
     out.attempt(work)
 
 
-def _stop(out: Output, port: str | None) -> None:
+def _stop(out: Output, port: str | None, *, resync: bool) -> None:
     """Stop the robot at a port, whoever drives it; nothing heavy is loaded for that."""
     from zfcal.robot.stopping import stop_at
 
@@ -154,7 +162,7 @@ def _stop(out: Output, port: str | None) -> None:
         raise click.UsageError("--stop is for a robot that is there: give its serial port.")
 
     def work() -> None:
-        is_held = stop_at(port)
+        is_held = stop_at(port, out.note, resync=resync)
         out.note(f"{port}: STOP was sent.")
         if is_held:
             out.note(

@@ -1,7 +1,7 @@
 """Trials with poses that grow, for tests of the driver.
 
 `LivePoses.changes` is what is wrong with the robot's pose, `ahead_s` by how much the frames' stamps
-are, and `fresh_s` says when a pose last was right.
+are, `behind_s` how late they are written, and `fresh_s` says when a pose last was right.
 """
 
 import dataclasses
@@ -80,7 +80,7 @@ class LivePoses:
         self._thread = threading.Thread(target=self._write, daemon=True)
         self.without = set()
         self.changes = {}
-        self.ahead_s = 0.0
+        self.ahead_s = self.behind_s = 0.0
         self.fresh_s = 0.0
 
     def freeze(self):
@@ -94,7 +94,8 @@ class LivePoses:
     def _write(self):
         began_s, zero_s, writer, start_s = time.monotonic(), self._frames[0].time_s, None, None
         for poses in self._frames:
-            while (wait_s := began_s + poses.time_s - zero_s - time.monotonic()) > 0:
+            due_s = began_s + poses.time_s - zero_s
+            while (wait_s := due_s + self.behind_s - time.monotonic()) > 0:
                 if self._ended.wait(min(wait_s, 0.05)):
                     return
             if self._frozen.is_set():

@@ -407,6 +407,47 @@ def test_a_frame_with_a_place_that_is_no_number_is_left_out(root, recorded, bad,
     assert replay(root, say_nothing).is_same
 
 
+def test_a_frame_whose_number_is_not_of_its_time_is_left_out(root, recorded):
+    """No target is kept because a higher number was seen: all steps are swum by, and it is told."""
+    heard = []
+    frames = [dataclasses.replace(f, frame=10**9) if f.frame == 61 else f for f in recorded[1]]
+    items = redrive(root, frames, tell=heard.append)
+    assert {t["step"] for t in only(items, "target")} == set(range(40))
+    (left_out,) = [event.problem for event in heard if isinstance(event, LeftOut)]
+    assert "frame 1000000000 is said to be of 4.0" in left_out
+    assert replay(root, say_nothing).is_same
+
+
+def test_steps_go_on_where_numbers_are_set_back(root, recorded):
+    """By less than what shows: the first frame with a lower number has a step of its own."""
+    frames = [dataclasses.replace(f, frame=f.frame - 12 * (f.frame >= 60)) for f in recorded[1]]
+    items = redrive(root, frames)
+    assert [t["step"] for t in only(items, "target")] == [*range(20), *range(16, 36)]
+
+
+def test_the_robot_stands_where_the_model_leads_nowhere(root, monkeypatch):
+    """A target holds for its step and half a second; then the robot is stopped, and it is told."""
+    aim = Pilot._aim
+    monkeypatch.setattr(Pilot, "_aim", lambda *a: None if 20 <= a[2] < 30 else aim(*a))
+    items = run(root)
+    held = {round(c["time_s"], 1): c["held"] for c in only(items, "command") if c["held"]}
+    assert set(held.values()) == {"stale-target"}
+    # The last one was that of 3.8 s.
+    assert min(held) == pytest.approx(4.6)
+    assert max(held) == pytest.approx(5.9)
+    assert [(f["fault"], f["ended"]) for f in only(items, "fault")] == [
+        ("stale-target", False),
+        ("stale-target", True),
+    ]
+
+
+def test_a_robot_in_the_tank_is_not_driven_by_the_poses_clock(root):
+    """It does not wait for the driver: nothing would stop it when the poses end."""
+    with pytest.raises(InputError, match="virtual robot that waits") as found:
+        drive(root, DriveOptions(port="/dev/ttyUSB7", clock="poses"), say_nothing)
+    assert "--clock wall" in found.value.hint
+
+
 def test_a_robot_that_was_lifted_is_found_after_five_frames(root, recorded):
     """Put down half a metre away: four frames are left out, then it is driven from there."""
     first = recorded[1][0].agents[4]

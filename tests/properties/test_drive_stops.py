@@ -34,8 +34,19 @@ from zfcal.robot import events
 from zfcal.robot.body import WHEEL_LIMIT_M_S, Pose
 from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import FishBot, Watchdog
-from zfcal.robot.lastword import DRIVER, HELPER, STATE, STOP, WHOLE, Guard, Output, Slate
+from zfcal.robot.lastword import (
+    DRIVER,
+    HELPER,
+    RESYNC,
+    STATE,
+    STOP,
+    WHOLE,
+    Guard,
+    Output,
+    Slate,
+)
 from zfcal.robot.motion import Goal
+from zfcal.robot.plausible import is_frame
 from zfcal.robot.simulated import SimulatedFishBot, Traits
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
@@ -57,6 +68,9 @@ BYTES_A_STEP = 58
 PATIENCE_S, TICK_S = 0.5, 0.1
 SLACK_S = 3 * STEP_S
 """A step each for the writer, the line and the robot."""
+
+RESYNC_S = len(RESYNC) / BYTES_A_STEP * STEP_S
+"""Until a receiver that had lost its place has found it again."""
 
 BRAKING_S = 0.3
 """From 0.3 m/s to 0 at 1 m/s^2."""
@@ -139,8 +153,9 @@ class Line:
         """Open the port anew, with a helper."""
         world = self._world
         world.slate = Slate(bytearray(Slate.SIZE))
-        self.output = Output(world.port, world.slate, DRIVER)
-        self.output.begin()
+        world.slate.until_s = self.until_s
+        self.output = Output(world.port, world.slate, DRIVER, clock=lambda: world.now_s)
+        assert self.output.begin()
         self.is_open = True
         self.n_opened += 1
         world.start_helper()
@@ -190,6 +205,9 @@ class World:
         self.written_s, self.fresh_s = -math.inf, -math.inf
         self.late_until_s, self.deaf_until_s = 0.0, 0.0
         self.frame, self.pending, self.anchors = 0, [], []
+        self.behind_s, self.on_its_way, self.newest_s = 0.0, [], -math.inf
+        self.loses, self.is_astray, self.since_lost = 0, False, bytearray()
+        self.number = 0
         self.start_driver()
 
     def start_driver(self):
@@ -207,11 +225,12 @@ class World:
         )
         self.driver = Driver(PLACES["opened"], self.manner, crew)
         self.looked_s = self.now_s
+        self.all_late_s = math.inf
         self.driver_runs, self.hangs_until_s = True, 0.0
 
     def start_helper(self):
         """Start a helper on the slate that there is."""
-        output = Output(self.port, self.slate, HELPER)
+        output = Output(self.port, self.slate, HELPER, clock=lambda: self.now_s)
         self.helper = Guard(output, self.slate)
         self.slate.alive_s = self.now_s
         self.helper_runs, self.helper_wakes_s, self.helper_due_s = True, self.now_s, math.inf
@@ -232,13 +251,38 @@ class World:
             self.helper_wakes_s = self.now_s + self.helper.look(self.now_s)
         if self.hears:
             self.port.drain(BYTES_A_STEP)
-            arrived, self.port.arrived = bytes(self.port.arrived), bytearray()
+            arrived = self.on_the_air(self.port.arrived)
+            self.port.arrived = bytearray()
             self.heard += [(self.now_s, frame) for frame in self.robot.receive(arrived)]
         self.robot.advance(self.now_s - 100.0)
         self.check()
 
+    def on_the_air(self, data):
+        """Return what arrives: all, or all but a byte."""
+        if self.loses and data:
+            at = min(self.loses, len(data)) - 1
+            data = data[:at] + data[at + 1 :]
+            self.loses, self.is_astray = 0, True
+            self.since_lost = bytearray()
+        if self.is_astray:
+            # Until the receiver was brought to the beginning of a frame.
+            self.since_lost += data
+            self.is_astray = RESYNC not in self.since_lost
+        return bytes(data)
+
     def track(self):
-        """Write a frame of poses, when one is due."""
+        """Write the frames of poses that the tracker is done with."""
+        self.look()
+        while self.on_its_way and self.on_its_way[0][0] <= self.now_s - self.behind_s:
+            taken_s, is_fresh, poses = self.on_its_way.pop(0)
+            self.newest_s = taken_s
+            if is_fresh:
+                # Fresh for whoever takes it; a driver that is stopped knows nothing of it.
+                self.written_s = taken_s
+            self.pending.append(poses)
+
+    def look(self):
+        """Take an image, when one is due."""
         frame = int((self.now_s - 100.0) * FPS)
         if frame == self.frame or not self.sees:
             return
@@ -253,13 +297,13 @@ class World:
             robot |= WRONG[self.wrong]
         if self.wrong != "lost":
             agents.append(AgentPose(agent=4, kind=ROBOT, **robot))
-        if self.wrong is None or (self.wrong == "jumping" and self.is_in_reach(robot)):
-            # Fresh for whoever takes it; a driver that is stopped knows nothing of it.
-            self.written_s = self.now_s
+        is_fresh = self.wrong is None or (self.wrong == "jumping" and self.is_in_reach(robot))
+        if is_fresh:
             self.anchors.append((self.now_s, robot["x_m"], robot["y_m"]))
             del self.anchors[:-300]
-        poses = FramePoses(time_s=frame / FPS, frame=frame, agents=tuple(agents))
-        self.pending.append(poses)
+        poses = FramePoses(time_s=frame / FPS, frame=frame + self.number, agents=tuple(agents))
+        self.number = 0
+        self.on_its_way.append((self.now_s, is_fresh, poses))
 
     def is_in_reach(self, robot):
         """Return whether the robot can have driven there from a place where it was seen."""
@@ -275,7 +319,13 @@ class World:
         if self.now_s < self.hangs_until_s:
             return
         frames, self.pending = self.pending, []
-        self.fresh_s = self.written_s
+        # By how much all frames are late that a driver has seen, it cannot know; nor whether they
+        # are, or the camera is up to 1 % slow.
+        self.all_late_s += 0.01 * (self.now_s - self.looked_s)
+        if frames:
+            self.all_late_s = min(self.all_late_s, self.now_s - self.newest_s)
+        self.fresh_s = self.written_s + (self.all_late_s if self.all_late_s < math.inf else 0.0)
+        frames = [each for each in frames if is_frame(each.time_s, each.frame, FPS)]
         since_s, self.looked_s = self.now_s - self.looked_s, self.now_s
         self.driver.listen()
         self.driver.take(frames, age_s=STEP_S if frames else None, looked_s=since_s)
@@ -304,18 +354,24 @@ class World:
         asked, real = self.robot._asked, self.robot.wheels
         for wheels in (asked, real):
             assert max(abs(wheels.left_m_s), abs(wheels.right_m_s)) <= WHEEL_LIMIT_M_S + 1e-9
-        for _, frame in self.heard[-8:]:
-            if frame.type == events.MOTOR_CONTROL + 5:
-                assert max(map(abs, frame.arguments)) <= 30
+        if not self.is_astray:
+            for _, frame in self.heard[-8:]:
+                if frame.type == events.MOTOR_CONTROL + 5:
+                    assert max(map(abs, frame.arguments)) <= 30
         old_s = self.now_s - self.fresh_s
         if not self.is_stoppable or self.now_s <= self.late_until_s + SLACK_S:
             return
+        if self.is_astray:
+            # The receiver has lost its place: what brings it back, takes its time.
+            old_s -= RESYNC_S
         if old_s > PATIENCE_S + TICK_S + SLACK_S:
             assert (asked.left_m_s, asked.right_m_s) == (0.0, 0.0), f"{old_s:.3f} s old"
             # The last that was heard: STOP came in time, and nothing after it.
             assert not self.heard or self.heard[-1][1].type not in {11, 21}
             COUNTED["checked while stale"] += 1
         since_s = max(self.fresh_s, self.late_until_s, self.deaf_until_s)
+        if self.is_astray:
+            since_s += RESYNC_S
         if self.now_s - since_s > PATIENCE_S + TICK_S + SLACK_S + BRAKING_S:
             assert (real.left_m_s, real.right_m_s) == (0.0, 0.0)
 
@@ -382,6 +438,31 @@ class Stops(RuleBasedStateMachine):
             pilot._target = dataclasses.replace(pilot._target, goal=Goal(**goal))
         self.world.pass_s(0.15)
 
+    @rule(seconds=st.sampled_from([0.3, 0.8, 2.0]))
+    def tracker_falls_behind(self, seconds):
+        """From now on it writes poses of images that old."""
+        self.world.behind_s = seconds
+        self.world.pass_s(seconds)
+
+    @rule()
+    def tracker_catches_up(self):
+        """It writes all of them at once."""
+        self.world.behind_s = 0.0
+        self.world.pass_s(0.1)
+
+    @rule(number=st.sampled_from([-(10**6), -100, 12, 10**9]))
+    def absurd_number(self, number):
+        """A frame has a number that is not of its time."""
+        self.world.number = number
+        self.world.pass_s(0.2)
+
+    @precondition(lambda self: self.world.hears)
+    @rule(at=st.integers(1, 12))
+    def byte_is_lost(self, at):
+        """On the air: a receiver that has no way to know reads on from the wrong place."""
+        self.world.loses = at
+        self.world.pass_s(0.2)
+
     @rule()
     def obstacle(self):
         """The robot meets something."""
@@ -402,7 +483,8 @@ class Stops(RuleBasedStateMachine):
         world.hears = world.line.is_open = False
         world.helper = None
         world.port.queue.clear()
-        world.robot._decoder.reset()
+        # Its receiver waits for the rest of whatever frame that has cut.
+        world.is_astray, world.since_lost = True, bytearray()
         world.pass_s(0.2)
 
     @precondition(lambda self: not self.world.hears and self.world.driver_runs)
@@ -445,10 +527,10 @@ class Stops(RuleBasedStateMachine):
         if softly:
             assert world.bot.hold()
         world.driver_runs = False
-        assert world.helper.say()
+        assert world.helper.begin_last()
         world.helper = None
         ended_s = world.now_s
-        world.pass_s(seconds)
+        world.pass_s(seconds + RESYNC_S)
         # Nothing but the driver's end is needed for that: poses may still come.
         assert any(f.type == events.STOP for t, f in world.heard if t >= ended_s)
         asked = world.robot._asked
@@ -466,7 +548,7 @@ class Stops(RuleBasedStateMachine):
             world.slate.put(HELPER, STATE, 1)
         world.helper = None
         killed_s = world.now_s
-        world.pass_s(0.12)
+        world.pass_s(0.12 + RESYNC_S)
         if world.hears:
             assert any(f.type == events.STOP for t, f in world.heard if t >= killed_s)
 
@@ -484,7 +566,12 @@ class Stops(RuleBasedStateMachine):
     def all_is_well(self):
         """Then the robot is driven again before long: who stops for ever is safe and useless."""
         world = self.world
-        world.sees, world.wrong = True, None
+        if world.is_astray:
+            # Whoever drives does not know: the next hold brings the receiver back.
+            world.sees = False
+            world.pass_s(1.0)
+            assert not world.is_astray
+        world.sees, world.wrong, world.behind_s = True, None, 0.0
         world.robot._starving_until_s = -math.inf
         world.pass_s(2.0)
         moves = [t for t, f in world.heard if f.type == events.MOTOR_CONTROL + 5]
@@ -505,8 +592,9 @@ class Stops(RuleBasedStateMachine):
         if world is not None and world.hears and world.driver_runs:
             world.bot.hold()
             world.driver_runs = False
-            world.pass_s(0.1)
-            assert world.heard[-1][1].type == events.STOP
+            world.pass_s(0.1 + RESYNC_S)
+            known = [f.type for _, f in world.heard if f.type in {events.STOP, 11, 21}]
+            assert known[-1] == events.STOP
 
 
 GO = events.motor_control("F", 12, 10).encode()

@@ -31,6 +31,9 @@ class CountedPort:
         dropped, self.queue = len(self.queue), bytearray()
         return dropped if self.reports else 0
 
+    def resume(self):
+        """Let bytes go, as they always do here."""
+
     def drain(self, count=10**6):
         """Let so many bytes go."""
         self.arrived += self.queue[:count]
@@ -41,7 +44,8 @@ class CountedPort:
         return Decoder().feed(bytes(self.arrived))
 
 
-def writers(port):
+def writers(port, *, is_lossless=True, clock=lambda: 0.0):
     """Return a slate and the outputs of driver and helper to one port."""
     slate = Slate(bytearray(Slate.SIZE))
-    return slate, Output(port, slate, DRIVER), Output(port, slate, HELPER)
+    how = {"is_lossless": is_lossless, "clock": clock}
+    return slate, *(Output(port, slate, who, **how) for who in (DRIVER, HELPER))

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import math
 import os
 import pty
 import signal
@@ -9,15 +10,18 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from zfcal.errors import InputError
 from zfcal.robot import events
+from zfcal.robot.aseba import Decoder
 from zfcal.robot.body import Pose, Wheels
 from zfcal.robot.events import Said
 from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.lastword import RESYNC
 from zfcal.robot.port import SerialLine
 from zfcal.robot.simulated import SimulatedFishBot, Traits
 from zfcal.robot.virtual_process import Control
@@ -26,14 +30,19 @@ STOP = events.stop().encode().hex()
 GO = Wheels(left_m_s=0.10, right_m_s=0.12)
 
 
+VOID = {frame.encode().hex() for frame in Decoder().feed(RESYNC)} - {STOP}
+"""What a receiver at the beginning of a frame makes of the resynchronisation, without its STOP."""
+
+
 def heard(robot):
-    """Return the frames that a virtual robot has heard, in hexadecimal."""
-    return [frame for _, frame in robot.control.ask("heard")["heard"]]
+    """Return the frames that a virtual robot has heard and knows, in hexadecimal."""
+    return [frame for _, frame in robot.control.ask("heard")["heard"] if frame not in VOID]
 
 
-def connected(robot, until):
-    """Return an open line to a virtual robot."""
-    line = SerialLine(str(robot.port))
+def connected(robot, until, **how):
+    """Return an open line to a virtual robot, on which what is sent holds for ever."""
+    line = SerialLine(str(robot.port), **how)
+    line.beat(math.inf)
     assert until(lambda: line.is_open)
     return line
 
@@ -54,16 +63,18 @@ def test_bytes_go_over_a_real_serial_port(start_virtual, until):
     assert until(lambda: robot.control.ask("pose")["x_m"] > 0.01)
     bot.close()
     assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
+    # First of all what drove before is stopped: by STOP, and once more by the resynchronisation.
     frames = heard(robot)
-    assert frames[:2] == ["020000" + "0011a00500", "0400000010a023000500"]
-    assert frames[2] == "040000000b000a000c00"
-    assert set(frames[3:]) == {STOP}
+    assert frames[:2] == [STOP, STOP]
+    assert frames[2:4] == ["020000" + "0011a00500", "0400000010a023000500"]
+    assert frames[4] == "040000000b000a000c00"
+    assert set(frames[5:]) == {STOP}
 
 
 def test_a_robot_in_steps_moves_when_it_is_told(start_virtual, until):
     """Through process and terminal it ends where the same bytes bring it in memory."""
     robot = start_virtual("--stepped", "--seed", "3", "--noise", "0.1")
-    bot = FishBot("F", connected(robot, until))
+    bot = FishBot("F", connected(robot, until, is_lossless=True))
     twin = SimulatedFishBot(Traits(noise=0.1), Pose(x_m=0, y_m=0, heading_rad=0), seed=3)
     for k in range(1, 30):
         frame = bot.frame_for(Wheels(left_m_s=0.1, right_m_s=0.1 + 0.001 * k))
@@ -245,6 +256,7 @@ from zfcal.robot.body import Wheels
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.port import SerialLine
 line = SerialLine(sys.argv[1])
+line.beat(float("inf"))
 line.wait(5)
 bot = FishBot("F", line)
 while True:
@@ -274,6 +286,7 @@ BEATING = """
 import sys, time
 from zfcal.robot.body import Wheels
 from zfcal.robot.fishbot import FishBot, Watchdog
+from zfcal.robot.lastword import RESYNC
 from zfcal.robot.port import SerialLine
 line = SerialLine(sys.argv[1])
 line.wait(5)
@@ -318,6 +331,66 @@ SLACK_S = 0.1
 def stops(robot):
     """Return the times at which a virtual robot has heard STOP."""
     return [time_s for time_s, frame in robot.control.ask("heard")["heard"] if frame == STOP]
+
+
+def test_a_robot_that_still_moves_is_stopped_when_its_port_is_opened(start_virtual, until):
+    """By whatever it was driven before, and wherever its receiver stands; and it is held."""
+    robot = start_virtual("--noise", "0", "--lag-s", "0")
+    port = os.open(robot.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(port, events.motor_control("F", 20, 20).encode() + events.list_nodes().encode()[:5])
+    assert until(lambda: robot.control.ask("pose")["left_m_s"] == pytest.approx(0.2))
+    os.close(port)
+    line = SerialLine(str(robot.port))
+    assert until(lambda: robot.control.ask("pose")["left_m_s"] == 0.0)
+    # Its helper holds it, though nobody has said anything yet.
+    heard(robot)
+    assert until(lambda: heard(robot).count(STOP) >= 1)
+    line.close()
+
+
+DRIVEN_WELL = """
+import sys, time
+from zfcal.robot.port import SerialLine
+line = SerialLine(sys.argv[1])
+line.beat(float("inf"))
+line.wait(5)
+print(line._helper.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def test_the_helper_says_its_last_word_more_than_once_whatever_else_ends(start_virtual, until):
+    """A session's or a service's end signals all of its processes: the helper is the last."""
+    robot = start_virtual()
+    words = [sys.executable, "-c", DRIVEN_WELL, str(robot.port)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        helper = int(process.stdout.readline())
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+            os.kill(helper, number)
+        time.sleep(0.1)
+        heard(robot)
+        process.kill()
+        process.wait()
+        found = []
+        assert until(lambda: found.extend(heard(robot)) or found.count(STOP) >= 8)
+        assert until(lambda: is_gone(helper))
+
+
+def is_gone(pid):
+    """Return whether a process is no more; of a zombie somebody else takes care."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")")[1][1] == "Z"
+    except OSError:
+        return True
+
+
+def test_a_driver_that_ends_well_is_not_held_up_by_its_helper(start_virtual, until):
+    """One last word is enough where the driver has said STOP itself."""
+    robot = start_virtual()
+    bot = FishBot("F", connected(robot, until))
+    began_s = time.monotonic()
+    bot.close()
+    assert time.monotonic() - began_s < 0.4
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])

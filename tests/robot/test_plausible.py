@@ -105,7 +105,15 @@ def test_no_robot_that_drives_is_left_out(speeds, heading):
 
 def test_frames_have_times_and_numbers_of_a_trial():
     """From 0 on, and not of another age."""
-    assert is_frame(0.0, 0)
-    assert is_frame(3600.0, 54_000)
+    assert is_frame(0.0, 0, 15.0)
+    assert is_frame(3600.0, 54_000, 15.0)
     for time_s, number in ((NAN, 1), (INF, 1), (-1.0, 1), (1e308, 1), (1.0, -1)):
-        assert not is_frame(time_s, number)
+        assert not is_frame(time_s, number, 15.0)
+
+
+def test_a_frames_number_is_that_of_its_time():
+    """A camera may run 1 % slow for hours, and a tracker begin at any frame; no more than that."""
+    assert is_frame(3600.0, round(0.99 * 54_000), 15.0)
+    assert is_frame(0.0, 14, 15.0)
+    for time_s, number in ((10.0, 10**9), (10.0, 0), (3600.0, 50_000), (0.0, 16)):
+        assert not is_frame(time_s, number, 15.0)

@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import json
+import math
 import os
 import pty
 import subprocess
@@ -24,6 +25,7 @@ from zfcal.robot.stopping import stop_at
 from zfcal_cli.main import run
 
 STOP = stop().encode()
+GO = motor_control("F", 10, 12).encode()
 HEAVY = ("numpy", "shapely", "serial", "pandas", "mcap", "jsonschema")
 
 
@@ -66,6 +68,7 @@ def test_a_port_that_a_driver_has_is_stopped_as_well(start_virtual, until, capsy
     """Its lock keeps other drivers out, not a hand; who has it is not disturbed, and it is said."""
     robot = start_virtual("--noise", "0", "--lag-s", "0")
     line = SerialLine(str(robot.port))
+    line.beat(math.inf)
     assert until(lambda: line.is_open)
     bot = FishBot("F", line)
     assert bot.send(bot.frame_for(Wheels(left_m_s=0.2, right_m_s=0.2)))
@@ -77,6 +80,10 @@ def test_a_port_that_a_driver_has_is_stopped_as_well(start_virtual, until, capsy
     assert termios.tcgetattr(line._serial.fileno()) == before
     assert bot.send(bot.frame_for(Wheels(left_m_s=0.2, right_m_s=0.2)))
     bot.close()
+
+
+def say_nothing(_):
+    """Hear that it waits."""
 
 
 @contextlib.contextmanager
@@ -97,13 +104,13 @@ def test_a_port_that_a_program_keeps_to_itself_is_told(terminal):
     """TIOCEXCL: one line, and it is not waited for; before and after it can be stopped."""
     robot, port = terminal
     with nobody_in_particular(port):
-        stop_at(port)
+        stop_at(port, say_nothing)
         other = os.open(port, os.O_RDWR | os.O_NOCTTY)
         fcntl.ioctl(other, termios.TIOCEXCL)
         with pytest.raises(InputError, match=r"cannot be opened .*busy"):
-            stop_at(port)
+            stop_at(port, say_nothing)
         fcntl.ioctl(other, termios.TIOCNXCL)
-        stop_at(port)
+        stop_at(port, say_nothing)
         os.close(other)
     # A terminal passes on each write in its own time.
     data = os.read(robot, 100)
@@ -115,12 +122,11 @@ def test_a_port_that_a_program_keeps_to_itself_is_told(terminal):
 def test_a_port_that_is_full_is_emptied_first(terminal):
     """Thousands of commands that nobody reads: STOP is understood behind what is left of them."""
     robot, port = terminal
-    go = motor_control("F", 10, 12).encode()
     other = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     with contextlib.suppress(BlockingIOError):
         while True:
-            os.write(other, go)
-    stop_at(port)
+            os.write(other, GO)
+    stop_at(port, say_nothing)
     os.set_blocking(robot, False)
     data = bytearray()
     with contextlib.suppress(BlockingIOError):
@@ -153,13 +159,60 @@ def test_a_port_that_sends_nothing_is_told_in_time(terminal, monkeypatch):
     """What was handed over and does not leave was not sent; closing does not wait for it."""
     _, port = terminal
     flushed = []
+    monkeypatch.setattr(stopping, "LONGEST_S", 0.9)
     monkeypatch.setattr(stopping.Descriptor, "unsent", lambda _: 6)
     monkeypatch.setattr(stopping.Descriptor, "flush", lambda _: flushed.append(1))
     began_s = time.monotonic()
-    with pytest.raises(InputError, match=r"not sent in 0\.7 s \(it does not leave the port\)"):
-        stop_at(port)
-    assert time.monotonic() - began_s < 0.9
+    told = []
+    with pytest.raises(InputError, match=r"not sent in 0\.9 s \(it does not leave the port\)"):
+        stop_at(port, told.append)
+    assert time.monotonic() - began_s < 1.2
     assert flushed
+    assert told == [
+        f"{port}: STOP waits for the link (it does not leave the port); Ctrl-C gives up."
+    ]
+
+
+def test_of_a_port_that_a_driver_has_nothing_is_dropped(terminal, monkeypatch):
+    """What waits there may be its own STOP."""
+    _, port = terminal
+    line = SerialLine(port)
+    assert line.wait(5.0)
+    flushed = []
+    monkeypatch.setattr(stopping, "LONGEST_S", 0.1)
+    monkeypatch.setattr(stopping.Descriptor, "unsent", lambda _: 6)
+    monkeypatch.setattr(stopping.Descriptor, "flush", lambda _: flushed.append(1))
+    with pytest.raises(InputError, match="does not leave"):
+        stop_at(port, say_nothing)
+    assert not flushed
+    monkeypatch.undo()
+    line.close()
+
+
+def test_a_link_that_takes_seconds_to_come_up_is_waited_for(terminal, monkeypatch):
+    """As Bluetooth does where nobody had the port: STOP waits there, is not dropped, and goes."""
+    robot, port = terminal
+    up_s = time.monotonic() + 1.5
+    monkeypatch.setattr(
+        stopping.Descriptor, "unsent", lambda _: 6 if time.monotonic() < up_s else 0
+    )
+    told = []
+    assert stop_at(port, told.append) is False
+    assert time.monotonic() >= up_s
+    assert len(told) == 1
+    assert os.read(robot, 100) == STOP
+
+
+@pytest.mark.parametrize("lost", range(1, len(GO)))
+def test_a_robot_that_does_not_obey_is_brought_back(terminal, lost):
+    """It has lost bytes, and reads on from the wrong place."""
+    robot, port = terminal
+    assert run(["drive", "--stop", "--resync", "--port", port]) == 0
+    decoder = Decoder()
+    decoder.feed(GO[lost:] + GO + GO)
+    time.sleep(0.02)
+    assert decoder.feed(os.read(robot, 8192))[-1] == stop()
+    assert decoder.feed(GO)[-1].encode() == GO
 
 
 @pytest.mark.parametrize(
@@ -170,6 +223,7 @@ def test_a_port_that_sends_nothing_is_told_in_time(terminal, monkeypatch):
         ["--stop", "--port", "/dev/null", "--force"],
         ["--stop", "--port", "/dev/null", "--duration", "2s"],
         ["--stop", "--port", "/dev/null", "--replay"],
+        ["trial", "--resync", "--port", "/dev/null"],
         [],
         ["--replay"],
     ],

@@ -28,7 +28,7 @@ from zfcal.online.pilot import Manner
 from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
 from zfcal.robot.fishbot import FishBot, Watchdog
 from zfcal.robot.plausible import is_frame
-from zfcal.robot.port import SerialLine
+from zfcal.robot.port import SerialLine, is_pseudo_terminal
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.tracks import FramePoses
 from zfcal.units import SEGMENT_S
@@ -207,7 +207,13 @@ def _robot(
         words += ["--stepped"] if options.clock == "poses" else []
         virtual = stack.enter_context(VirtualProcess(words))
         port = str(virtual.port)
-    line = SerialLine(port)
+    elif options.clock == "poses" and not is_pseudo_terminal(port):
+        raise InputError(
+            f"{port}: --clock poses is for a virtual robot that waits for the driver.",
+            hint="A robot in the tank does not wait: drive it by --clock wall, the default.",
+        )
+    # On the poses' clock the robot waits for each byte, and silence means nothing.
+    line = SerialLine(port, is_lossless=options.clock == "poses")
     robot = FishBot(options.manner.letter, line)
     if not line.wait(_OPENING_S):
         line.close()
@@ -336,13 +342,16 @@ class _Loop:
 
     def _sound(self, frames: list[FramePoses]) -> list[FramePoses]:
         """Return the frames that can be of a trial; of the others the first is told."""
-        found = [poses for poses in frames if is_frame(poses.time_s, poses.frame)]
+        fps = self._opened.trial.fps
+        found = [poses for poses in frames if is_frame(poses.time_s, poses.frame, fps)]
         if len(found) < len(frames) and not self._is_unsound:
             self._is_unsound = True
             path = self._follower.path or self._opened.trial.root / "poses"
-            bad = next(poses for poses in frames if not is_frame(poses.time_s, poses.frame))
-            problem = f"{path}: frame {bad.frame} is said to be of {bad.time_s} s."
-            hint = "Frames count from 0, seconds from the start of the trial; such are left out."
+            bad = next(p for p in frames if not is_frame(p.time_s, p.frame, fps))
+            problem = (
+                f"{path}: frame {bad.frame} is said to be of {bad.time_s} s, at {fps:g} frames/s."
+            )
+            hint = "Frames and seconds count from the start of the trial; such are left out."
             self._crew.tell(LeftOut(path=path, problem=problem, hint=hint))
         return found
 

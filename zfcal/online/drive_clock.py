@@ -16,6 +16,11 @@ from zfcal.robot.motion import TICK_S
 
 _SLACK_S = 1e-6
 
+_DRIFT = 0.01
+"""By so much at most a camera's rate differs from that by which its frames are timed."""
+
+_SET_BACK_S = 1.0
+
 
 class DriveClock(Protocol):
     """When to tick.
@@ -137,6 +142,38 @@ class PoseClock:
     def steady_s(self) -> float:
         """Return the time of the last frame: silence of nobody means nothing."""
         return self._time_s
+
+
+@final
+class Lag:
+    """How old frames are at least, by how much sooner others came that were taken when they were.
+
+    A tracker that falls behind writes poses now of images that are old. What all frames are late
+    by, it cannot tell.
+    """
+
+    def __init__(self) -> None:
+        self._lead_s, self._at_s, self._time_s = -math.inf, 0.0, -math.inf
+
+    def of(self, time_s: float, now_s: float) -> float:
+        """Return by how many seconds a frame of this time that comes now is behind.
+
+        Parameters
+        ----------
+        time_s
+            Of the frame, in seconds of the trial.
+        now_s
+            By a clock that is never set back.
+        """
+        lead_s = time_s - now_s
+        expected_s = self._lead_s - _DRIFT * (now_s - self._at_s)
+        # Whoever sets the frames' clock back begins anew.
+        is_new = time_s < self._time_s - _SET_BACK_S
+        self._time_s = time_s
+        if lead_s >= expected_s or is_new:
+            self._lead_s, self._at_s = lead_s, now_s
+            return 0.0
+        return expected_s - lead_s
 
 
 def _on_grid(time_s: float) -> float:

@@ -7,13 +7,21 @@ import time
 from dataclasses import dataclass
 from typing import Any, final
 
-from zfcal.online.drive_clock import DriveClock
+from zfcal.online.drive_clock import DriveClock, Lag
 from zfcal.online.drive_events import DriveStatus
 from zfcal.online.drive_log import POSE_TO_STATE, TICK_TO_BYTE, DriveLog
 from zfcal.online.drive_models import DriveModels
 from zfcal.online.events import Note, Tell
 from zfcal.online.opening import OpenTrial
-from zfcal.online.pilot import InForce, Manner, Pilot, Target, command_item, target_item
+from zfcal.online.pilot import (
+    STALE_TARGET,
+    InForce,
+    Manner,
+    Pilot,
+    Target,
+    command_item,
+    target_item,
+)
 from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import PATIENCE_S, FishBot, Watchdog
 from zfcal.robot.motion import TICK_S
@@ -31,6 +39,7 @@ _SAYS = {
     "the robot was stopped until another one is there.",
     "power-down": "The robot has lost its supply (PowerDown for 3 s): it was stopped.",
     "obstacle": "The robot met an obstacle: it turns, and does not go on.",
+    STALE_TARGET: "The model has led nowhere for half a second: the robot was stopped.",
     "refused": "A wheel speed was refused: it is beyond what the robot can do.",
     "watchdog": "The driver itself was held up: its watchdog stopped the robot.",
 }
@@ -87,6 +96,8 @@ class Driver:
         self._begun = False
         self._is_driving = False
         self._n_histories = 0
+        self._lag = Lag()
+        self._ticked_s = math.inf
         self._seen_s = -math.inf
         self._held = ""
         self._doubted_s = -math.inf
@@ -131,8 +142,7 @@ class Driver:
             self._crew.clock.take_frame(poses.time_s)
             # The first ones of several have waited for longer.
             waited_s = max(0.0, frames[-1].time_s - poses.time_s)
-            is_live = self._crew.clock.is_live
-            self._take(poses, old_s=looked_s + waited_s if is_live else 0.0)
+            self._take(poses, old_s=self._old_s(poses.time_s, looked_s + waited_s))
             if age_s is not None:
                 self._crew.log.measure(POSE_TO_STATE, age_s + waited_s)
 
@@ -151,6 +161,12 @@ class Driver:
             return
         self._is_driving = True
         self._crew.clock.take_frame(self._time_of_frame_s or 0.0)
+
+    def _old_s(self, time_s: float, waited_s: float) -> float:
+        """Return how old a frame's image is at least; 0 where time is not that of a clock."""
+        if not self._crew.clock.is_live:
+            return 0.0
+        return max(waited_s, self._lag.of(time_s, self._crew.clock.steady_s()))
 
     def tick(self) -> None:
         """Do the ticks that are due."""
@@ -271,13 +287,18 @@ class Driver:
             self._crew.log.add(target_item(target))
 
     def _tick(self, time_s: float, due_s: float) -> None:
+        now_s = self._crew.clock.steady_s()
+        was_held_up, self._ticked_s = now_s - self._ticked_s > PATIENCE_S, now_s
         held = self._reason()
         command = self.pilot.tick(time_s, held)
         sent = self._crew.robot.send(command.message)
         if sent and self._crew.clock.is_live:
             self._measure(time.perf_counter() - due_s)
         self.n_commands += 1
-        self._tell_changes(time_s, command.held if command.held == "refused" else held)
+        is_explained = held in {"stale-pose", "port-lost", "helper-lost"} and not was_held_up
+        self._tell_bites(time_s, is_explained=is_explained)
+        by_itself = command.held in {"refused", STALE_TARGET}
+        self._tell_changes(time_s, command.held if by_itself else held)
         told = {"sent": sent, "n_sent": self._crew.robot.n_sent}
         self._crew.log.add(command_item(command, self._letter) | told)
 
@@ -302,15 +323,15 @@ class Driver:
             return "stale-pose"
         return fault
 
-    def _tell_changes(self, time_s: float, held: str) -> None:
+    def _tell_bites(self, time_s: float, *, is_explained: bool) -> None:
+        """Say that the watchdog had to stop the robot, where nothing else explains it."""
         watchdog = self._crew.watchdog
         if watchdog is not None and watchdog.n_bites != self._n_bites:
             self._n_bites = watchdog.n_bites
-            if (
-                held not in {"stale-pose", "port-lost", "helper-lost"}
-                and self.pilot.pose is not None
-            ):
+            if self.pilot.pose is not None and not is_explained:
                 self._fault(time_s, "watchdog", _SAYS["watchdog"])
+
+    def _tell_changes(self, time_s: float, held: str) -> None:
         if held == self._held:
             return
         if self._held:

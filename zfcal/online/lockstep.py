@@ -43,7 +43,7 @@ class LockstepDriver:
 
     def __init__(self, opened: OpenTrial, port: Path, tell: Tell, *, after_s: float) -> None:
         options = DriveOptions(port=str(port), clock="poses")
-        line = SerialLine(str(port))
+        line = SerialLine(str(port), is_lossless=True)
         if not line.wait(_OPENING_S):
             line.close()
             raise InputError(f"{port}: the port cannot be opened ({line.problem or 'no answer'}).")

@@ -22,7 +22,7 @@ from zfcal.parameters import Parameters
 from zfcal.robot.aseba import Frame
 from zfcal.robot.body import RADIUS_M, Pose, Wheels, wheels_for
 from zfcal.robot.confines import Confines
-from zfcal.robot.fishbot import FishBot
+from zfcal.robot.fishbot import PATIENCE_S, FishBot
 from zfcal.robot.motion import Gains, Goal, bearing, pattern_of
 from zfcal.robot.plausible import Doubt, Plausibility, Reach
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
@@ -37,6 +37,8 @@ _SPARE = 4
 
 TURNING = "obstacle"
 """The one reason for which the robot still turns; for all others it stands."""
+
+STALE_TARGET = "stale-target"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +157,7 @@ class Pilot:
         self._step: int | None = None
         self._plausibility, self._reach = Plausibility(opened.arena), Reach()
         self.pose: Pose | None = None
+        self._seen_s = 0.0
         self.n_others = 0
         self.doubts: list[tuple[AgentPose, Doubt]] = []
         self.frame = 0
@@ -170,10 +173,13 @@ class Pilot:
         return frame // self._stride
 
     def is_due(self, frame: int) -> bool:
-        """Return whether a step of the model falls on a frame, or between it and the last one."""
+        """Return whether a step of the model falls on a frame, or between it and the last one.
+
+        Also where the frames' numbers were set back: no target is kept because its number is high.
+        """
         if self._step is None:
             return frame % self._stride == 0
-        return frame // self._stride > self._step
+        return frame // self._stride != self._step
 
     def warm_up(self, model: InForce) -> None:
         """Let a pilot that nobody follows decide: the first step compiles, or loads what is."""
@@ -196,7 +202,7 @@ class Pilot:
             self.doubts.append((robot, doubt))
             robot = None
         self.n_others = len(others)
-        self.frame = poses.frame
+        self.frame, self._seen_s = poses.frame, poses.time_s
         if robot is not None:
             heading = robot.heading_rad
             if not math.isfinite(heading):
@@ -206,7 +212,7 @@ class Pilot:
             return None
         step = poses.frame // self._stride
         if self._step is not None:
-            self.n_missed += step - self._step - 1
+            self.n_missed += max(0, step - self._step - 1)
         self._step = step
         self._among.measure(poses.time_s, self._seats.take(others))
         if not self._place(seen=robot is not None):
@@ -229,6 +235,9 @@ class Pilot:
         wheels, message = Wheels(), None
         if target is None or pose is None:
             held = held or "no-target"
+        elif not held and self._seen_s - target.time_s > self._dt_s + PATIENCE_S:
+            # A step's target holds until the next step's; none has come for long.
+            held = STALE_TARGET
         elif held in {"", TURNING}:
             try:
                 wheels = self._wheels(pose, target.goal, time_s, turning=held == TURNING)

@@ -17,11 +17,13 @@ import fcntl
 import mmap
 import os
 import select
+import signal
 import struct
 import sys
 import termios
 import time
 import weakref
+from collections.abc import Callable
 from typing import Protocol
 
 STOP = bytes.fromhex("00 00 00 00 01 00")
@@ -35,6 +37,15 @@ MOST_FRAME = 15
 
 AGAIN_S = 0.1
 """While nothing fresh is known STOP is said so often: a command that was late lasts a tick."""
+
+RESYNC_S = 1.0
+"""And so often together with `RESYNC`: a receiver may have lost a byte on the air."""
+
+STUCK_S = 0.5
+"""Bytes that wait for longer than this will not go: a radio says a byte again for less long."""
+
+LAST_S = 1.0
+"""For so long the helper says STOP when the driver has gone: one alone may be lost."""
 
 LOOK_S = 0.02
 NICENESS = -10
@@ -80,6 +91,9 @@ class Port(Protocol):
     def flush(self) -> int:
         """Drop what waits here; return how many bytes that were, as the port's driver says."""
 
+    def resume(self) -> None:
+        """Let bytes leave again, if somebody was killed while he held them up."""
+
 
 class Descriptor:
     """A terminal that is open.
@@ -117,9 +131,13 @@ class Descriptor:
         with contextlib.suppress(termios.error):
             termios.tcflush(self._number, termios.TCOFLUSH)
         after = self.unsent()
+        self.resume()
+        return max(0, before - after)
+
+    def resume(self) -> None:
+        """Let bytes leave."""
         with contextlib.suppress(termios.error):
             termios.tcflow(self._number, termios.TCOON)
-        return max(0, before - after)
 
 
 class Slate:
@@ -156,7 +174,7 @@ class Slate:
 
     @property
     def until_s(self) -> float:
-        """Until when the robot may move, by the monotonic clock; 0 before anything was known."""
+        """Until when the robot may move, by the monotonic clock; 0 before anything is known."""
         return self._times[0]
 
     @until_s.setter
@@ -223,15 +241,31 @@ class Output:
         What it shares with the other writer.
     who
         `DRIVER` or `HELPER`.
+    is_lossless
+        Whether what was written is always heard: then `RESYNC` is said where a frame was cut, and
+        not beside that.
+    clock
+        In seconds, never set back.
     """
 
-    def __init__(self, port: Port, slate: Slate, who: int) -> None:
+    def __init__(
+        self,
+        port: Port,
+        slate: Slate,
+        who: int,
+        *,
+        is_lossless: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._port = port
         self._slate = slate
         self._who = who
+        self._is_lossless = is_lossless
+        self._clock = clock
         self._mended = (-1, -1)
         self._stopped_at = -1
         self._others = 0
+        self._resynced_s, self._waits_since_s = float("-inf"), float("inf")
         self.is_lost = False
 
     @property
@@ -239,10 +273,20 @@ class Output:
         """Whether this writer's last frame is not whole on the line."""
         return self._slate.number(self._who, STATE) != WHOLE
 
-    def begin(self) -> None:
-        """Stop, in place of what somebody else has left waiting in the port's driver."""
+    def begin(self) -> bool:
+        """Stop whoever hears at the port, wherever its receiver is; return whether that was taken.
+
+        What somebody else has left waiting in the port's driver is dropped.
+        """
+        self._port.resume()
         if self._port.unsent() > 0:
-            self._force()
+            return self._force()
+        self.doubt()
+        return self._is_lossless or self.stop()
+
+    def doubt(self) -> None:
+        """Take the receiver for one that may be anywhere in a frame, where bytes can be lost."""
+        self.is_lost = self.is_lost or not self._is_lossless
 
     def waiting(self) -> int:
         """Return how many bytes wait in the port's driver, at most.
@@ -264,9 +308,10 @@ class Output:
         """Write a frame of the driver's; return whether it went as a whole.
 
         If not, and `is_cut`, `finish` goes on with it. Where the line is not known to be at the
-        beginning of a frame it is brought there first.
+        beginning of a frame it is brought there, in place of this frame.
         """
-        if (self.is_cut or self.is_lost) and not self.stop():
+        if self._is_doubtful():
+            self.stop()
             return False
         self._others = self._slate.number(HELPER, FRAMES)
         self._slate.put(DRIVER, STATE, WRITING)
@@ -280,7 +325,7 @@ class Output:
         """Write what is missing of the driver's frame; return whether it is whole now."""
         done = self._slate.number(DRIVER, DONE)
         rest = self._slate.frame(0)[done:]
-        if self._was_disturbed():
+        if self._was_disturbed() or self._slate.number(DRIVER, STATE) != CUT:
             self.stop()
             return False
         self._slate.put(DRIVER, STATE, WRITING)
@@ -296,15 +341,18 @@ class Output:
     def stop(self) -> bool:
         """Write STOP, behind what is missing of a frame; return whether it is on its way.
 
-        Where the port takes no more, what waits is dropped first.
+        Where the port takes no more, what waits is dropped first. The first STOP after a command,
+        and one a second, is followed by `RESYNC`.
         """
         if self._is_doubtful():
+            self._port.resume()
             data = self._slate.missing(0) + STOP + RESYNC
         elif self._ends_in_stop() and self.waiting():
             # One waits already, and nothing behind it.
-            return True
+            return not self._is_stuck() or self._force()
         else:
-            data = STOP
+            data = STOP + RESYNC if self._is_resync_due() else STOP
+        self._waits_since_s = float("inf")
         taken = self._say(data)
         return taken == len(data) or self._force(taken)
 
@@ -316,21 +364,38 @@ class Output:
         """Return whether the line may be in the middle of a frame."""
         if self.is_cut or self.is_lost:
             return True
-        return self._who == HELPER and self._driver() not in {
-            (WHOLE, self._slate.number(DRIVER, FRAMES)),
-            self._mended,
-        }
+        state, frames = self._other()
+        # The helper is writing for a moment, fifty times a second at most, and lives; a driver
+        # that is found writing may be no more.
+        well = {WHOLE} if self._who == HELPER else {WHOLE, WRITING}
+        return state not in well and (state, frames) != self._mended
 
-    def _driver(self) -> tuple[int, int]:
-        return self._slate.number(DRIVER, STATE), self._slate.number(DRIVER, FRAMES)
+    def _is_resync_due(self) -> bool:
+        """Return whether a receiver that has lost a byte is to be brought back now."""
+        if self._is_lossless:
+            return False
+        return not self._ends_in_stop() or self._clock() - self._resynced_s >= RESYNC_S
+
+    def _is_stuck(self) -> bool:
+        """Return whether a STOP that waits has waited for too long."""
+        now_s = self._clock()
+        self._waits_since_s = min(self._waits_since_s, now_s)
+        return now_s - self._waits_since_s > STUCK_S
+
+    def _other(self) -> tuple[int, int]:
+        """Return the other writer's state, and how often it wrote."""
+        other = DRIVER if self._who == HELPER else HELPER
+        return self._slate.number(other, STATE), self._slate.number(other, FRAMES)
 
     def _ends_in_stop(self) -> bool:
         """Return whether STOP was the last that was written."""
-        return self._slate.frame(0) == STOP or self._stopped_at == self._driver()[1]
+        frames = self._slate.number(DRIVER, FRAMES)
+        return self._slate.frame(0) == STOP or self._stopped_at == frames
 
     def _say(self, data: bytes, *, then: int = WHOLE) -> int:
         """Write what ends in STOP; return how many bytes were taken: if all, the state is then."""
-        before, driver = self._slate.number(self._who, STATE), self._driver()
+        before, other = self._slate.number(self._who, STATE), self._other()
+        driver = self._slate.number(DRIVER, FRAMES)
         self._slate.put(self._who, STATE, WRITING)
         if self._who == HELPER:
             # Before it is written: the driver looks for it after each piece of its own.
@@ -341,10 +406,12 @@ class Output:
             if self._who == DRIVER:
                 self._slate.remember(STOP, len(STOP))
             else:
-                self._stopped_at = driver[1]
+                self._stopped_at = driver
+            if data.endswith(RESYNC):
+                self._resynced_s = self._clock()
         if taken == len(data) and then == WHOLE:
             self._slate.put(self._who, STATE, WHOLE)
-            self._mended, self.is_lost = driver, False
+            self._mended, self.is_lost = other, False
         return taken
 
     def _force(self, after: int = 0) -> bool:
@@ -359,6 +426,7 @@ class Output:
             So many bytes of a STOP wait behind the driver's frames.
         """
         self._slate.put(self._who, STATE, UNKNOWN)
+        self._waits_since_s = float("inf")
         dropped = self._port.flush()
         data = self._slate.missing(max(0, dropped - after)) + STOP
         went = self._say(data, then=UNKNOWN) == len(data)
@@ -392,14 +460,17 @@ class Guard:
         """Stop the robot if it is time; return how long to wait for the next look."""
         self._slate.alive_s = now_s
         until_s = self._slate.until_s
-        if until_s == 0.0:
-            return LOOK_S
         if now_s < until_s:
             self._said_s = -AGAIN_S
             return min(LOOK_S, until_s - now_s)
         if now_s - self._said_s >= AGAIN_S - LOOK_S / 2 and self.say():
             self._said_s = now_s
         return LOOK_S
+
+    def begin_last(self) -> bool:
+        """Say STOP to a receiver of which nothing is known; return whether that is on its way."""
+        self._output.doubt()
+        return self.say()
 
     def say(self) -> bool:
         """Say STOP; return whether it is on its way."""
@@ -410,17 +481,29 @@ class Guard:
 
 
 def main() -> None:
-    """Watch the driver whose port and slate are named, until standard input ends; then stop."""
-    port, shared = (int(word) for word in sys.argv[1:3])
+    """Watch the driver whose port and slate are named, until standard input ends; then stop.
+
+    A third word says that the line is lossless. A driver that ends by itself says so by a byte: it
+    has said STOP, and once more is enough.
+    """
+    port, shared, is_lossless = (int(word) for word in sys.argv[1:4])
+    # Whoever ends a session or a service ends all of its processes at once, and this one is last.
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     os.set_blocking(port, False)
     slate = Slate(mmap.mmap(shared, Slate.SIZE))
-    guard = Guard(Output(Descriptor(port), slate, HELPER), slate)
+    output = Output(Descriptor(port), slate, HELPER, is_lossless=bool(is_lossless))
+    guard = Guard(output, slate)
     rest_s = 0.0
-    while not (select.select([0], [], [], rest_s)[0] and not os.read(0, 64)):
+    while not select.select([0], [], [], rest_s)[0]:
         rest_s = guard.look(time.monotonic())
-    guard.say()
+    is_well = bool(os.read(0, 64))
+    guard.begin_last()
+    for _ in range(0 if is_well else round(LAST_S / AGAIN_S)):
+        time.sleep(AGAIN_S)
+        guard.say()
 
 
 if __name__ == "__main__":

@@ -29,6 +29,9 @@ CONSISTENT_FRAMES = 5
 LATEST_S = 1e9
 """Seconds since a trial began, some thirty years: no frame is later."""
 
+OFF_S, OFF = 1.0, 0.02
+"""So far a frame's number may be from its time: a second and 2 %, cameras are a little off."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Doubt:
@@ -46,9 +49,21 @@ class Doubt:
     says: str
 
 
-def is_frame(time_s: float, frame: int) -> bool:
-    """Return whether a frame of poses has a time and a number that a trial can have."""
-    return 0.0 <= time_s <= LATEST_S and frame >= 0
+def is_frame(time_s: float, frame: int, fps: float) -> bool:
+    """Return whether a frame of poses has a time and a number that a trial can have.
+
+    Parameters
+    ----------
+    time_s
+        Seconds since the start of the trial.
+    frame
+        Number of the frame since then.
+    fps
+        Frames a second, in the trial.
+    """
+    if not (0.0 <= time_s <= LATEST_S and frame >= 0):
+        return False
+    return abs(frame / fps - time_s) <= OFF_S + OFF * time_s
 
 
 @final

@@ -7,9 +7,11 @@ its own; who writes meanwhile is told at once that there is no line.
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import subprocess
 import sys
+import termios
 import threading
 import time
 from collections.abc import Callable
@@ -19,7 +21,17 @@ from typing import Protocol, TypeVar, final
 import serial
 
 from zfcal.robot import lastword
-from zfcal.robot.lastword import DRIVER, HELPER, STATE, STOP, WHOLE, Descriptor, Output, Slate
+from zfcal.robot.lastword import (
+    DRIVER,
+    HELPER,
+    STATE,
+    STOP,
+    STUCK_S,
+    WHOLE,
+    Descriptor,
+    Output,
+    Slate,
+)
 
 T = TypeVar("T")
 
@@ -31,14 +43,15 @@ _WRITE_S = 0.05
 _PIECES = 5
 """In so many pieces a message goes at most; a line with room takes it in one."""
 
-_STUCK_S = 0.5
-"""Bytes that wait for longer than this will not go: a radio says a byte again for less long."""
-
 _SILENT_S = 0.5
 """A helper that has not looked for so long hangs; it looks fifty times a second."""
 
 _STARTING_S = 5.0
+_ENDING_S = 0.5
 _LOOK_S = 0.005
+
+_BREAKS = (OSError, serial.SerialException, termios.error)
+"""What a port that has gone raises."""
 
 
 class Line(Protocol):
@@ -73,18 +86,22 @@ class Line(Protocol):
 class SerialLine:
     """A serial port, 115200 baud, 8N1.
 
-    While it is open a helper, a small process, holds the port as well. It says STOP when the
-    last `beat` runs out, and when this process ends, in whatever way. One that ends itself, or
-    hangs, is replaced.
+    Whoever hears there is stopped when it is opened. While it is open a helper, a small process,
+    holds the port as well. It says STOP until the first `beat`, when the last one runs out, and
+    when this process ends, in whatever way. One that ends itself, or hangs, is replaced.
 
     Parameters
     ----------
     port
         Such as ``/dev/rfcomm5``.
+    is_lossless
+        For a virtual robot that is led in steps: it hears every byte, and waits. Then nothing is
+        said at the opening, and there is no expiry until a `beat` states one.
     """
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, *, is_lossless: bool = False) -> None:
         self.port = port
+        self._is_lossless = is_lossless
         self.n_opened = 0
         self.problem = ""
         self._lock = threading.Lock()
@@ -92,7 +109,7 @@ class SerialLine:
         self._output: Output | None = None
         self._helper: Helper | None = None
         self._full_since_s = float("inf")
-        self._until_s = 0.0
+        self._until_s = float("inf") if is_lossless else 0.0
         self._closing = threading.Event()
         self._wanted = threading.Event()
         self._wanted.set()
@@ -152,7 +169,7 @@ class SerialLine:
             return None
         try:
             return use(self._serial)
-        except (OSError, serial.SerialException) as error:
+        except _BREAKS as error:
             self.problem = str(error)
             self._leave()
             self._wanted.set()
@@ -160,11 +177,11 @@ class SerialLine:
 
     def _leave(self) -> None:
         if self._serial is not None:
-            with contextlib.suppress(OSError, serial.SerialException):
+            with contextlib.suppress(*_BREAKS):
                 self._serial.close()
             self._serial = None
         if self._helper is not None:
-            # It sees that nobody is left, and has its last word.
+            # It has its last word.
             self._helper.end()
             self._helper = None
 
@@ -179,15 +196,25 @@ class SerialLine:
                 self._wanted.set()
 
     def _open(self) -> bool:
+        slate = Slate.shared()
+        slate.until_s = self._until_s
         try:
             opened = serial.Serial(self.port, BAUD, timeout=0, write_timeout=0, exclusive=True)
-            descriptor = Descriptor(opened.fileno())
-            helper = Helper(opened.fileno(), Slate.shared())
-        except (OSError, ValueError, serial.SerialException) as error:
+        except (*_BREAKS, ValueError) as error:
             self.problem = str(error)
             return False
+        lossless = self._is_lossless
+        output = Output(Descriptor(opened.fileno()), slate, DRIVER, is_lossless=lossless)
+        try:
+            # Before all else: what drove the robot before may have left its wheels turning.
+            if not output.begin():
+                raise serial.SerialTimeoutException("it takes no STOP")
+            helper = Helper(opened.fileno(), slate, is_lossless=lossless)
+        except _BREAKS as error:
+            self.problem = str(error)
+            opened.close()
+            return False
         is_there = helper.wait(_STARTING_S)
-        output = Output(descriptor, helper.slate, DRIVER)
         with self._lock:
             if self._closing.is_set() or not is_there:
                 self.problem = "the process that stops the robot does not start"
@@ -195,8 +222,8 @@ class SerialLine:
                 helper.kill()
                 return False
             self._helper, self._output, self._serial = helper, output, opened
-            helper.slate.until_s = self._until_s
-            self._attempt(lambda _: output.begin())
+            slate.until_s = self._until_s
+            self._full_since_s = float("inf")
             self.n_opened += 1
         return self.is_open
 
@@ -212,7 +239,7 @@ class SerialLine:
                 return False
             before.slate.put(HELPER, STATE, WHOLE)
             try:
-                made = Helper(port.fileno(), before.slate)
+                made = Helper(port.fileno(), before.slate, is_lossless=self._is_lossless)
             except OSError as error:
                 self.problem = str(error)
                 return False
@@ -235,12 +262,15 @@ class SerialLine:
         if output is None:
             return False
         if data == STOP:
+            # That one waits already is believed for so long.
+            self._count_silence(is_silent=output.waiting() > 0)
             if output.stop():
                 return True
             raise serial.SerialTimeoutException("Write timeout")
-        if not output.has_room(data):
-            return self._wait_for_room()
-        self._full_since_s = float("inf")
+        has_room = output.has_room(data)
+        self._count_silence(is_silent=not has_room)
+        if not has_room:
+            return False
         for _ in range(_PIECES):
             # The second look is for a driver that was held up while it waited.
             if not (_takes(port, _WRITE_S) or _takes(port, 0.0)):
@@ -249,14 +279,13 @@ class SerialLine:
                 return True
         raise serial.SerialTimeoutException("Write timeout")
 
-    def _wait_for_room(self) -> bool:
-        """Leave a frame out while others wait; raise once that has lasted."""
+    def _count_silence(self, *, is_silent: bool) -> None:
+        """Note whether bytes wait that were there before; raise once that has lasted."""
         now_s = time.monotonic()
-        self._full_since_s = min(self._full_since_s, now_s)
-        if now_s - self._full_since_s > _STUCK_S:
+        self._full_since_s = min(self._full_since_s, now_s) if is_silent else float("inf")
+        if now_s - self._full_since_s > STUCK_S:
             self._full_since_s = float("inf")
-            raise serial.SerialTimeoutException(f"no byte has gone for {_STUCK_S} s")
-        return False
+            raise serial.SerialTimeoutException(f"no byte has gone for {STUCK_S} s")
 
 
 @final
@@ -269,15 +298,17 @@ class Helper:
         Descriptor of the port.
     slate
         What they share, such as `Slate.shared` makes.
+    is_lossless
+        Whether every byte is heard (see `Output`).
     """
 
-    def __init__(self, port: int, slate: Slate) -> None:
+    def __init__(self, port: int, slate: Slate, *, is_lossless: bool = False) -> None:
         self.slate = slate
         slate.alive_s = 0.0
         self._process = subprocess.Popen(  # noqa: S603 - this very Python, on a file of this package
             [
                 *(sys.executable, "-I", "-S", str(Path(lastword.__file__))),
-                *(str(port), str(slate.descriptor)),
+                *(str(port), str(slate.descriptor), str(int(is_lossless))),
             ],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
@@ -311,15 +342,18 @@ class Helper:
         """Let it have its last word."""
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):
+                # That all is well: it need not say it again and again.
+                self._process.stdin.write(b".")
                 self._process.stdin.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(0.5)
+            self._process.wait(_ENDING_S)
         self.kill()
 
     def kill(self) -> None:
-        """End it without a last word."""
+        """End it without a last word; one that the system itself holds up is left behind."""
         self._process.kill()
-        self._process.wait()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_ENDING_S)
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
@@ -328,3 +362,8 @@ class Helper:
 def _takes(port: serial.Serial, patience_s: float) -> bool:
     """Wait until the line takes bytes, or patience ends; return whether it does."""
     return bool(select.select([], [port.fileno()], [], patience_s)[1])
+
+
+def is_pseudo_terminal(port: str) -> bool:
+    """Return whether a port is the end of a pseudo-terminal, as a virtual robot's is."""
+    return os.path.realpath(port).startswith("/dev/pts/")

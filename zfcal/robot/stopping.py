@@ -8,20 +8,23 @@ import os
 import termios
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from zfcal.errors import InputError
 from zfcal.robot.lastword import DRIVER, Descriptor, Output, Slate
 
 PATIENCE_S = 0.7
-"""For so long a port is tried, opening and sending together."""
+"""After so long it is said that STOP has not gone yet: where the radio link is up it has."""
+
+LONGEST_S = 15.0
+"""For so long it is waited for: a Bluetooth link that nobody had takes seconds to come up."""
 
 _PAUSE_S = 0.01
 _SPEED, _CFLAG = (4, 5), 2
 """Places in what `termios.tcgetattr` returns."""
 
 
-def stop_at(port: str) -> bool:
+def stop_at(port: str, tell: Callable[[str], None], *, resync: bool = False) -> bool:
     """Say STOP to whatever robots hear at a port.
 
     A driver that has the port does not keep others out (its lock is advisory); a program that
@@ -31,6 +34,10 @@ def stop_at(port: str) -> bool:
     ----------
     port
         A serial port, such as ``/dev/rfcomm5``; 115200 baud, 8N1.
+    tell
+        Hears after `PATIENCE_S` that STOP waits for the link, if it does.
+    resync
+        Whether bytes follow by which a receiver that has lost one finds its place again, and STOP.
 
     Returns
     -------
@@ -40,25 +47,22 @@ def stop_at(port: str) -> bool:
     Raises
     ------
     InputError
-        It cannot be opened, is no serial port, or has not sent STOP in `PATIENCE_S`.
+        It cannot be opened, is no serial port, or has not sent STOP in `LONGEST_S`.
     """
-    end_s = time.monotonic() + PATIENCE_S
     with _opened(port) as number:
         is_held = _is_held(number)
         if not is_held:
             _set_up(number)
         descriptor = Descriptor(number)
-        output = Output(descriptor, Slate(bytearray(Slate.SIZE)), DRIVER)
-        problem = _say(output, end_s)
-        while not problem and descriptor.unsent():
-            if time.monotonic() > end_s:
-                problem = "it does not leave the port"
-            time.sleep(_PAUSE_S)
+        # Whoever was killed while he held the port's output up would hold this up as well.
+        descriptor.resume()
+        problem = _send(descriptor, lambda says: tell(f"{port}: {says}"), resync=resync)
         if problem:
-            # Or closing the port would wait for it.
-            descriptor.flush()
+            if not is_held:
+                # Or closing the port would wait for it. Of a driver's port nothing is dropped.
+                descriptor.flush()
             raise InputError(
-                f"{port}: STOP was not sent in {PATIENCE_S} s ({problem}).",
+                f"{port}: STOP was not sent in {LONGEST_S:g} s ({problem}).",
                 hint="Take the robot out, or use its switch; then look after the radio link.",
             )
     return is_held
@@ -106,14 +110,19 @@ def _is_held(number: int) -> bool:
     return False
 
 
-def _say(output: Output, end_s: float) -> str:
-    """Say STOP as soon as the port takes it; return why it did not."""
-    while True:
+def _send(descriptor: Descriptor, tell: Callable[[str], None], *, resync: bool) -> str:
+    """Say STOP as soon as the port takes it, and wait until it has left; return why it did not."""
+    output = Output(descriptor, Slate(bytearray(Slate.SIZE)), DRIVER, is_lossless=not resync)
+    began_s, is_said, is_told = time.monotonic(), False, False
+    while time.monotonic() - began_s < LONGEST_S:
         problem = "it takes nothing"
         with contextlib.suppress(OSError):
-            if output.stop():
+            is_said = is_said or output.stop()
+            if is_said and not descriptor.unsent():
                 return ""
-            problem = "it is full"
-        if time.monotonic() > end_s:
-            return problem
+            problem = "it does not leave the port" if is_said else "it is full"
+        if time.monotonic() - began_s > PATIENCE_S and not is_told:
+            is_told = True
+            tell(f"STOP waits for the link ({problem}); Ctrl-C gives up.")
         time.sleep(_PAUSE_S)
+    return problem
