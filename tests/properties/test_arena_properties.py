@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from shapely import affinity
 
@@ -24,7 +24,9 @@ def star(radii_m):
 def tank(radii_m):
     """Return a tank with a core zone, walls and centre."""
     outline = star(np.array(radii_m))
-    core = Zone(name="core", follows_walls=False, polygon=affinity.scale(outline, 0.2, 0.2))
+    # Shrunk towards the origin, which sees every corner: so it lies inside whatever the shape.
+    polygon = affinity.scale(outline, 0.2, 0.2, origin=(0.0, 0.0))
+    core = Zone(name="core", follows_walls=False, polygon=polygon)
     return make_arena(name="star", outline=outline, zones=(core,), wall_zone_m=0.03)
 
 
@@ -108,6 +110,7 @@ def test_every_point_inside_has_a_zone_and_every_point_outside_none(radii_m, see
     np.testing.assert_array_equal(arena.zone_of(xy_m) != VOID, inside)
 
 
+@example(radii_m=[0.5, 0.25, 0.25, 0.21875, 0.21875, 0.5625, 0.21875], seed=0)
 @given(radii_m=RADII, seed=SEEDS)
 def test_settling_puts_all_near_points_inside_and_moves_none_twice(radii_m, seed):
     """A point up to the tolerance outside ends inside, not farther than it had to go."""
