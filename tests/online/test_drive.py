@@ -1,6 +1,8 @@
 """The driver in step with its poses: what it decides, logs and decides again."""
 
 import dataclasses
+import functools
+import hashlib
 import importlib.util
 import itertools
 import json
@@ -18,7 +20,8 @@ from zfcal.artifacts.drive_files import LATENCY_KEY, drive_files, read_drive
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, write_model
-from zfcal.errors import InputError, LockedError
+from zfcal.errors import ChangedError, InputError, LockedError
+from zfcal.online import drive as driving
 from zfcal.online.drive import DriveOptions, drive
 from zfcal.online.drive_models import DriveModels
 from zfcal.online.drive_replay import replay
@@ -146,6 +149,53 @@ def test_a_replay_decides_the_same(root, pattern, free_running):
     assert (tally.targets, tally.same_targets) == (40, 40)
     assert (tally.commands, tally.same_commands) == (80, 80)
     assert len(only(items, "command")) == 80
+
+
+@pytest.fixture
+def meddled(tmp_path, monkeypatch):
+    """Return a trial whose arena gets other zones right after each of the first readings."""
+    root = driven.make_trial(
+        tmp_path / "own", "--side-m", "1", "--fish", "4", "--robot", "--fps", str(driven.FPS)
+    )
+    driven.write_poses(root, driven.frames_of(root, 2))
+    arena, known, digits, opened = root / "arena.geojson", '"wall_zone_m": 0.07', iter("12"), []
+
+    def opens(trial, *, times):
+        found = open_trial(trial)
+        opened.append((found.arena, hashlib.sha256(arena.read_bytes()).hexdigest()))
+        if len(opened) <= times:
+            part = arena.with_name(".part")
+            part.write_text(arena.read_text("utf-8").replace(known, f"{known}{next(digits)}"))
+            part.replace(arena)
+        return found
+
+    def meddle(times):
+        monkeypatch.setattr(driving, "open_trial", functools.partial(opens, times=times))
+        return root, opened
+
+    return meddle
+
+
+def test_the_log_bears_the_hash_of_the_arena_that_was_read(meddled):
+    """Where another one lies there before it is hashed, it is read again, and that is told."""
+    root, opened = meddled(times=1)
+    heard = []
+    run(root, tell=heard.append, seconds=1)
+    stated = read_lineage(root / "drive" / "000000.mcap").inputs["arena.geojson"]
+    (before, old), (after, new) = opened
+    assert before != after
+    assert old != new
+    assert stated == new == hashlib.sha256((root / "arena.geojson").read_bytes()).hexdigest()
+    (again,) = [note.text for note in heard if isinstance(note, Note) and "changed" in note.text]
+    assert str(root / "arena.geojson") in again
+
+
+def test_an_arena_that_never_rests_is_not_driven_in(meddled):
+    """Twice another one is there when it is hashed: nobody knows which one was read."""
+    root, _ = meddled(times=2)
+    with pytest.raises(ChangedError, match=r"arena\.geojson: has changed"):
+        run(root, seconds=1)
+    assert not drive_files(root)
 
 
 @pytest.mark.slow

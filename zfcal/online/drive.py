@@ -25,6 +25,7 @@ from zfcal.online.driving import Crew, Driver
 from zfcal.online.events import LeftOut, Note, Result, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.online.pilot import Manner
+from zfcal.online.settled import settled
 from zfcal.online.undisturbed import ahead_of_others, garbage_left_alone
 from zfcal.robot.fishbot import FishBot, Watchdog
 from zfcal.robot.plausible import is_frame
@@ -104,9 +105,11 @@ def drive(root: Path, options: DriveOptions, tell: DriveTell, *, task: Task | No
     InputError
         The trial has no robot, the port cannot be opened, or logs of another drive are in
         the way.
+    ChangedError
+        The arena's file has changed twice while it was being read.
     """
     task = task or Task()
-    opened = open_trial(root)
+    opened, lineage = settled(lambda: _open(root, options), tell)
     if opened.trial.n_robots < 1:
         raise InputError(
             f"{opened.trial.config}: n_robots is 0: there is nobody to drive.",
@@ -117,7 +120,13 @@ def drive(root: Path, options: DriveOptions, tell: DriveTell, *, task: Task | No
     with at_work(root, "drive", task):
         _make_room(opened, options, tell, task)
         with contextlib.ExitStack() as stack:
-            return _drive(opened, options, tell, stack)
+            return _drive(opened, options, lineage, tell, stack)
+
+
+def _open(root: Path, options: DriveOptions) -> tuple[OpenTrial, Lineage]:
+    """Return the trial, and where the log comes from: its hashes are of what was read."""
+    opened = open_trial(root)
+    return opened, lineage_of(opened, options)
 
 
 def lineage_of(opened: OpenTrial, options: DriveOptions) -> Lineage:
@@ -148,12 +157,16 @@ def _make_room(opened: OpenTrial, options: DriveOptions, tell: Tell, task: Task)
 
 
 def _drive(
-    opened: OpenTrial, options: DriveOptions, tell: DriveTell, stack: contextlib.ExitStack
+    opened: OpenTrial,
+    options: DriveOptions,
+    lineage: Lineage,
+    tell: DriveTell,
+    stack: contextlib.ExitStack,
 ) -> str:
     is_live = options.clock == "wall"
     robot, virtual = _robot(opened, options, stack)
     clock: DriveClock = WallClock() if is_live else PoseClock(opened.trial.fps)
-    log = DriveLog(opened.trial, lineage_of(opened, options), tell, is_patient=is_live)
+    log = DriveLog(opened.trial, lineage, tell, is_patient=is_live)
     watchdog = Watchdog(robot) if is_live else None
     crew = Crew(
         robot=robot,
