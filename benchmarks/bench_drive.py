@@ -25,7 +25,8 @@ from regressions import Ratio, conclude, parser
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import read_model
-from zfcal.artifacts.pose_files import POSES, PoseWriter
+from zfcal.artifacts.pose_files import PoseWriter
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.model.simulate import simulate_tracks
 from zfcal.online.opening import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses

@@ -15,11 +15,12 @@ from jsonschema import Draft202012Validator
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from zfcal.artifacts import pose_files
+from zfcal.artifacts import pose_files, pose_messages
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.mcap_files import overview
-from zfcal.artifacts.pose_files import POSES, PoseFollower, PoseWriter, read_clock, read_poses
+from zfcal.artifacts.pose_files import PoseFollower, PoseWriter, read_clock, read_poses
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.validation import read_json
 from zfcal.errors import DamagedError, InputError, StorageError
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses, tracks_of
@@ -206,7 +207,8 @@ def test_a_killed_writer_leaves_all_that_it_had_written(tmp_path):
         "import os, signal, sys\n"
         "from pathlib import Path\n"
         "from zfcal.artifacts.lineage import Lineage\n"
-        "from zfcal.artifacts.pose_files import POSES, PoseWriter\n"
+        "from zfcal.artifacts.pose_files import PoseWriter\n"
+        "from zfcal.artifacts.pose_messages import POSES\n"
         "from zfcal.tracks import FramePoses\n"
         "w = PoseWriter(Path(sys.argv[1]), Lineage(schema=POSES, command='track'))\n"
         "for k in range(50):\n"
@@ -360,7 +362,7 @@ def test_a_frame_with_a_number_out_of_range_is_left_out(path, tmp_path, changes,
 def test_no_message_of_another_form_is_more_than_damage(path, data):
     """Deep, long, not finite, of another minute, or no JSON."""
     with pytest.raises(DamagedError, match="a message of /agents is not of"):
-        pose_files._from_json(path, data)
+        pose_messages.from_json(path, data)
 
 
 def test_a_live_follower_leaves_frames_of_the_future_out(path, tmp_path, monkeypatch):

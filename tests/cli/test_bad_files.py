@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.pose_files import POSES, PoseWriter
+from zfcal.artifacts.pose_files import PoseWriter
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.report import page
 from zfcal.tracks import FISH, AgentPose, FramePoses
 from zfcal_cli.main import run

@@ -13,7 +13,8 @@ import numpy as np
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import read_model, write_model
-from zfcal.artifacts.pose_files import POSES, PoseWriter
+from zfcal.artifacts.pose_files import PoseWriter
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.model.simulate import simulate_tracks
 from zfcal.online.opening import open_trial
 from zfcal.parameters import from_genes, to_genes

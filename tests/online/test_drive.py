@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from zfcal.artifacts import pose_files
+from zfcal.artifacts import pose_files, pose_messages
 from zfcal.artifacts.drive_files import LATENCY_KEY, drive_files, read_drive
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.mcap_files import overview
@@ -416,7 +416,7 @@ def redrive(root, frames, **options):
     for path in (root / "poses").iterdir():
         path.unlink()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pose_files, "to_json", json.dumps)
+        patch.setattr(pose_messages, "to_json", json.dumps)
         driven.write_poses(root, frames)
     return run(root, **options)
 
@@ -538,11 +538,11 @@ def test_implausible_fish_are_absent(root, recorded, bad):
 def test_frames_of_no_time_are_left_out_and_told(root, recorded):
     """NaN, infinite, of another age, before the start: the others are driven by, all is told."""
     times = {3: math.nan, 7: math.inf, 9: 1e308, 11: -1.0}
-    heard, as_json = [], pose_files._as_json
+    heard, as_json = [], pose_files.as_json
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             pose_files,
-            "_as_json",
+            "as_json",
             lambda f: as_json(dataclasses.replace(f, time_s=times.get(f.frame, f.time_s))),
         )
         items = redrive(root, recorded[1], tell=heard.append)

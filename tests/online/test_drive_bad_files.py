@@ -105,7 +105,7 @@ def test_a_pose_of_the_robot_that_is_none_stops_it_until_the_next_good_one(
 ):
     """It is told what is wrong, once, and the driver goes on."""
     # A tracker of others writes what zfcal's own refuses to write.
-    monkeypatch.setattr("zfcal.artifacts.pose_files.to_json", json.dumps)
+    monkeypatch.setattr("zfcal.artifacts.pose_messages.to_json", json.dumps)
     rig.start()
     drives_on(rig)
     rig.poses.changes = {name: value}

@@ -5,7 +5,8 @@ import dataclasses
 import pytest
 
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.pose_files import POSES, read_poses
+from zfcal.artifacts.pose_files import read_poses
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.tables import TRACKS, read_extra, read_tracks
 from zfcal.online.events import Made, say_nothing
 from zfcal.online.minutes import NEXT_KEY, Minutes, Origins

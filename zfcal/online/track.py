@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.pose_files import POSES
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.reading import Contents, one_content
 from zfcal.online.events import Planned, Tell, UpToDate
 from zfcal.online.following import Following

@@ -17,7 +17,7 @@ from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import SCHEMA as MODEL
 from zfcal.artifacts.models import write_model
-from zfcal.artifacts.pose_files import POSES
+from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.validation import read_json
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
