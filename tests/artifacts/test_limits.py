@@ -59,6 +59,14 @@ def test_no_json_ends_a_run(text, says):
         json_of(text)
 
 
+def test_what_is_not_finite_is_taken_where_it_is_asked_for():
+    """As many programs write it; a document that is too deep stays an error."""
+    found = json_of('{"a": [NaN, -Infinity, 1]}', not_finite=True)
+    assert repr(found) == "{'a': [nan, -inf, 1]}"
+    with pytest.raises(ValueError, match="nests deeper"):
+        json_of("[" * 100_000, not_finite=True)
+
+
 def test_a_large_file_is_not_read_unless_the_limit_is_raised(tmp_path, monkeypatch):
     """The message says how."""
     path = tmp_path / "model.toml"

@@ -329,21 +329,49 @@ def _wrong(**changes):
     ("changes", "says"),
     [
         ({"x_m": 1e308}, "x_m is 1e\\+308"),
+        ({"x_m": math.nan}, "x_m is nan"),
+        ({"y_m": -math.inf}, "y_m is -inf"),
         ({"y_m": -1001.0}, "y_m is -1001"),
         ({"agent": 2**40}, "agent is 1099511627776"),
+        ({"agent": 1}, "agent 1 stands 2 times"),
         ({"confidence": 2.0}, "confidence is 2.0"),
         ({"heading_rad": 1e9}, "heading_rad is 1000000000.0"),
     ],
 )
-def test_a_frame_with_a_number_out_of_range_is_left_out(path, tmp_path, changes, says):
-    """Those before and behind it are taken; the file is named once."""
+def test_whoever_has_a_number_out_of_range_is_absent(path, tmp_path, monkeypatch, changes, says):
+    """Alone, or with whom its id is shared; the others stay, and the file is named once."""
+    # A tracker of others writes what zfcal's own refuses to write.
+    monkeypatch.setattr(pose_messages, "to_json", json.dumps)
     with PoseWriter(path, LINEAGE) as writer:
         for poses in (frame(0), _wrong(**changes), _wrong(**changes), frame(2)):
             writer.add(poses)
-    frames, problems = _drained(PoseFollower(tmp_path))
-    assert frames == [0, 2]
-    assert len(problems) == 1
-    assert re.search(says, problems[0])
+    left = frame(1).agents[2 if changes == {"agent": 1} else 1 :]
+    wrong = dataclasses.replace(frame(1), agents=left)
+    wanted = repr([frame(0), wrong, wrong, frame(2)])
+
+    follower = PoseFollower(tmp_path)
+    assert repr(follower.poll()) == wanted
+    (problem,) = follower.take_problems()
+    assert re.search(f"in frame 1 .*{says}", str(problem))
+
+    told = []
+    assert repr(list(read_poses(path, left_out=told.append))) == wanted
+    assert [str(error) for error in told] == [str(problem)] * 2
+    with pytest.raises(DamagedError, match=says):
+        list(read_poses(path))
+
+
+def test_a_frame_that_is_none_is_told_beside_an_agent_that_is_none(path, tmp_path):
+    """Each once, however many there are."""
+    bad_frame = dataclasses.replace(frame(1), time_s=500.0)
+    with PoseWriter(path, LINEAGE) as writer:
+        for poses in (_wrong(x_m=1e308), bad_frame, _wrong(x_m=1e308), bad_frame, frame(2)):
+            writer.add(poses)
+    follower = PoseFollower(tmp_path)
+    assert [len(poses.agents) for poses in follower.poll()] == [2, 2, 3]
+    first, second = follower.take_problems()
+    assert "agent 0 has no pose" in str(first)
+    assert "time_s is 500.0" in str(second)
 
 
 @pytest.mark.parametrize(
@@ -351,6 +379,7 @@ def test_a_frame_with_a_number_out_of_range_is_left_out(path, tmp_path, changes,
     [
         b'{"agents":' * 50_000,
         b'{"time_s": 1, "frame": 1, "agents": [5]}',
+        b'{"time_s": 1, "frame": 1, "agents": {"agent": 5}}',
         b'{"time_s": 1, "frame": 1e400, "agents": []}',
         b'{"time_s": NaN, "frame": 1, "agents": []}',
         b'{"time_s": 1, "frame": ' + b"9" * 5001 + b', "agents": []}',
@@ -361,7 +390,7 @@ def test_a_frame_with_a_number_out_of_range_is_left_out(path, tmp_path, changes,
 )
 def test_no_message_of_another_form_is_more_than_damage(path, data):
     """Deep, long, not finite, of another minute, or no JSON."""
-    with pytest.raises(DamagedError, match="a message of /agents is not of"):
+    with pytest.raises(DamagedError, match="message of /agents is not of"):
         pose_messages.from_json(path, data)
 
 

@@ -440,20 +440,38 @@ def test_an_implausible_pose_of_the_robot_is_none(root, recorded, bad):
     assert replay(root, say_nothing).is_same
 
 
-@pytest.mark.parametrize("agent", [1, 4])
 @pytest.mark.parametrize("bad", NO_NUMBERS)
-def test_a_frame_with_a_place_that_is_no_number_is_left_out(root, recorded, bad, agent):
-    """Whoever has it: STOP after half a second without frames, and the file is named once."""
+def test_a_robot_whose_place_is_no_number_is_not_seen(root, recorded, bad):
+    """STOP after half a second, and the file is named once; the fish stay."""
     heard = []
-    changes = NO_NUMBERS[bad]
-    frames = [
-        changed(f, agent=agent, **changes) if 4.0 <= f.time_s < 5.5 else f for f in recorded[1]
-    ]
+    frames = [changed(f, **NO_NUMBERS[bad]) if 4.0 <= f.time_s < 5.5 else f for f in recorded[1]]
     items = redrive(root, frames, tell=heard.append)
-    seen = [p["frame"] for p in only(items, "pose")]
-    assert seen == [*range(60), *range(83, 120)]
+    assert [p["frame"] for p in only(items, "pose")] == list(range(120))
+    assert {p["agents"] for p in only(items, "pose")} == {4}
+    held = {round(c["time_s"], 1): c for c in only(items, "command") if c["held"]}
+    assert set(held) == {round(k / 10, 1) for k in range(45, 56)}
+    assert {c["bytes"] for c in held.values()} == {"000000000100"}
+    assert [f["fault"] for f in only(items, "fault")] == ["stale-pose"] * 2
     (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
-    assert "a message of /agents" in left_out.problem
+    assert "in frame 60 agent 4 has no pose" in left_out.problem
+    assert replay(root, say_nothing).is_same
+
+
+@pytest.mark.parametrize("bad", NO_NUMBERS)
+def test_a_fish_whose_place_is_no_number_is_absent(root, recorded, bad):
+    """The same targets and commands as if it were not there, and the file is named once."""
+    frames, heard = recorded[1], []
+    without = [
+        dataclasses.replace(f, agents=tuple(a for a in f.agents if a.agent != 1)) for f in frames
+    ]
+    wanted = redrive(root, without)
+    bad_ones = [changed(f, agent=1, **NO_NUMBERS[bad]) for f in frames]
+    items = redrive(root, bad_ones, force=True, tell=heard.append)
+    for what in ("pose", "target", "command"):
+        assert only(items, what) == only(wanted, what)
+    assert not only(items, "fault")
+    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert "in frame 0 agent 1 has no pose" in left_out.problem
     assert replay(root, say_nothing).is_same
 
 

@@ -113,7 +113,7 @@ def test_a_pose_of_the_robot_that_is_none_stops_it_until_the_next_good_one(
     rig.poses.changes = {}
     drives_on(rig)
     rig.end()
-    assert rig.said().count("a message of /agents is not of zfcal.poses/1") == 1
+    assert rig.said().count("agent 4 has no pose") == 1
     assert "bug in zfcal" not in rig.said()
 
 

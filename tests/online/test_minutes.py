@@ -5,11 +5,11 @@ import dataclasses
 import pytest
 
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.pose_files import read_poses
+from zfcal.artifacts.pose_files import PoseWriter, read_poses
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.tables import TRACKS, read_extra, read_tracks
-from zfcal.online.events import Made, say_nothing
-from zfcal.online.minutes import NEXT_KEY, Minutes, Origins
+from zfcal.online.events import LeftOut, Made, say_nothing
+from zfcal.online.minutes import NEXT_KEY, Minutes, Origins, unfinished
 from zfcal.online.opening import Task, open_trial
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.tracks import FISH, AgentPose, FramePoses
@@ -123,3 +123,19 @@ def test_closing_what_has_not_passed_does_nothing(root, minutes):
     assert not segment(root).exists()
     live.finish(2.0)
     assert len(read_tracks(segment(root))) == 10
+
+
+def test_what_an_interrupted_minute_holds_behind_a_bad_frame_is_kept(root, heard):
+    """A frame that is none and a fish that is none are left out, and the file is named once."""
+    path = root / "poses" / "000000.mcap"
+    far = dataclasses.replace(frame(1).agents[0], agent=1, x_m=1e308)
+    beside = dataclasses.replace(frame(1), agents=(*frame(1).agents, far))
+    late = dataclasses.replace(frame(2), time_s=500.0)
+    with PoseWriter(path, Lineage(schema=POSES, command="track")) as writer:
+        for poses in (frame(0), beside, late, frame(3)):
+            writer.add(poses)
+
+    assert unfinished(root, heard.append, also=0) == {0: [frame(0), frame(1), frame(3)]}
+    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert left_out.path == path
+    assert "in frame 1 agent 1 has no pose" in left_out.problem

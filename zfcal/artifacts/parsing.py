@@ -21,8 +21,16 @@ _LONG_KEY = re.compile(r"(?:[\w\"'-]{1,64}[ \t]*\.[ \t]*){100}")
 _TOO_DEEP = f"it nests deeper than {DEEPEST}"
 
 
-def json_of(text: str | bytes) -> Any:
-    """Return what a text of JSON holds; NaN, Infinity and a key that stands twice are errors.
+def json_of(text: str | bytes, *, not_finite: bool = False) -> Any:
+    """Return what a text of JSON holds; a key that stands twice is an error.
+
+    Parameters
+    ----------
+    text
+        The text.
+    not_finite
+        Whether NaN and Infinity may stand where numbers do, as many programs write them though
+        JSON has no word for them; whoever reads checks each number. Otherwise they are errors.
 
     Raises
     ------
@@ -30,7 +38,8 @@ def json_of(text: str | bytes) -> Any:
         It is no JSON, or nests too deep.
     """
     try:
-        found = json.loads(text, parse_constant=_refuse, object_pairs_hook=_object)
+        constant = float if not_finite else _refuse
+        found = json.loads(text, parse_constant=constant, object_pairs_hook=_object)
     except (RecursionError, MemoryError) as error:
         raise ValueError(_TOO_DEEP) from error
     _check_values(found)

@@ -33,6 +33,9 @@ CLOCK_KEY = "zfcal.clock"
 _AHEAD_S, _SILENT_S = 60.0, 5.0
 """A frame that is so far ahead of the clock is left out, unless none but such come for so long."""
 
+_FILE, _FRAME, _AGENT = "file", "frame", "agent"
+"""What may be bad: each is told once of a file."""
+
 
 @final
 class PoseWriter:
@@ -136,7 +139,8 @@ def read_poses(
     path
         The file.
     left_out
-        Hears of each frame that is none; such are left out then, as a follower does.
+        Hears of each frame that is none, and of each agent whose pose is none; such are left
+        out then, as a follower does.
 
     Raises
     ------
@@ -149,7 +153,7 @@ def read_poses(
         raise InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
     for _, data in Tail(path, "/agents").messages():
         try:
-            poses = from_json(path, data)
+            poses = from_json(path, data, absent=left_out)
         except DamagedError as error:
             if left_out is None:
                 raise
@@ -183,7 +187,7 @@ class PoseFollower:
         self._tail: Tail | None = None
         self._known = -1
         self._bad: dict[Path, Looks | None] = {}
-        self._told: set[Path] = set()
+        self._told: set[tuple[Path, str]] = set()
         self._problems: list[DamagedError] = []
         self._clock = _Clock() if newest else None
 
@@ -203,8 +207,8 @@ class PoseFollower:
         Raises
         ------
         DamagedError
-            A file cannot be read, or holds what cannot be: told once of each. The next
-            question goes on behind it.
+            A file cannot be read, or holds a frame or an agent that cannot be: told once of
+            each. The next question goes on behind it.
         """
         found: list[FramePoses] = []
         while True:
@@ -235,7 +239,7 @@ class PoseFollower:
             self._tail, self._known = tail, second_of(path, ".mcap") or 0
             found += added
             return True
-        if path in self._told:
+        if (path, _FILE) in self._told:
             self._bad[path] = looks
         return False
 
@@ -247,13 +251,13 @@ class PoseFollower:
                 try:
                     found.append(self._checked(tail.path, data))
                 except DamagedError as error:
-                    self._note(tail.path, error)
+                    self._note(tail.path, error, what=_FRAME)
         except (DamagedError, InputError) as error:
             self._note(tail.path, error)
         return found
 
     def _checked(self, path: Path, data: bytes) -> FramePoses:
-        poses = from_json(path, data)
+        poses = from_json(path, data, absent=lambda error: self._note(path, error, what=_AGENT))
         if self._clock is not None and not self._clock.is_passing(poses.time_s):
             raise DamagedError(
                 f"{path}: a frame of {poses.time_s:.3f} s runs ahead of the clock.",
@@ -261,10 +265,10 @@ class PoseFollower:
             )
         return poses
 
-    def _note(self, path: Path, error: DamagedError | InputError) -> None:
-        """Keep what is wrong with a file until it is asked; the first time only."""
-        if path not in self._told:
-            self._told.add(path)
+    def _note(self, path: Path, error: DamagedError | InputError, *, what: str = _FILE) -> None:
+        """Keep what is wrong with a file, or in it, until it is asked; the first time only."""
+        if (path, what) not in self._told:
+            self._told.add((path, what))
             self._problems.append(DamagedError(str(error), hint=error.hint))
 
     def _later(self) -> list[Path]:

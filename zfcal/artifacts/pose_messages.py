@@ -8,7 +8,8 @@ say the same to viewers. Files are the business of `pose_files`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -35,6 +36,9 @@ _EDGE_S = 1.0
 _FARTHEST_M = 1000.0
 _LARGEST_ID = 2**31 - 1
 _MOST_AGENTS = 10_000
+
+_WRONG = (ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""What reading a message of another form may raise."""
 
 _FRAME_ID = "arena"
 _FISH_COLOUR = (0.0, 0.45, 0.7, 1.0)
@@ -78,7 +82,9 @@ def as_json(poses: FramePoses) -> bytes:
     return to_json({"time_s": poses.time_s, "frame": poses.frame, "agents": agents}).encode()
 
 
-def from_json(path: Path, data: bytes) -> FramePoses:
+def from_json(
+    path: Path, data: bytes, *, absent: Callable[[DamagedError], None] | None = None
+) -> FramePoses:
     """Return the frame that a message of ``/agents`` says.
 
     Parameters
@@ -87,6 +93,9 @@ def from_json(path: Path, data: bytes) -> FramePoses:
         Its file, which bounds the time, and for the message.
     data
         The message.
+    absent
+        Hears of each agent whose pose is none; it counts as absent then, and the others of
+        its frame stay. None to refuse the frame.
 
     Raises
     ------
@@ -94,44 +103,60 @@ def from_json(path: Path, data: bytes) -> FramePoses:
         It has another form, or says what no tracker sees.
     """
     try:
-        found = json_of(data)
-        if len(found["agents"]) > _MOST_AGENTS:
-            message = f"{len(found['agents'])} agents, expected at most {_MOST_AGENTS}"
-            raise ValueError(message)  # noqa: TRY301 - becomes a DamagedError with the others
-        agents = tuple(_as_agent(agent) for agent in found["agents"])
+        # One number that is none is no reason to lose the others of the frame.
+        found = json_of(data, not_finite=True)
+        agents = found["agents"]
+        if not isinstance(agents, list) or len(agents) > _MOST_AGENTS:
+            message = f"agents are no list of at most {_MOST_AGENTS}"
+            raise ValueError(message)
         time_s, frame = float(found["time_s"]), int(found["frame"])
-        _check_frame(path, time_s, frame, agents)
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        _check_frame(path, time_s, frame)
+    except _WRONG as error:
         raise DamagedError(
             f"{path}: a message of /agents is not of {POSES} ({error!r:.200}).",
             hint="It was not made by zfcal, or by another version of it.",
         ) from error
-    return FramePoses(time_s=time_s, frame=frame, agents=agents)
+    sound, problems = _told_apart(agents)
+    for problem in problems:
+        told = DamagedError(
+            f"{path}: in frame {frame} {problem}: a message of /agents is not of {POSES}.",
+            hint="It counts as absent, the others of its frame are taken: check the tracker.",
+        )
+        if absent is None:
+            raise told
+        absent(told)
+    return FramePoses(time_s=time_s, frame=frame, agents=tuple(sound))
 
 
-def _check_frame(path: Path, time_s: float, frame: int, agents: tuple[AgentPose, ...]) -> None:
-    """Refuse what no tracker sees; each limit is written so that NaN fails.
+def _told_apart(agents: list[Any]) -> tuple[list[AgentPose], list[str]]:
+    """Return the poses that are some, and what is wrong with the others."""
+    found: list[AgentPose] = []
+    problems = []
+    for agent in agents:
+        try:
+            found.append(_as_agent(agent))
+        except _WRONG as error:
+            number = agent.get("agent") if isinstance(agent, dict) else None
+            problems.append(f"agent {number!r:.40} has no pose ({error!r:.200})")
+    times = Counter(pose.agent for pose in found)
+    # Nobody knows which of them is the animal.
+    problems += [f"agent {number} stands {n} times" for number, n in times.items() if n > 1]
+    return [pose for pose in found if times[pose.agent] == 1], problems
+
+
+def _check_frame(path: Path, time_s: float, frame: int) -> None:
+    """Refuse a frame that is of no time; each limit is written so that NaN fails.
 
     Raises
     ------
     ValueError
-        A number is out of its range, or an agent is there twice.
+        A number is out of its range.
     """
     start_s = second_of(path, ".mcap")
     low_s = 0.0 if start_s is None else start_s - _EDGE_S
     high_s = 1e9 if start_s is None else start_s + SEGMENT_S + _EDGE_S
     _check_range("time_s", time_s, low_s, high_s)
     _check_range("frame", frame, 0, 2**53)
-    if len({agent.agent for agent in agents}) < len(agents):
-        message = "an agent stands twice in a frame"
-        raise ValueError(message)
-    for agent in agents:
-        _check_range("agent", agent.agent, 0, _LARGEST_ID)
-        _check_range("x_m", agent.x_m, -_FARTHEST_M, _FARTHEST_M)
-        _check_range("y_m", agent.y_m, -_FARTHEST_M, _FARTHEST_M)
-        _check_range("confidence", agent.confidence, 0.0, 1.0)
-        if not math.isnan(agent.heading_rad):
-            _check_range("heading_rad", agent.heading_rad, -100.0, 100.0)
 
 
 def _check_range(name: str, value: float, low: float, high: float) -> None:
@@ -141,8 +166,15 @@ def _check_range(name: str, value: float, low: float, high: float) -> None:
 
 
 def _as_agent(found: Mapping[str, Any]) -> AgentPose:
+    """Return a pose; refuse one that no tracker sees, each limit written so that NaN fails.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, AttributeError, OverflowError
+        It has another form, or a number is out of its range.
+    """
     heading = found.get("heading_rad")
-    return AgentPose(
+    pose = AgentPose(
         agent=int(found["agent"]),
         kind=KINDS.index(found["kind"]),
         x_m=float(found["x_m"]),
@@ -150,6 +182,13 @@ def _as_agent(found: Mapping[str, Any]) -> AgentPose:
         heading_rad=math.nan if heading is None else float(heading),
         confidence=float(found["confidence"]),
     )
+    _check_range("agent", pose.agent, 0, _LARGEST_ID)
+    _check_range("x_m", pose.x_m, -_FARTHEST_M, _FARTHEST_M)
+    _check_range("y_m", pose.y_m, -_FARTHEST_M, _FARTHEST_M)
+    _check_range("confidence", pose.confidence, 0.0, 1.0)
+    if not math.isnan(pose.heading_rad):
+        _check_range("heading_rad", pose.heading_rad, -100.0, 100.0)
+    return pose
 
 
 def as_poses(poses: FramePoses, time_ns: int) -> PosesInFrame:

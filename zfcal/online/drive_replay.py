@@ -217,7 +217,7 @@ class _Poses:
     def _of(self, path: Path) -> Iterator[FramePoses]:
         problems: list[DamagedError] = []
         try:
-            # The driver went on behind frames that are none, too.
+            # The driver went on behind frames, and beside agents, that are none, too.
             yield from read_poses(path, left_out=problems.append)
         except DamagedError as error:
             problems.append(error)

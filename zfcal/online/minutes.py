@@ -284,7 +284,8 @@ def unfinished(root: Path, tell: Tell, *, also: int) -> dict[int, list[FramePose
     root
         The trial's directory.
     tell
-        Hears of files that are damaged; what lies before the damage counts.
+        Hears of files that are damaged, once of each. What lies before the damage counts; a
+        frame or an agent that is none is left out.
     also
         The minute that is passing, whose segment may be a part.
     """
@@ -294,11 +295,14 @@ def unfinished(root: Path, tell: Tell, *, also: int) -> dict[int, list[FramePose
         if start_s in known:
             continue
         frames: list[FramePoses] = []
+        problems: list[DamagedError | InputError] = []
         try:
-            for poses in read_poses(path):
+            for poses in read_poses(path, left_out=problems.append):
                 frames.append(poses)  # noqa: PERF402 - those before the damage are kept
         except (DamagedError, InputError) as error:
-            tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+            problems.append(error)
+        for problem in problems[:1]:
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
         found[start_s] = frames
     return found
 
