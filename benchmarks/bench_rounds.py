@@ -43,12 +43,13 @@ from zfcal.calibrate.objective import (
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
 from zfcal.errors import InputError
 from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
+from zfcal.online.calibrate import calibrate
 from zfcal.online.events import say_nothing
 from zfcal.online.holdout import FixedModel, pooled_fish
 from zfcal.online.likelihood import estimate
 from zfcal.online.opening import OpenTrial, Task, open_trial
 from zfcal.online.rounds import RoundPlaces, read_control
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.segments import Segments
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.online.simulate import SimulateOptions, simulate

@@ -249,7 +249,7 @@ def _said(document: dict[str, Any]) -> Row:
 def _extended(root: Path) -> Row:
     """Return what ``zfcal extend`` says of a trial that was diagnosed, and what that took."""
     from zfcal.calibrate.task import Settings
-    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.searching import CalibrateOptions
 
     extend = importlib.import_module("zfcal.online.extend")
     settings = Settings(generations=GENERATIONS)

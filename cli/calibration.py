@@ -17,9 +17,9 @@ from .output import Output
 from .streams import STDIN, each_trial, trials_together
 
 if TYPE_CHECKING:
-    from zfcal.online.calibrate import CalibrateOptions
     from zfcal.online.events import Tell
     from zfcal.online.opening import Task
+    from zfcal.online.searching import CalibrateOptions
     from zfcal.online.streams import Work
 
     MakeTask = Callable[[frozenset[int] | None], Task]
@@ -96,8 +96,8 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         Two options contradict each other, or one could not take effect.
     """
     from zfcal.calibrate.task import Settings
-    from zfcal.online.calibrate import CalibrateOptions
     from zfcal.online.opening import Task
+    from zfcal.online.searching import CalibrateOptions
 
     _check_together(options)
     settings = Settings(

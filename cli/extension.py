@@ -27,9 +27,9 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[ExtendO
         Two options contradict each other, or one could not take effect.
     """
     from zfcal.calibrate.task import Settings
-    from zfcal.online.calibrate import CalibrateOptions
     from zfcal.online.extend import ExtendOptions
     from zfcal.online.opening import Task
+    from zfcal.online.searching import CalibrateOptions
 
     _check_together(options, trials)
     calibration = CalibrateOptions(

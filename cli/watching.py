@@ -18,7 +18,7 @@ from .status_line import StatusLine, describe
 from .tracking import track_options
 
 if TYPE_CHECKING:
-    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.searching import CalibrateOptions
     from zfcal.online.watch_events import Happened, Status
     from zfcal.online.watch_stages import WatchOptions
 

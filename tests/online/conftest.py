@@ -13,8 +13,8 @@ import pytest
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.tables import write_tracks
 from zfcal.calibrate.task import Settings
-from zfcal.online.calibrate import CalibrateOptions
 from zfcal.online.events import say_nothing
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
 

@@ -15,7 +15,7 @@ from zfcal.artifacts.tables import read_extra, read_table, write_table
 from zfcal.behaviour.rows import scores_from_rows
 from zfcal.errors import InputError, LockedError, StorageError
 from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
+from zfcal.online.calibrate import calibrate
 from zfcal.online.events import (
     LeftOut,
     Made,
@@ -28,6 +28,7 @@ from zfcal.online.events import (
 )
 from zfcal.online.opening import Task
 from zfcal.online.rounds import RoundPlaces, read_control, read_previous
+from zfcal.online.searching import CalibrateOptions
 from zfcal.parameters import to_genes
 
 

@@ -13,11 +13,11 @@ from zfcal.artifacts.models import read_model, write_model
 from zfcal.artifacts.validation import check, read_json
 from zfcal.diagnose.findings import Screened, Verdict
 from zfcal.errors import InputError, LockedError
-from zfcal.online.calibrate import CalibrateOptions
 from zfcal.online.diagnose import DiagnoseOptions, KnownNoise, diagnose
 from zfcal.online.events import Made, Note, Planned, Progress, Result, UpToDate, say_nothing
 from zfcal.online.extend import ExtendOptions, extend
 from zfcal.online.opening import Task
+from zfcal.online.searching import CalibrateOptions
 
 MEASURES = ["nats_per_step", "S_over_ceiling", "D", "W", "O", "T", "effect"]
 

@@ -9,10 +9,11 @@ import pytest
 from zfcal.calibrate.task import Settings
 from zfcal.errors import ZfcalError
 from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
+from zfcal.online.calibrate import calibrate
 from zfcal.online.closed_loop import closed_loop
 from zfcal.online.events import Made, Result, say_nothing
 from zfcal.online.opening import open_trial
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.virtual_rounds import RoundsBeside, Windows, do_rounds, rounds_beside
 from zfcal.online.virtual_trial import Experiment, LoopOptions
 from zfcal.online.worker import Worker

@@ -9,11 +9,12 @@ from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
 from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
+from zfcal.online.calibrate import calibrate
 from zfcal.online.events import Made, Note, Tell, UpToDate
 from zfcal.online.film import FilmOptions, film, frames_folder
 from zfcal.online.opening import Task
 from zfcal.online.rig import BELOW, OVERHEAD, CameraChoice
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.segments import segment_path, segment_starts
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.online.simulate import SimulateOptions, simulate

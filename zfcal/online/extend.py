@@ -21,13 +21,13 @@ from zfcal.diagnose.document import gap_document
 from zfcal.diagnose.findings import Gap, Verdict
 from zfcal.errors import DamagedError, InputError
 from zfcal.model.effects import find_effect
-from zfcal.online.calibrate import CalibrateOptions
 from zfcal.online.diagnose import Case, DiagnoseOptions, diagnose, open_case
 from zfcal.online.events import Made, Note, Result, Tell, say_nothing
 from zfcal.online.extension import Extension, extension_of
 from zfcal.online.findings import FILE, FOLDER, Book, Draw
 from zfcal.online.opening import Task, at_work, open_trial, reason_to_make
 from zfcal.online.rounds import MODEL, checkpoint_key
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.settled import settled
 from zfcal.online.stretch import read_stretch
 

@@ -42,13 +42,13 @@ from zfcal.diagnose.placebo import placebo_for
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
 from zfcal.model.simulate import Counts
-from zfcal.online.calibrate import CalibrateOptions, run_search
 from zfcal.online.diagnose import Case
 from zfcal.online.events import Progress, Tell
 from zfcal.online.extended_group import SpanGroup
 from zfcal.online.gap import Judged, draw_blocks, effect_gap, feature_gaps, likelihood_gap
 from zfcal.online.halves import Halves, split
 from zfcal.online.rounds import result_table, score_table
+from zfcal.online.searching import CalibrateOptions, run_search
 from zfcal.online.stretch import Stretch
 from zfcal.parameters import Parameters, to_genes
 

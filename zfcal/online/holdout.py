@@ -27,13 +27,7 @@ from zfcal.calibrate.task import Settings
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import InputError
 from zfcal.model.simulate import Counts, pack, simulate_counts
-from zfcal.online.calibrate import (
-    CalibrateOptions,
-    baseline_scores,
-    calibrate_options,
-    make_group,
-    run_search,
-)
+from zfcal.online.calibrate import calibrate_options, make_group
 from zfcal.online.events import Made, Result, Tell
 from zfcal.online.likelihood import estimate
 from zfcal.online.opening import OpenTrial, Task, at_work, reason_to_make
@@ -44,6 +38,7 @@ from zfcal.online.rounds import (
     score_table,
     summary_of,
 )
+from zfcal.online.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.online.segments import STEP_S, Segments, segment_path, segment_starts
 from zfcal.online.settled import settled
 from zfcal.parameters import Parameters, to_genes

@@ -10,8 +10,9 @@ from typing import final
 
 from zfcal.calibrate.task import Settings
 from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import CalibrateOptions, calibrate
+from zfcal.online.calibrate import calibrate
 from zfcal.online.events import Tell
+from zfcal.online.searching import CalibrateOptions
 from zfcal.online.segments import segment_starts
 from zfcal.online.virtual_trial import Experiment
 from zfcal.online.worker import Worker

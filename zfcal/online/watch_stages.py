@@ -23,7 +23,7 @@ from zfcal.online.worker import Job
 
 if TYPE_CHECKING:
     from zfcal.online.analyse import AnalyseOptions
-    from zfcal.online.calibrate import CalibrateOptions
+    from zfcal.online.searching import CalibrateOptions
     from zfcal.online.track_plan import TrackOptions
 
 TRACK, ANALYSE, CALIBRATE = STAGES = ("track", "analyse", "calibrate")
