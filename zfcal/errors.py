@@ -7,6 +7,7 @@
     │   └── SchemaError   an artifact of another schema or version
     ├── DamagedError      a file that cannot be read whole; the rest goes on, exit 3
     ├── StorageError      the disk is full, or a place cannot be written
+    │   └── TakenError    a folder stands where one file is to go; others can be written
     ├── ChangedError      an input has changed while something was made from it
     └── LockedError       the same command is at work on the same trial, exit 75
 
@@ -59,6 +60,10 @@ class DamagedError(ZfcalError):
 
 class StorageError(ZfcalError):
     """A file cannot be written: the disk is full or the place is closed."""
+
+
+class TakenError(StorageError):
+    """A folder stands where a file is to go: work on many files goes on with the others."""
 
 
 class ChangedError(ZfcalError):

@@ -5,6 +5,11 @@ import signal
 
 import pytest
 
+QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--no-seed-likelihood")
+IMPORT = ("import", "tracks.csv", "trial", "--format", "csv", "--force")
+ANALYSE = ("analyse", "trial", "--force")
+CALIBRATE = ("calibrate", "trial", "--force", *QUICK)
+
 
 @pytest.fixture(autouse=True)
 def in_time():
@@ -52,3 +57,80 @@ def test_statistics_are_not_written_through_a_link_that_leads_outside(zfcal, tri
     assert "leads outside the trial" in done.err
     assert list((tmp_path / "theirs").iterdir()) == []
     assert "leads outside the trial" in zfcal("check", "trial").out
+
+
+def _round(end):
+    return {f"models/{end}.parquet", f"scores/{end}-model.parquet", f"models/{end}.toml"}
+
+
+TAKEN = {
+    "tracks/000060.parquet": (IMPORT, {f"tracks/{k:06d}.parquet" for k in (0, 120, 180)}),
+    "stats/000120.parquet": (
+        ANALYSE,
+        {"scores/000120.parquet", "stats/000180.parquet", "scores/000180.parquet"},
+    ),
+    "scores/000120.parquet": (
+        ANALYSE,
+        {"stats/000120.parquet", "stats/000180.parquet", "scores/000180.parquet"},
+    ),
+    "models/000120.toml": (CALIBRATE, _round("000180")),
+    "models/000120.parquet": (CALIBRATE, _round("000180")),
+    "scores/000120-model.parquet": (CALIBRATE, _round("000180")),
+    "models/.000120.checkpoint": (CALIBRATE, _round("000120") | _round("000180")),
+}
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_an_output_whose_place_a_folder_takes_is_left_out_alone(zfcal, trial, name):
+    """It is named, the folder stays, the others are made; once it is gone, this one as well."""
+    words, made = TAKEN[name]
+    if words == CALIBRATE:
+        assert zfcal("analyse", "trial").code == 0
+    place = trial / name
+    place.unlink(missing_ok=True)
+    place.mkdir(parents=True)
+    (place / "notes.txt").write_text("mine")
+    done = zfcal(*words)
+    assert done.code == 3, done.err
+    assert done.err.count(f"left out: trial/{name}: cannot be written (Is a directory)") == 1
+    assert "A folder stands where the file is to go: move it away." in done.err
+    assert set(done.lines) == {f"trial/{each}" for each in made}
+    assert (place / "notes.txt").read_text() == "mine"
+    place.rename(trial.parent / "away")
+    again = zfcal(*words)
+    assert again.code == 0, again.err
+    assert place.is_file() or name.endswith(".checkpoint")
+
+
+def test_a_folder_in_the_place_of_a_segment_of_old_stays(zfcal, trial):
+    """The recording does not reach there: it is named, and the others are written."""
+    (trial / "tracks" / "000240.parquet").mkdir()
+    done = zfcal(*IMPORT)
+    assert done.code == 3
+    assert "tracks/000240.parquet: cannot be removed (Is a directory)" in done.err
+    assert len(done.lines) == 4
+
+
+def test_a_folder_named_like_a_round_that_was_passed_over_passes_none_over(zfcal, trial):
+    """Only a file says that a window was passed over."""
+    assert zfcal("analyse", "trial").code == 0
+    (trial / "models" / "000120.skipped.json").mkdir()
+    done = zfcal("calibrate", "trial", *QUICK)
+    assert done.code == 0, done.err
+    assert "trial/models/000120.toml" in done.lines
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("diagnosis/findings.json", ("diagnose", "trial", "--quick")),
+        pytest.param("report/index.html", ("report", "trial"), marks=pytest.mark.slow),
+    ],
+)
+def test_a_command_with_one_output_says_that_a_folder_takes_its_place(zfcal, trial, name, words):
+    """Nothing else is to be made: it ends with exit code 1, a diagnosis before it has begun."""
+    (trial / name).mkdir(parents=True)
+    done = zfcal(*words)
+    assert done.code == 1
+    assert f"trial/{name}: cannot be written (Is a directory)" in done.err
+    assert "A folder stands where the file is to go" in done.err

@@ -8,7 +8,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.tables import TRACKS, read_extra, read_tracks
-from zfcal.online.events import LeftOut, Made, say_nothing
+from zfcal.online.events import LeftOut, Made, UpToDate, say_nothing
 from zfcal.online.minutes import NEXT_KEY, Minutes, Origins, unfinished
 from zfcal.online.opening import Task, open_trial
 from zfcal.online.setup import NewTrial, create_trial
@@ -123,6 +123,26 @@ def test_closing_what_has_not_passed_does_nothing(root, minutes):
     assert not segment(root).exists()
     live.finish(2.0)
     assert len(read_tracks(segment(root))) == 10
+
+
+@pytest.mark.parametrize(("folder", "ending"), [("tracks", ".parquet"), ("poses", ".mcap")])
+def test_a_minute_one_of_whose_files_has_no_place_has_the_other(
+    root, minutes, heard, folder, ending
+):
+    """A folder stands there: that file is left out and told once, the minutes go on."""
+    taken = root / folder / f"000060{ending}"
+    taken.mkdir(parents=True)
+    live = minutes()
+    add(live, range(0, 901, 50))
+    live.finish(180.2)
+
+    made = {event.path.relative_to(root).as_posix() for event in heard if isinstance(event, Made)}
+    wanted = {f"tracks/{k:06d}.parquet" for k in (0, 60, 120, 180)}
+    wanted |= {f"poses/{k:06d}.mcap" for k in (0, 60, 120, 180)}
+    assert made == wanted - {f"{folder}/{taken.name}"}
+    (left_out,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert left_out.path == taken
+    assert not [event for event in heard if isinstance(event, UpToDate)]
 
 
 def test_what_an_interrupted_minute_holds_behind_a_bad_frame_is_kept(root, heard):

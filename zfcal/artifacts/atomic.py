@@ -18,7 +18,7 @@ from pathlib import Path
 
 from zfcal.artifacts.places import check_inside
 from zfcal.artifacts.reading import check_contents, forget_content, open_to_write
-from zfcal.errors import StorageError
+from zfcal.errors import StorageError, TakenError
 
 _COUNTER = itertools.count()
 _IN_USE: set[str] = set()
@@ -121,10 +121,61 @@ def append_bytes(path: Path, data: bytes) -> None:
         raise storage_error(path, error) from error
 
 
-def storage_error(path: Path, error: OSError) -> StorageError:
-    """Return the error for a place that cannot be written, with what to do about it."""
-    return StorageError(
-        f"{path}: cannot be written ({error.strerror or error}). What was there is kept.",
+def remove(path: Path) -> None:
+    """Remove a file, which need not be there.
+
+    Raises
+    ------
+    TakenError
+        A folder stands there: nobody knows what for, and it stays.
+    StorageError
+        It cannot be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise storage_error(path, error, what="removed") from error
+
+
+def discard(path: Path) -> None:
+    """Remove a file of no more use; a folder in its place is somebody else's, and stays.
+
+    Raises
+    ------
+    StorageError
+        It cannot be removed.
+    """
+    with contextlib.suppress(TakenError):
+        remove(path)
+
+
+def check_free(path: Path) -> None:
+    """Refuse a place where a folder stands, before work is done for the file that is to go there.
+
+    Raises
+    ------
+    TakenError
+        One does.
+    """
+    if path.is_dir() and not path.is_symlink():
+        raise storage_error(path, IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR)))
+
+
+def storage_error(path: Path, error: OSError, *, what: str = "written") -> StorageError:
+    """Return the error for a place that cannot be written, with what to do about it.
+
+    Parameters
+    ----------
+    path
+        The place.
+    error
+        What the system says.
+    what
+        What cannot be done with it.
+    """
+    kind = TakenError if error.errno == errno.EISDIR else StorageError
+    return kind(
+        f"{path}: cannot be {what} ({error.strerror or error}). What was there is kept.",
         hint=_HINTS.get(error.errno or 0, "Check the disk, and the connection to it."),
     )
 

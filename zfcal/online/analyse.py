@@ -32,6 +32,7 @@ from zfcal.online.segments import (
     segment_path,
 )
 from zfcal.online.settled import Items
+from zfcal.online.taken import unless_taken
 from zfcal.online.windows import starts_of, whole_segments, window_ends
 
 STATS = "zfcal.stats/1"
@@ -223,8 +224,10 @@ def _make_window(run: _Run, end_s: int) -> None:
         has_robot=trial.n_robots > 0,
         control=run.control,
     )
-    _write_stats(run, stats, window)
-    _write_scores(run, scores, window, next(iter(hashes)))
+    with unless_taken(stats.path, run.tell):
+        _write_stats(run, stats, window)
+    with unless_taken(scores.path, run.tell):
+        _write_scores(run, scores, window, next(iter(hashes)))
 
 
 def _reason(run: _Run, output: _Output) -> str | None:

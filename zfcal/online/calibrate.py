@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from zfcal.artifacts.atomic import check_free, discard
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
@@ -49,6 +50,7 @@ from zfcal.online.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.online.segments import readable
 from zfcal.online.settled import Items
 from zfcal.online.skipping import skipped_path, without_skipped
+from zfcal.online.taken import unless_taken
 from zfcal.online.windows import LENGTH_S
 
 _INSTANT_S = 0.001
@@ -201,6 +203,8 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
     reason = _reason(run, places, expected, shaken=shaken)
     if reason is None:
         return False
+    if _taken(run, places):
+        return False
     if run.task.dry_run:
         for path, _ in places.artifacts:
             run.tell(Planned(path=path, reason=reason))
@@ -229,13 +233,23 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
     baselines = baseline_scores(round_task, run.options, result)
     likelihood = None if estimated is None else estimated.table
     # First, so that no window is ever both passed over and calibrated.
-    skipped_path(run.root, places.end_s).unlink(missing_ok=True)
+    discard(skipped_path(run.root, places.end_s))
     write_round(places, result, lineages, result_table(result, baselines, likelihood))
-    places.checkpoint.unlink(missing_ok=True)
+    discard(places.checkpoint)
     for path, _ in places.artifacts:
         run.tell(Made(path=path, reason=reason))
     value = {"path": str(places.model), "window_end_s": places.end_s, "seed": run.seed}
     run.tell(Result(value={**value, **summary_of(result, baselines)}))
+    return False
+
+
+def _taken(run: _Run, places: RoundPlaces) -> bool:
+    """Return whether a folder stands where one of a round's files is to go, which is told."""
+    for path, _ in places.artifacts:
+        with unless_taken(path, run.tell):
+            check_free(path)
+            continue
+        return True
     return False
 
 

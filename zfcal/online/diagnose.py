@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from zfcal.artifacts.atomic import check_free
 from zfcal.artifacts.freshness import hash_inputs, relative_to, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import newest_model, read_model_for
@@ -181,6 +182,7 @@ def _diagnose(
         tell_version([book.path], expected, tell)
         tell(UpToDate(path=book.path))
     else:
+        check_free(book.path)
         if draw is not None and options.workers > 1:
             draw.prepare()
         diagnosis = _answer(case, stretch, tell)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from zfcal.artifacts.atomic import check_free, discard
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model, read_result, write_model
@@ -124,6 +125,7 @@ def _extend(
     ignore = ("generations",) if options.calibration.budget_s is not None else ()
     reason = reason_to_make(output, expected, task, tell, ignore=ignore)
     if reason is not None:
+        check_free(output)
         _make(output, extension, expected)
         tell(Made(path=output, reason=reason))
     if not task.dry_run:
@@ -292,7 +294,7 @@ def _make(output: Path, extension: Extension, expected: Lineage) -> None:
     gap = {each.measure: _entry(each) for each in made.gap}
     write_model(output, made.model, lineage, {**made.result, "gap": gap})
     for path in extension.checkpoints(checkpoints):
-        path.unlink(missing_ok=True)
+        discard(path)
 
 
 def _entry(gap: Gap) -> dict[str, JSON]:

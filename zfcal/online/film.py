@@ -15,7 +15,7 @@ from typing import final
 
 import cv2
 
-from zfcal.artifacts.atomic import write_whole
+from zfcal.artifacts.atomic import check_free, remove, write_whole
 from zfcal.artifacts.cameras import SCHEMA as CAMERA
 from zfcal.artifacts.frame_files import FRAMES, FrameWriter, frame_segments
 from zfcal.artifacts.freshness import hash_inputs
@@ -31,6 +31,7 @@ from zfcal.online.events import Made, Note, Planned, Progress, Tell
 from zfcal.online.opening import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.online.segments import STEP_S, segment_path, segment_starts
 from zfcal.online.settled import settled
+from zfcal.online.taken import unless_taken
 from zfcal.tracks import Tracks, concatenate
 from zfcal.trial import second_of
 from zfcal.vision.camera import Camera, Homography
@@ -192,8 +193,10 @@ def _film_one(scene: _Scene, name: str, camera_file: Path, tell: Tell, task: Tas
         drawer = _Drawer(scene, name, read_camera(camera_file), lineage)
         total = sum(len(scene.rows(start)) for start in stale)
         for start, reason in stale.items():
-            write_whole(paths[start], drawer.writer_of(start, total, tell))
-            tell(Made(path=paths[start], reason=reason))
+            with unless_taken(paths[start], tell):
+                check_free(paths[start])
+                write_whole(paths[start], drawer.writer_of(start, total, tell))
+                tell(Made(path=paths[start], reason=reason))
         tell(Progress(stage=f"{name} images", done=total, total=total))
     _remove_others(scene, name, tell, task)
 
@@ -322,5 +325,6 @@ def _remove_others(scene: _Scene, name: str, tell: Tell, task: Task) -> None:
         if task.dry_run:
             tell(Note(text=f"would remove {path}: the tracks do not reach there any more."))
             continue
-        path.unlink(missing_ok=True)
-        tell(Note(text=f"{path}: removed, the tracks do not reach there any more."))
+        with unless_taken(path, tell):
+            remove(path)
+            tell(Note(text=f"{path}: removed, the tracks do not reach there any more."))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.artifacts.atomic import check_free, discard
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
@@ -245,6 +246,7 @@ def _calibrate_span(
     reason = reason_to_make(output, expected, task, tell, ignore=ignore)
     if reason is None:
         return
+    check_free(output)
     settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
     group = make_group(opened, options)
     estimated = None
@@ -270,7 +272,7 @@ def _calibrate_span(
     table = {**result_table(result, baselines, likelihood), **judged}
     made = replace(expected, options={**expected.options, "generations": result.generations})
     write_model(output, result.champion, made, table)
-    checkpoint.unlink(missing_ok=True)
+    discard(checkpoint)
     tell(Made(path=output, reason=reason))
     tell(Result(value={"path": str(output), **summary_of(result, baselines), **judged}))
 

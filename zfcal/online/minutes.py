@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, final
 
+from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
@@ -19,6 +20,7 @@ from zfcal.online.events import LeftOut, Made, Note, Tell, UpToDate
 from zfcal.online.opening import OpenTrial, Task, reason_to_make
 from zfcal.online.recording import STRETCH_KEY
 from zfcal.online.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.online.taken import unless_taken
 from zfcal.tracks import FramePoses, Tracks, tracks_of
 
 BAD_KEY = "bad_frames"
@@ -57,7 +59,8 @@ class Origins:
 @dataclass(slots=True, kw_only=True)
 class _Minute:
     start_s: int
-    writer: PoseWriter | None
+    writer: PoseWriter | None = None
+    has_poses: bool = True
     next_agent: int = 0
     frames: list[FramePoses] = field(default_factory=list)
     bad: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
@@ -132,7 +135,7 @@ class Minutes:
             if not is_urgent:
                 self.close_passed()
         if self._minute is None:
-            self._minute = _Minute(start_s=start_s, writer=self._pose_writer(start_s))
+            self._minute = self._begun(start_s)
         minute = self._minute
         if minute.writer is not None:
             minute.writer.add(poses)
@@ -215,18 +218,26 @@ class Minutes:
             }
             if stretch:
                 extra[STRETCH_KEY] = list(stretch)
-            write_tracks(path, tracks, self._origins.tracks, extra=extra)
-            self._tell(Made(path=path, reason=reason))
+            with unless_taken(path, self._tell):
+                write_tracks(path, tracks, self._origins.tracks, extra=extra)
+                self._tell(Made(path=path, reason=reason))
         # After the tracks: who reads the paths finds the segment when it hears of the poses.
         if minute.writer is not None:
             self._tell(Made(path=minute.writer.path, reason="tracked"))
-        else:
+        elif minute.has_poses:
             self._tell(UpToDate(path=_poses_path(root, minute.start_s)))
 
     def _reason(self, path: Path) -> str | None:
         if self._origins.is_live:
             return "tracked"
         return reason_to_make(path, self._origins.tracks, self._task, self._tell)
+
+    def _begun(self, start_s: int) -> _Minute:
+        """Return a minute that begins; one for whose poses there is no place has tracks alone."""
+        minute = _Minute(start_s=start_s, has_poses=False)
+        with unless_taken(_poses_path(self._opened.trial.root, start_s), self._tell):
+            minute.writer, minute.has_poses = self._pose_writer(start_s), True
+        return minute
 
     def _pose_writer(self, start_s: int) -> PoseWriter | None:
         """Return what writes a minute's poses; None if they are there already."""
@@ -249,8 +260,10 @@ class Minutes:
         gone = [segment_path(root, s) for s in set(segment_starts(root)) - self._seen]
         gone += [_poses_path(root, start) for start in set(pose_files(root)) - self._seen]
         for path in sorted(gone):
-            path.unlink(missing_ok=True)
-            self._tell(Note(text=f"{path}: removed, the recording does not reach there any more."))
+            with unless_taken(path, self._tell):
+                remove(path)
+                text = f"{path}: removed, the recording does not reach there any more."
+                self._tell(Note(text=text))
 
 
 def poses_reason(path: Path, lineage: Lineage) -> str | None:

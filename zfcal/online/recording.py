@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading import hash_of, hold_steady
@@ -16,6 +17,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.online.events import Made, Note, Progress, Tell
 from zfcal.online.opening import Task, reason_to_make
 from zfcal.online.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.online.taken import unless_taken
 from zfcal.tracks import Tracks
 from zfcal.trial import Trial
 
@@ -175,8 +177,9 @@ def write_segments(trial: Trial, recording: Recording, tell: Tell, *, task: Task
         if reason:
             end_s = min(recording.end_s, float(start + STEP_S))
             extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
-            write_tracks(path, tracks, recording.lineage, extra=extra)
-            tell(Made(path=path, reason=reason))
+            with unless_taken(path, tell):
+                write_tracks(path, tracks, recording.lineage, extra=extra)
+                tell(Made(path=path, reason=reason))
         tell(Progress(stage="segments", done=number, total=len(parts)))
     _remove_others(trial, {start for start, _ in parts}, tell, task=task)
 
@@ -211,5 +214,6 @@ def _remove_others(trial: Trial, starts: set[int], tell: Tell, *, task: Task) ->
         if task.dry_run:
             tell(Note(text=f"would remove {path}: the recording does not reach there any more."))
             continue
-        path.unlink(missing_ok=True)
-        tell(Note(text=f"{path}: removed, the recording does not reach there any more."))
+        with unless_taken(path, tell):
+            remove(path)
+            tell(Note(text=f"{path}: removed, the recording does not reach there any more."))

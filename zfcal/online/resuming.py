@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.pose_files import read_clock
 from zfcal.errors import DamagedError, InputError
@@ -14,6 +15,7 @@ from zfcal.online.events import Note, Tell
 from zfcal.online.learnt import learnt_before
 from zfcal.online.minutes import Minutes, next_agent_of, pose_files, unfinished
 from zfcal.online.segments import STEP_S, segment_path, segment_starts
+from zfcal.online.taken import unless_taken
 from zfcal.tracks import FramePoses
 
 STARTED = "started_unix_s"
@@ -78,7 +80,8 @@ def begin_anew(root: Path, tell: Tell) -> None:
     gone += pose_files(root).values()
     gone += sorted(root.glob("frames/*/*.mcap"))
     for path in gone:
-        path.unlink(missing_ok=True)
+        with unless_taken(path, tell):
+            remove(path)
     if gone:
         tell(Note(text=f"{root}: {len(gone)} files of an earlier recording were removed."))
 

@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from zfcal.artifacts.atomic import check_free
 from zfcal.artifacts.lineage import JSON
 from zfcal.calibrate.baselines import random_search, unchanged
 from zfcal.calibrate.pace import Deadline
@@ -22,6 +23,7 @@ from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import InputError
 from zfcal.online.events import Progress, Tell
 from zfcal.online.rounds import Checkpoint
+from zfcal.online.taken import unless_taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +103,8 @@ def run_search(
     options
         How.
     checkpoint
-        Where to keep it; the caller removes it when the result is written.
+        Where to keep it; the caller removes it when the result is written. Where a folder
+        stands there, nothing is kept, and that is told.
     tell
         Hears of each generation.
     key
@@ -111,9 +114,14 @@ def run_search(
     started_s = time.monotonic()
     stage = f"window to {round_task.seeds.window_end_s} s"
     kept = Checkpoint(checkpoint, key)
+    is_kept = False
+    with unless_taken(checkpoint, tell):
+        check_free(checkpoint)
+        is_kept = True
 
     def watch(search: Search) -> None:
-        kept.save(search)
+        if is_kept:
+            kept.save(search)
         done, total = search.state.generation, options.generations_asked
         if options.budget_s is not None:
             done, total = int(time.monotonic() - started_s), math.ceil(options.budget_s)

@@ -28,7 +28,7 @@ def skipped_path(root: Path, end_s: int) -> Path:
 
 def skipped_ends(root: Path) -> set[int]:
     """Return the ends of the windows that were passed over, in seconds."""
-    return set(numbered_of(root / "models", ENDING))
+    return {end for end, path in numbered_of(root / "models", ENDING).items() if is_regular(path)}
 
 
 def without_skipped(root: Path, ends: list[int], task: Task, tell: Tell) -> list[int]:
