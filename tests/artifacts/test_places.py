@@ -1,12 +1,15 @@
 """Files of a trial lie in it: a link that leads outside is refused by its name."""
 
 import os
+import shlex
+import subprocess
 
 import pytest
 
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
+from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.lock import lock
-from zfcal.artifacts.places import numbered
+from zfcal.artifacts.places import numbered, way_back
 from zfcal.artifacts.reading import numbered_of, open_regular, open_to_write, read_bytes
 from zfcal.errors import InputError, StorageError
 
@@ -110,3 +113,69 @@ def test_a_folder_that_is_not_there_holds_nothing(tmp_path):
     """Nor does a file in its place."""
     (tmp_path / "stats").touch()
     assert numbered(tmp_path / "stats", ".parquet") == numbered(tmp_path / "x", ".parquet") == {}
+
+
+NAMED = {
+    "frames": "zfcal track {root} --overhead {out}/overhead",
+    "frames/below": "zfcal track {root} --below {out}",
+    "frames/below/000000.mcap": "zfcal track {root} --below {out}",
+    "film.avi": "Name it where it lies: {out}",
+    "stats": "Put the files there, or mount their folder: rm {link}; mkdir {link}; mount --bind",
+    "stats/000120.parquet": "Put the file itself there: cp --remove-destination",
+    "arena.geojson": "Put the file itself there: cp --remove-destination",
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("target", ["outside", "outside/file", "outside/gone"])
+def test_the_hint_says_what_to_do_about_a_link(trial, tmp_path, name, target):
+    """Images and films are named where they lie, what belongs to a trial is put there."""
+    link, out = trial / name, tmp_path / target
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(out)
+    hint = way_back(link)
+    if target.endswith("gone"):
+        assert "Nothing lies there, maybe its disk is not mounted" in hint
+        assert hint.endswith(f"rm {link}.")
+        return
+    if (target == "outside") == name.endswith((".parquet", ".mcap", ".avi", ".geojson")):
+        return
+    place = out.parent if name.endswith(".mcap") else out
+    assert NAMED[name].format(root=trial, out=place, link=link) in hint
+
+
+@pytest.mark.parametrize("name", ["stats/000120.parquet", "film.avi"])
+def test_the_command_of_the_hint_puts_the_file_there(trial, tmp_path, name):
+    """As a person would do it, in a folder whose name needs quotes."""
+    theirs = tmp_path / "the disk"
+    theirs.mkdir()
+    (theirs / "file").write_bytes(b"theirs")
+    link = trial / name
+    link.parent.mkdir(exist_ok=True)
+    link.symlink_to(theirs / "file")
+    with pytest.raises(InputError) as refused:
+        read_bytes(link)
+    command = refused.value.hint.partition("ut the file itself there: ")[2].removesuffix(".")
+    subprocess.run(shlex.split(command), check=True)
+    assert not link.is_symlink()
+    assert read_bytes(link) == b"theirs"
+
+
+@pytest.mark.parametrize("write", [write_bytes_whole, append_bytes])
+def test_who_may_not_write_behind_a_link_hears_the_same(trial, tmp_path, write):
+    """As who may not read there."""
+    (trial / "stats").symlink_to(tmp_path / "outside")
+    with pytest.raises(StorageError) as refused:
+        write(trial / "stats" / "000120.parquet", b"ours")
+    assert f"mount --bind {tmp_path / 'outside'} {trial / 'stats'}" in refused.value.hint
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".toml", ".json", ".mcap"])
+def test_who_asks_where_an_artifact_comes_from_hears_the_same(trial, ending):
+    """The lineage of a file behind a link is not that of a damaged file."""
+    (trial / "stats").mkdir()
+    link = trial / "stats" / f"000120{ending}"
+    link.symlink_to("../../outside/file")
+    with pytest.raises(InputError, match="leads outside") as refused:
+        read_lineage(link)
+    assert "cp --remove-destination" in refused.value.hint

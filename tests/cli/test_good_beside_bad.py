@@ -5,6 +5,8 @@ import signal
 
 import pytest
 
+from zfcal.report import page
+
 QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--no-seed-likelihood")
 IMPORT = ("import", "tracks.csv", "trial", "--format", "csv", "--force")
 ANALYSE = ("analyse", "trial", "--force")
@@ -134,3 +136,68 @@ def test_a_command_with_one_output_says_that_a_folder_takes_its_place(zfcal, tri
     assert done.code == 1
     assert f"trial/{name}: cannot be written (Is a directory)" in done.err
     assert "A folder stands where the file is to go" in done.err
+
+
+def test_folders_and_files_may_be_linked_within_a_trial(zfcal, trial):
+    """Tracks are kept elsewhere in it, and statistics are written through such a link."""
+    kept = trial / "kept"
+    kept.mkdir()
+    (trial / "tracks").rename(kept / "tracks")
+    (trial / "tracks").symlink_to("kept/tracks")
+    (kept / "tracks" / "000060.parquet").rename(kept / "minute.parquet")
+    (kept / "tracks" / "000060.parquet").symlink_to("../minute.parquet")
+    (kept / "stats").mkdir()
+    (trial / "stats").symlink_to(kept / "stats")
+    for words in (("analyse", "trial"), ("calibrate", "trial", *QUICK)):
+        done = zfcal(*words)
+        assert done.code == 0, done.err
+    assert (kept / "stats" / "000120.parquet").is_file()
+    assert (trial / "models" / "000180.toml").is_file()
+    assert "error" not in zfcal("check", "trial").out
+
+
+LINKED = {
+    "analyse": "tracks/000120.parquet",
+    "calibrate": "stats/000180.parquet",
+    "diagnose": "tracks/000120.parquet",
+    "report": "tracks/000120.parquet",
+    "check": "tracks/000120.parquet",
+    "inspect": "tracks/000120.parquet",
+    "track": "frames/overhead/000000.mcap",
+    "import": "foreign.csv",
+}
+WORDS = {
+    "calibrate": QUICK,
+    "diagnose": ("--quick",),
+    "track": (
+        *("--overhead", "trial/frames/overhead", "--corners", "0,9 9,9 9,0 0,0"),
+        *("--robot-as-fish", "--force"),
+    ),
+    "import": ("--format", "csv", "--force"),
+}
+
+
+@pytest.mark.parametrize("command", LINKED)
+def test_every_command_that_refuses_a_link_says_what_to_do(
+    zfcal, trial, tmp_path, monkeypatch, command
+):
+    """With where the file lies, for what may be named there, or how to put it into the trial."""
+    monkeypatch.setattr(page, "_drawer", lambda _: lambda part: part.write_bytes(b"drawn"))
+    monkeypatch.setattr(page, "render_page", lambda *_: "drawn")
+    assert zfcal("analyse", "trial").code == 0
+    place, theirs = trial / LINKED[command], tmp_path / "theirs"
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if place.exists():
+        place.rename(theirs)
+    else:
+        theirs.write_bytes(b"x")
+    place.symlink_to(theirs)
+    given = {"inspect": [place], "import": [place, "trial"]}.get(command, ["trial"])
+    done = zfcal(command, *given, *WORDS.get(command, ()))
+    assert done.code == (3 if command in {"analyse", "calibrate", "report", "check"} else 1)
+    said = done.err + done.out
+    assert "leads outside the trial" in said
+    assert f"cp --remove-destination {theirs} {place}" in said
+    if command in {"track", "import"}:
+        assert "where " in said
+        assert f"{theirs if command == 'import' else tmp_path}" in said

@@ -16,7 +16,7 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-from zfcal.artifacts.places import check_inside
+from zfcal.artifacts.places import check_inside, way_back
 from zfcal.artifacts.reading import check_contents, forget_content, open_to_write
 from zfcal.errors import StorageError, TakenError
 
@@ -34,7 +34,6 @@ _HINTS = {
     errno.ENOTDIR: "A file stands where a folder is needed: move it away.",
     errno.EEXIST: "A file stands where a folder is needed: move it away.",
     errno.ELOOP: "A symbolic link stands where the file is to go: move it away.",
-    errno.EXDEV: "Put a folder of its own there: nothing is written outside the trial.",
     errno.EISDIR: "A folder stands where the file is to go: move it away.",
 }
 # What a directory that cannot be flushed says: some network file systems have no such call.
@@ -176,7 +175,11 @@ def storage_error(path: Path, error: OSError, *, what: str = "written") -> Stora
     kind = TakenError if error.errno == errno.EISDIR else StorageError
     return kind(
         f"{path}: cannot be {what} ({error.strerror or error}). What was there is kept.",
-        hint=_HINTS.get(error.errno or 0, "Check the disk, and the connection to it."),
+        hint=(
+            way_back(path)
+            if error.errno == errno.EXDEV
+            else _HINTS.get(error.errno or 0, "Check the disk, and the connection to it.")
+        ),
     )
 
 

@@ -7,6 +7,7 @@ work leaves the same bytes. Whether an artifact is out of date is in `freshness`
 
 from __future__ import annotations
 
+import errno
 import json
 import struct
 from collections.abc import Mapping, Sequence
@@ -124,6 +125,8 @@ def read_lineage(path: Path) -> Lineage:
     except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
         raise unreadable(path, error) from error
     except (OSError, ValueError, MemoryError, struct.error) as error:
+        if isinstance(error, OSError) and error.errno == errno.EXDEV:
+            raise unreadable(path, error) from error
         raise DamagedError(
             f"{path}: cannot be read whole ({first_line(error)}).",
             hint="Copy it again from where it was made, or remove it and make it anew.",

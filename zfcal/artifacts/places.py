@@ -11,8 +11,15 @@ import errno
 import os
 import stat
 from pathlib import Path
+from shlex import quote
 
 from zfcal.trial import CONFIG_NAME, second_of
+
+_FOLDERS = {
+    *("tracks", "stats", "scores", "models", "poses", "cameras"),
+    *("drive", "diagnosis", "report"),
+}
+"""Folders of a trial whose files are found by their place; the others' are named by people."""
 
 KINDS = {
     stat.S_IFDIR: "a folder",
@@ -38,16 +45,57 @@ def check_inside(path: Path | str) -> None:
     OSError
         It leads outside, and by which link.
     """
+    out = _way_out(path)
+    if out is not None:
+        root, link, real = out
+        is_itself = link == os.path.abspath(path)  # noqa: PTH100 - as a text, beside others
+        named = "" if is_itself else f" by the link {os.path.relpath(link, root)}"
+        text = f"it leads outside the trial{named}, to {real}"
+        raise OSError(errno.EXDEV, text, str(path))
+
+
+def way_back(path: Path) -> str:
+    """Return what to do about a path that a link leads outside, with the commands for it."""
+    out = _way_out(path)
+    if out is None:
+        return "Put the file itself there."
+    root, link, real = out
+    target, place = quote(os.path.realpath(link)), quote(link)
+    if not os.path.exists(link):  # noqa: PTH110 - as above
+        return f"Nothing lies there, maybe its disk is not mounted; remove the link: rm {place}."
+    if os.path.isdir(link):  # noqa: PTH112 - as above
+        mount = f"rm {place}; mkdir {place}; mount --bind {target} {place}"
+        ways = f"put the files there, or mount their folder: {mount}."
+    else:
+        ways = f"put the file itself there: cp --remove-destination {target} {place}."
+    inside = Path(os.path.abspath(path)).relative_to(root)  # noqa: PTH100 - as above
+    named = _named(inside, Path(real), Path(root))
+    return f"{named} Or {ways}" if named else ways[0].upper() + ways[1:]
+
+
+def _named(inside: Path, real: Path, root: Path) -> str:
+    """Return how to name what may lie anywhere; empty for what must lie in the trial."""
+    folder = inside.parts[0]
+    if folder == "frames":
+        camera = inside.parts[1] if len(inside.parts) > 1 else "overhead"
+        source = real.parent if real.is_file() else real
+        source = source / camera if inside.name == folder else source
+        words = f"zfcal track {quote(str(root))} --{camera} {quote(str(source))}"
+        return f"Name the images where they lie: {words}."
+    is_own = folder in _FOLDERS or inside.suffix in {".toml", ".geojson"}
+    return "" if is_own else f"Name it where it lies: {quote(str(real))}."
+
+
+def _way_out(path: Path | str) -> tuple[str, str, str] | None:
+    """Return the trial that a path leads out of, the link that does it, and where to."""
     place, real = os.path.abspath(path), os.path.realpath(path)  # noqa: PTH100 - asked so often
     if real == place:
-        return
+        return None
     for root in _trials_above(place):
         within = os.path.realpath(root)
         if real != within and not real.startswith(within.rstrip(os.sep) + os.sep):
-            link = _first_link(root, place)
-            named = "" if link == place else f" by the link {os.path.relpath(link, root)}"
-            text = f"it leads outside the trial{named}, to {real}"
-            raise OSError(errno.EXDEV, text, str(path))
+            return root, _first_link(root, place), real
+    return None
 
 
 def is_regular(path: Path) -> bool:

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TypeAlias, final
 
 from zfcal.artifacts.limits import check_size, most_bytes, too_large
-from zfcal.artifacts.places import KINDS, check_inside, numbered
+from zfcal.artifacts.places import KINDS, check_inside, numbered, way_back
 from zfcal.errors import ChangedError, InputError
 
 Looks: TypeAlias = tuple[int, ...]
@@ -370,10 +370,7 @@ def unreadable(path: Path, error: OSError) -> InputError:
         return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
     hint = "Check that it is a file, and its permissions."
     if error.errno == errno.EXDEV:
-        hint = (
-            "Put the file itself there, or mount its disk there; films and images may lie anywhere "
-            "when trial.toml or an option names them."
-        )
+        hint = way_back(path)
     return InputError(f"{path}: cannot be read ({error.strerror or error}).", hint=hint)
 
 

@@ -17,7 +17,7 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
-from zfcal.artifacts.reading import numbered_of
+from zfcal.artifacts.reading import numbered_of, open_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
 from zfcal.behaviour.located import Located, locate
@@ -91,8 +91,17 @@ def input_files(root: Path) -> list[Path]:
     own_arena = root / trial.arena
     files = [trial.config, *([own_arena] if own_arena.is_file() else [])]
     for folder, ending in _ENDINGS:
-        files += [path for _, path in reader.files(folder, ending)]
+        # What is no file is no input: it is named where it is read.
+        files += [path for _, path in reader.files(folder, ending) if _can_be_opened(path)]
     return files
+
+
+def _can_be_opened(path: Path) -> bool:
+    try:
+        open_regular(path).close()
+    except OSError:
+        return False
+    return True
 
 
 def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
