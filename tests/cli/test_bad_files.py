@@ -14,10 +14,14 @@ from pathlib import Path
 
 import pytest
 
+from zfcal.artifacts.atomic import write_bytes_whole
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import PoseWriter
 from zfcal.artifacts.pose_messages import POSES
-from zfcal.report import page
+from zfcal.artifacts.settings import name_camera
+from zfcal.online import extend
+from zfcal.online.diagnose import KnownNoise
+from zfcal.report import arena_figure, gather, page
 from zfcal.tracks import FISH, AgentPose, FramePoses
 from zfcal_cli.main import run
 
@@ -33,6 +37,7 @@ FILES = (
     "models/000120.toml",
     "models/000120.parquet",
     "models/000180.skipped.json",
+    "models/extended.toml",
     "models/.000120.checkpoint",
     "tracks/000120.parquet",
     "stats/000120.parquet",
@@ -46,6 +51,8 @@ FILES = (
     "report/index.html",
     ".lock-analyse",
     ".lock-calibrate",
+    ".lock-diagnose",
+    ".lock-track",
 )
 FOLDERS = ("tracks", "stats", "scores", "models", "poses", "report", "drive", "diagnosis")
 
@@ -131,12 +138,17 @@ OF_FOLDERS = {
     "outside": _special(lambda path, outside: path.symlink_to(outside)),
 }
 QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--seed", "1")
+LEAST = ("--generations", "0", "--population", "4", "--workers", "1")
 MODEL = "trial/models/000120.toml"
+IMAGES = "trial/frames/overhead"
 COMMANDS = {
     "analyse": ("analyse", "trial", "--force"),
     "calibrate": ("calibrate", "trial", "--force", *QUICK, "--no-seed-likelihood"),
     "estimate": ("calibrate", "trial", "--dry-run", *QUICK),
     "report": ("report", "trial", "--force"),
+    "diagnose": ("diagnose", "trial", "--force", "--workers", "1"),
+    "extend": ("extend", "trial", "--effect", "turning-bias", "--force", *LEAST),
+    "track": ("track", "trial", "--overhead", IMAGES, "--robot-as-fish", "--dark", "--force"),
     "check": ("check", "trial"),
     "simulate": ("simulate", "new", "--model", MODEL, "--duration", "1min", "-n"),
     "replay": ("drive", "trial", "--replay"),
@@ -144,27 +156,35 @@ COMMANDS = {
 }
 """What follows ``zfcal``; `inspect` is given the very file."""
 
-READ_BY = {
-    "trial.toml": ("analyse", "calibrate", "report", "check", "replay", "inspect"),
-    "arena.geojson": ("analyse", "calibrate", "report", "check", "inspect"),
-    "tracks": ("analyse", "estimate", "check", "report", "inspect"),
-    "stats": ("analyse", "calibrate", "check", "report", "inspect"),
-    "scores": ("analyse", "calibrate", "check", "report", "inspect"),
-    "models": ("calibrate", "check", "report", "simulate", "inspect"),
-    "drive": ("check", "replay", "inspect"),
-    "diagnosis": ("check", "report", "inspect"),
-    "report": ("check", "report", "inspect"),
-    ".lock-analyse": ("analyse", "check"),
-    ".lock-calibrate": ("calibrate", "check"),
-}
-"""By folder or file; the others are read by these."""
+LOOKING = ("check", "inspect", "estimate", "simulate", "replay")
+"""Those that leave a trial as it is."""
 
-OTHERS = ("check", "inspect")
+READ_BY = {
+    "trial.toml": ("analyse", "calibrate", "report", "diagnose", "extend", "track", "replay"),
+    "arena.geojson": ("analyse", "calibrate", "report", "diagnose", "extend", "track"),
+    "tracks": ("analyse", "estimate", "report", "diagnose", "extend", "track"),
+    "stats": ("analyse", "calibrate", "report"),
+    "scores": ("analyse", "calibrate", "report"),
+    "models": ("calibrate", "report", "simulate", "diagnose", "extend"),
+    "models/.000120.checkpoint": ("calibrate",),
+    "poses": ("track",),
+    "frames": ("track",),
+    "cameras": ("track",),
+    "drive": ("replay",),
+    "diagnosis": ("report", "diagnose", "extend"),
+    "report": ("report",),
+    ".lock-analyse": ("analyse",),
+    ".lock-calibrate": ("calibrate",),
+    ".lock-diagnose": ("diagnose",),
+    ".lock-track": ("track",),
+}
+"""By folder or file, besides `check` and `inspect`."""
 
 
 def readers_of(name):
-    """Return the commands that read a file."""
-    return READ_BY.get(name, READ_BY.get(name.partition("/")[0], OTHERS))
+    """Return the commands that read a file, first those that leave the trial as it is."""
+    own = READ_BY.get(name, READ_BY.get(name.partition("/")[0], ()))
+    return sorted(("check", "inspect", *own), key=lambda command: command not in LOOKING)
 
 
 def _numbers(data, word):
@@ -187,27 +207,53 @@ def template(tmp_path_factory, write_tracks):
         assert run(["import", "tracks.csv", "trial", "--format", "csv", "-q"]) == 0
         assert run(["analyse", "trial", "-q"]) == 0
         assert run(["calibrate", "trial", *QUICK, "--no-seed-likelihood", "-q"]) == 0
-    root = place / "trial"
-    for name in ("report", "poses", "frames/overhead", "cameras", "drive", "diagnosis"):
-        (root / name).mkdir(parents=True, exist_ok=True)
-    _write_poses(root / "poses" / "000060.mcap")
-    return root
+        film = ("--video", "--duration", "2s", "--arena", "trial/arena.geojson", "--fps", "5")
+        assert run(["simulate", "film", "--model", MODEL, *film, "-q"]) == 0
+        root = place / "trial"
+        for name in ("frames/overhead", "cameras"):
+            shutil.copytree(place / "film" / name, root / name)
+        name_camera(root, "overhead", root / "cameras" / "overhead.toml")
+        for name in ("report", "poses", "drive"):
+            (root / name).mkdir()
+        _write_poses(root / "poses" / "000060.mcap")
+        assert run([*COMMANDS["extend"], "-q"]) == 0
+    extended = (root / "models" / "extended.toml").read_bytes()
+    with pytest.MonkeyPatch.context() as patch:
+        # All is read by then; what is left takes as long as all else together.
+        patch.setattr(extend, "_make", lambda path, *_: write_bytes_whole(path, extended))
+        yield root
 
 
 def _write_poses(path):
     with PoseWriter(path, Lineage(schema=POSES, command="track")) as writer:
-        for frame in range(300, 600):
+        for frame in range(300, 330):
             place = {"x_m": 0.5, "y_m": 0.5, "heading_rad": math.nan, "confidence": 1.0}
             agents = (AgentPose(agent=0, kind=FISH, **place),)
             writer.add(FramePoses(time_s=frame / 5, frame=frame, agents=agents))
 
 
 @pytest.fixture(scope="module", autouse=True)
-def no_drawing():
-    """Let a report be read for, but not drawn: that takes ten seconds, and reads nothing."""
+def quick(make_diagnosis):
+    """Leave out what takes long and reads nothing: drawing, simulating, answering, flushing."""
+
+    def answer(question, _):
+        return make_diagnosis(question.arena, question.model, names=())
+
+    def estimate(_case, _stretch, stated_m, source):
+        return KnownNoise(sd_m=stated_m, source=source)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page, "_drawer", lambda _: lambda part: part.write_bytes(b"drawn"))
         patch.setattr(page, "render_page", lambda *_: "drawn")
+        patch.setattr(gather, "_simulated", lambda *_: None)
+        patch.setattr(arena_figure, "_GRID_POINTS", 8)
+        patch.setattr("zfcal.online.diagnose._engine", answer)
+        patch.setattr("zfcal.online.diagnose._estimate", estimate)
+        patch.setattr("zfcal.report.diagnosis_drawing.png_of", lambda _: b"drawn")
+        patch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
+        patch.setattr("zfcal.report.easel.Easel.prepare", lambda _: None)
+        # Nobody pulls the plug.
+        patch.setattr(os, "fsync", lambda _: None)
         yield
 
 
@@ -230,17 +276,22 @@ def in_time():
 
 @pytest.fixture
 def spoilt(template, tmp_path, monkeypatch, zfcal):
-    """Return what spoils a file of a fresh copy and runs a command on it."""
-    outside = tmp_path / "outside"
+    """Return what spoils a file of a copy, fresh if need be, and runs a command on it."""
+    root, outside = tmp_path / "trial", tmp_path / "outside"
+    now = []
 
-    def call(name, spoil, command):
-        root = tmp_path / "trial"
+    def prepare(name, spoil):
         for folder in (root, outside):
             shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(template, root)
         outside.mkdir()
         (outside / "file").write_bytes(b"of somebody else")
         spoil(root / name, outside)
+
+    def call(name, spoil, command):
+        if now != [name, spoil]:
+            prepare(name, spoil)
+        now[:] = [name, spoil] if command in LOOKING else []
         words = COMMANDS[command]
         with in_time():
             done = zfcal(*words, *([root / name] if command == "inspect" else []))
