@@ -28,7 +28,8 @@ def command(out: Output, trials: tuple[str, ...]) -> None:
         zfcal check trial
         zfcal check trial --json
     """
-    from zfcal.artifacts.checking import ERROR, OK, check_trial
+    from zfcal.artifacts.checking import check_trial
+    from zfcal.artifacts.findings import ERROR, OK
 
     def work(found: Work) -> None:
         for finding in check_trial(found.root):

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from zfcal.artifacts import machine
-from zfcal.artifacts.checking import ERROR, NOTE, OK, WARNING, check_trial
+from zfcal.artifacts.checking import check_trial
+from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.tables import SCORES, TRACKS, write_table, write_tracks

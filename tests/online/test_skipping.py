@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from zfcal.artifacts.checking import ERROR, check_trial
+from zfcal.artifacts.checking import check_trial
+from zfcal.artifacts.findings import ERROR
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.validation import check
 from zfcal.online.analyse import AnalyseOptions, analyse

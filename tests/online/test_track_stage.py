@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from zfcal.artifacts.checking import ERROR, WARNING, check_trial
+from zfcal.artifacts.checking import check_trial
+from zfcal.artifacts.findings import ERROR, WARNING
 from zfcal.artifacts.frame_files import read_frames
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.pose_files import PoseFollower, read_poses

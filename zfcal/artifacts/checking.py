@@ -1,6 +1,6 @@
 """Whether every artifact of a trial is whole, valid and what its lineage says.
 
-The computer that it lies on is looked at in `machine`.
+The computer that it lies on is looked at in `computer`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.artifacts import machine
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
+from zfcal.artifacts.computer import check_computer
+from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
@@ -32,47 +33,14 @@ from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.trial import CONFIG_NAME, LOOP_NAME, NUMBER, Trial, second_of
 from zfcal.units import SEGMENT_S
 
-OK, NOTE, WARNING, ERROR = "ok", "note", "warning", "error"
-
-LOW_DISK_BYTES = 2**30
-"""About what half an hour of camera images takes."""
-
-NO_DISK_BYTES = 50 * 2**20
-"""Too little to finish a round."""
-
 CLOCK_SLACK_S = 2.0
 """Two computers that share a trial may differ by so much without a warning."""
 
 GROWING_S = 10.0
 """A file that changed so lately is taken to be growing still."""
 
-_THIS_WAS_WRITTEN_S = 1.7e9
-"""Late in 2023: a clock before that has lost its battery."""
-
 FORGOTTEN_S = 3600.0
 """No copy and no write takes so long: a dot-file of that age was left behind."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """One thing that a check found.
-
-    Parameters
-    ----------
-    level
-        ``ok``, ``note``, ``warning`` or ``error``.
-    where
-        The file, relative to the trial, or what else it is about.
-    says
-        What was found.
-    hint
-        What to do about it.
-    """
-
-    level: str
-    where: str
-    says: str
-    hint: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +98,7 @@ def check_trial(root: Path, *, now_s: float | None = None) -> list[Finding]:
         Finding(level=OK, where=folder, says=f"{count} whole and valid")
         for folder, count in sorted(counts.items())
     ]
-    return findings + list(_computer(root, now_s))
+    return findings + list(check_computer(root, now_s))
 
 
 def _settings(root: Path, now_s: float) -> tuple[_Place, list[Finding]]:
@@ -366,36 +334,3 @@ _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
 def _checker_of(root: Path, path: Path) -> Callable[[_Place, Path], Iterator[Finding]] | None:
     name = path.relative_to(root).as_posix()
     return next((c for pattern, c in _CHECKERS.items() if re.fullmatch(pattern, name)), None)
-
-
-def _computer(root: Path, now_s: float) -> Iterator[Finding]:
-    versions = ", ".join(f"{name} {number}" for name, number in machine.versions().items())
-    yield Finding(level=OK, where="versions", says=versions)
-    yield Finding(level=OK, where="cores", says=str(machine.cores()))
-    yield from _disk(machine.free_bytes(root))
-    yield from _file_system(machine.file_system(root))
-    is_set = now_s > _THIS_WAS_WRITTEN_S
-    says = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(now_s))
-    hint = "" if is_set else "Set the clock, or the times of files mean nothing."
-    yield Finding(level=OK if is_set else WARNING, where="clock", says=says, hint=hint)
-
-
-def _disk(free_bytes: int) -> Iterator[Finding]:
-    says = f"{free_bytes / 2**30:.1f} GiB free"
-    level = OK
-    if free_bytes < LOW_DISK_BYTES:
-        level = ERROR if free_bytes < NO_DISK_BYTES else WARNING
-    hint = "" if level == OK else "Make room before the next recording."
-    yield Finding(level=level, where="disk", says=says, hint=hint)
-
-
-def _file_system(kind: str) -> Iterator[Finding]:
-    if machine.is_network(kind):
-        yield Finding(
-            level=WARNING,
-            where="file system",
-            says=f"{kind}: changes made on other computers are not announced",
-            hint="zfcal watch --poll looks for them; it does so by itself on such a file system.",
-        )
-    else:
-        yield Finding(level=OK, where="file system", says=kind or "of unknown type")
