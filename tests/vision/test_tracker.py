@@ -310,3 +310,22 @@ def test_wrong_options_are_named(wrong, says):
     with pytest.raises(InputError) as caught:
         TrackerOptions(**wrong)
     assert str(caught.value) == says
+
+
+def test_a_fish_takes_the_id_of_a_hand_that_has_left_and_keeps_it(drawn):
+    """Known to be as large as a hand, it would be lost in each frame, for good."""
+    paths = drawn.circling(140, turn=0.02)
+    empty = drawn.image([], noise=0.0)
+    tracker = FishTracker(
+        TrackerOptions(n_agents=3), drawn.PROJECTION, background=background_of(empty)
+    )
+
+    told = []
+    for frame in drawn.frames([bodies[:2] if k < 60 else bodies for k, bodies in enumerate(paths)]):
+        if frame.number < 60:
+            frame.image[85:115, 85:115] = 70
+        told.append(tracker.step(frame))
+
+    assert {len(seen) for seen in told[70:]} == {3}
+    assert {s.agent for seen in told[70:] for s in seen} == {0, 1, 2}
+    assert len({s.track for seen in told[70:] for s in seen}) == 3

@@ -14,7 +14,7 @@ from zfcal.vision.detect import Blob
 from zfcal.vision.identity import Identities
 from zfcal.vision.seen import Exchange
 from zfcal.vision.trail import Detection, Trail
-from zfcal.vision.usual import Bodies
+from zfcal.vision.usual import Bodies, Body
 
 Floats = NDArray[np.float64]
 
@@ -222,9 +222,18 @@ class Trails:
             for trail in seen:
                 trail.agent = names[trail.key]
                 look = self._identities.look(trail.agent)
-                if look is not None:
+                if look is not None and _fits(trail, look):
                     trail.wear(look)
         return sorted(seen, key=lambda trail: trail.agent)
+
+
+def _fits(trail: Trail, look: Body) -> bool:
+    """Return whether a track that looked so would be taken for what it was last seen as.
+
+    The id of a hand that has left goes over to a fish; as large as the hand it would be lost.
+    """
+    odd = abs(math.log(look.area_px * look.darkness / trail.own_mass)) - _ALIKE
+    return _SIZE * max(odd, 0.0) ** 2 < _REACH**2
 
 
 def _nearest(blobs: list[Blob], at: tuple[float, float], near: float) -> int | None:

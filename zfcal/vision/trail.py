@@ -103,6 +103,7 @@ class Trail:
         "mass",
         "missed",
         "opening",
+        "own_mass",
         "shape",
         "shared",
         "time_s",
@@ -124,6 +125,7 @@ class Trail:
         self.length_px = shape.length_px
         self.mass = shape.area_px * detection.blob.darkness
         self.heading_rad = shape.axis_rad
+        self.own_mass = self.mass
         self.hits = 1
         self.is_clear = False
         self.darkness = detection.darkness
@@ -196,6 +198,7 @@ class Trail:
             self.area_px += weight * (shape.area_px - self.area_px)
             self.length_px += weight * (shape.length_px - self.length_px)
             self.mass += weight * (detection.mass - self.mass)
+            self.own_mass = detection.mass
 
     def confidence(self, usual: Look) -> float:
         """Return how sure the last sighting is, in [0, 1]; below 0.5 it is a guess.
@@ -205,7 +208,9 @@ class Trail:
         """
         sure = 1.0 if self.shared == 1 else 0.7
         if usual.area_px > 0:
-            odd = abs(math.log(max(self.shape.area_px, 1.0) / usual.area_px))
+            # A robot that is known to be large is as large as it should be.
+            area_px = self.own_area_px(usual.area_px)
+            odd = abs(math.log(max(self.shape.area_px, 1.0) / area_px))
             sure -= min(0.3 * max(odd - 0.3, 0.0), 0.4)
         if self.hits < _YOUNG:
             sure -= 0.1

@@ -65,7 +65,7 @@ class Bodies:
         kept = [blob for blobs in whole for blob in blobs]
         if not kept:
             return
-        least = 0.3 * float(np.quantile([blob.area_px for blob in kept], 0.75))
+        least = 0.3 * _usual_area(whole, n_agents)
         for blob in kept:
             if blob.area_px >= least:
                 self.add(shape_of(blob.pixels, blob.weights), blob.darkness)
@@ -82,6 +82,19 @@ class Bodies:
         area, length, darkness = np.median(np.array(self._seen), axis=0)
         self.usual = Body(area_px=float(area), length_px=float(length), darkness=float(darkness))
         self._fresh = 0
+
+
+def _usual_area(frames: Sequence[Sequence[Blob]], n_agents: int | None) -> float:
+    """Return what most of the blobs are as large as, or nearly.
+
+    Of the largest of each frame, as many as there are animals, the middle one, and of two the
+    smaller: a robot may be far larger than fish. Where the number is not known, shadows may be
+    more than half of all, so that three quarters count.
+    """
+    areas = [sorted((blob.area_px for blob in blobs), reverse=True) for blobs in frames]
+    share = 0.75 if n_agents is None else 0.5
+    some = [area for frame in areas for area in frame[:n_agents]]
+    return float(np.quantile(some, share, method="lower"))
 
 
 def _usual_darkness(frames: Sequence[Sequence[Blob]], n_agents: int | None) -> float:
