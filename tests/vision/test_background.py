@@ -77,6 +77,21 @@ def test_fish_that_swim_leave_no_trace(drawn):
     assert np.abs(learnt(images).level.astype(int) - 180).max() <= 8
 
 
+@pytest.mark.parametrize("polarity", ["dark", "light"])
+@pytest.mark.parametrize("frames", [range(60), range(20, 50), range(0, 100, 4)])
+def test_a_hand_that_passed_is_no_tank(drawn, polarity, frames):
+    """Lighter than the tank where fish are dark; in one pixel a fish that sat looks the same."""
+    images = [drawn.image(bodies) for bodies in drawn.circling(100, turn=0.1)]
+    for k in frames:
+        images[k][40:120, 60:150] = 240
+    if polarity == "light":
+        images = [~image for image in images]
+
+    level = learnt(images, polarity=polarity).level.astype(int)
+
+    assert np.abs(level - (180 if polarity == "dark" else 75)).max() <= 8
+
+
 def test_a_fish_that_rests_for_the_last_second_is_no_tank(drawn):
     """It swims for 70 frames and rests for 30: longer than the mixture remembers."""
     moving = drawn.circling(70, n=1)

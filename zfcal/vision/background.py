@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from zfcal.errors import InputError
 from zfcal.vision._kernels import median_ratio
 from zfcal.vision.frames import Image
+from zfcal.vision.ghosts import without_step
 
 Grey = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -90,6 +91,15 @@ class Background:
         white = np.full_like(self.level, 255)
         low = cv2.subtract(white, width)
         return Background(level=white, low=np.asarray(low, np.uint8), high=white)
+
+    def levelled(self, level: Grey, where: NDArray[np.bool_]) -> Background:
+        """Return the tank with another level at some pixels, where it is as noisy as it was."""
+        width = cv2.max(cv2.subtract(self.level, self.low), cv2.subtract(self.high, self.level))
+        return Background(
+            level=level,
+            low=np.where(where, cv2.subtract(level, width), self.low),
+            high=np.where(where, cv2.add(level, width), self.high),
+        )
 
     def gain(self, grey: Grey) -> float:
         """Return how much brighter than the empty tank an image is; 1 for equally bright.
@@ -219,7 +229,9 @@ class BackgroundLearner:
         light = polarity == LIGHT
         learnt = self._learnt()
         usual = _usual([self._some(sample) for sample in self.samples], light=light)
-        return _without_sitters(learnt, self._spread(usual, learnt.level), light=light)
+        return _without_sitters(
+            learnt, self._spread(usual, learnt.level), light=light, where=self._where
+        )
 
     def usual(self) -> Background:
         """Return the tank as it was for half of the time, whatever the polarity of fish.
@@ -350,17 +362,20 @@ def _usual(samples: list[Grey], *, light: bool) -> Grey:
     return np.asarray(usual, np.uint8)
 
 
-def _without_sitters(learnt: Background, tank: Grey, *, light: bool) -> Background:
+def _without_sitters(
+    learnt: Background, tank: Grey, *, light: bool, where: NDArray[np.bool_] | None = None
+) -> Background:
     """Return the background with resting fish taken out, where they moved at some time."""
     usual = tank.astype(np.int16)
     away = (learnt.level - usual) if light else (usual - learnt.level)
     width = learnt.high.astype(np.int16) - learnt.low
     # Opened, so that a flickering edge, a pixel wide, stays what it was learnt as.
     square = np.ones((3, 3), np.uint8)
-    core = cv2.morphologyEx((away > width).astype(np.uint8), cv2.MORPH_OPEN, square)
-    # Whole pieces that hold some of what is left, and their edges: tails are thin.
-    _, piece = cv2.connectedComponents((away > width).astype(np.uint8), connectivity=8)
-    held = np.isin(piece, np.setdiff1d(piece[core > 0], 0)).astype(np.uint8)
+    apart = (away > width).astype(np.uint8)
+    core = np.asarray(cv2.morphologyEx(apart, cv2.MORPH_OPEN, square), np.uint8)
+    # Whole pieces that hold some of what is left, and their edges: tails are thin. Something
+    # light that passed, such as a hand, is no tank that a fish hid.
+    held = without_step(apart, tank, learnt.level, core=core, where=where).astype(np.uint8)
     sat = (cv2.dilate(held, square, iterations=2) > 0) & (away > 0)
     level = np.where(sat, usual, learnt.level)
     below = learnt.level.astype(np.int16) - learnt.low

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.vision.background import DARK, EITHER, LIGHT, Background, Grey
+from zfcal.vision.ghosts import Piece, pieces_of
 
 USUAL_MIN_BLOB_PX = 12.0
 """Smallest blob where nothing was learnt."""
@@ -43,10 +44,7 @@ _MOST = 0.6
 _ALIKE = 0.5, 4.0
 """Shares of a usual animal's mass between which something else stands out as an animal does."""
 
-_SURROUNDINGS_PX = 3
 _KERNEL = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-_SQUARE = np.ones((3, 3), np.uint8)
-_WIDE = np.ones((2 * _SURROUNDINGS_PX - 1,) * 2, np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,28 +183,23 @@ def pieces(frame: Grey, level: Grey, mask: Grey) -> list[Standing]:
     n, labels, boxes, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
     held = np.zeros(n, bool)
     held[labels[opened > 0]] = True
+    x, y, width, height = boxes[:, :4].T
+    # Of what the image cuts off it cannot be told how large it is.
+    held &= (x > 0) & (y > 0) & (x + width < mask.shape[1]) & (y + height < mask.shape[0])
+    areas = boxes[:, 4].astype(float)
     found = []
-    for k in np.flatnonzero(held[1:]) + 1:
-        x, y, width, height, area = boxes[k]
-        if x == 0 or y == 0 or x + width == mask.shape[1] or y + height == mask.shape[0]:
-            # The image cuts it off: how large it is cannot be told.
-            continue
-        top, left = max(y - _SURROUNDINGS_PX, 0), max(x - _SURROUNDINGS_PX, 0)
-        crop = np.s_[top : y + height + _SURROUNDINGS_PX, left : x + width + _SURROUNDINGS_PX]
-        piece = labels[crop] == k
-        near = cv2.dilate(piece.astype(np.uint8), _SQUARE) > 0
-        around = (cv2.dilate(piece.astype(np.uint8), _WIDE) > 0) & ~near & (labels[crop] == 0)
-        if around.any():
-            here, there = (_step(image[crop], piece, around) for image in (frame, level))
-            told = here if abs(here) >= abs(there) else there
-            sign = 1 if told > 0 else -1
-            found.append(Standing(sign=sign, area_px=float(area), contrast=abs(told)))
+    for piece in pieces_of(np.asarray(labels, np.int32), np.asarray(boxes, np.int32), held):
+        here, there = (_step(image, piece) for image in (frame, level))
+        told = here if abs(here) >= abs(there) else there
+        sign, area_px = 1 if told > 0 else -1, float(areas[piece.number])
+        found.append(Standing(sign=sign, area_px=area_px, contrast=abs(told)))
     return found
 
 
-def _step(image: Grey, piece: NDArray[np.bool_], around: NDArray[np.bool_]) -> float:
+def _step(image: Grey, piece: Piece) -> float:
     """Return by how many greys a piece of an image is lighter than what is around it."""
-    return float(image[piece].mean() - np.median(image[around]))
+    part = image[piece.crop]
+    return float(part[piece.inside].mean() - np.median(part[piece.around]))
 
 
 def _ranked(values: Sequence[Sequence[float]], n: int) -> NDArray[np.float64]:

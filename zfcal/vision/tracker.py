@@ -33,6 +33,7 @@ from zfcal.vision.finding import Finder, soften
 from zfcal.vision.fitting import prepare
 from zfcal.vision.following import Trails
 from zfcal.vision.frames import Frame
+from zfcal.vision.healing import Healer, healed
 from zfcal.vision.learning import Learnt, learn
 from zfcal.vision.plane import Plane
 from zfcal.vision.seen import BadFrame, Exchange, Reason, Seen, TrackerOptions
@@ -91,6 +92,7 @@ class FishTracker:
         self._finder: Finder | None = None
         self._plain: Background | None = None
         self._doubts = Doubts()
+        self._healer = Healer(region)
         self._compared = 0
         self.learnt: Learnt | None = None
         self._bodies = Bodies()
@@ -126,8 +128,8 @@ class FishTracker:
         if self._finder is not None or not self._learner.count:
             return
         samples = self._learner.samples
-        self._learn_from(samples, self._learner.usual())
-        background = self._learner.freeze(self.polarity)
+        self._learn_from(samples, healed(self._learner.usual(), samples, self._region))
+        background = healed(self._learner.freeze(self.polarity), samples, self._region)
         finder = self._take(background)
         samples = [as_dark(grey, background, self.polarity) for grey in samples]
         # The learner's frames are no longer needed: a second of them is as much as the rest.
@@ -192,16 +194,21 @@ class FishTracker:
 
     def step(self, frame: Frame) -> list[Seen]:
         """Return the animals of a frame, ascending by id; none while the background is learnt."""
-        if self._finder is None:
+        if self._finder is None or self._plain is None:
             self._note(frame, "no background", "the background is still being learnt")
             self.learn(frame)
             return []
         if self._is_loaded:
             self._learn_on_sight(whole(grey_of(frame.image)))
-        grey = self._comparable(frame)
-        if grey is None:
+        bright = self._comparable(frame)
+        if bright is None:
             self._trails.forget(frame.time_s)
             return []
+        if self._steps % _LOOK_EVERY == _LOOK_EVERY // 2:
+            self._heal(bright, self._plain)
+        grey = bright
+        if self.polarity != LIGHT:
+            grey = as_dark(bright, self._plain, self.polarity)
         blobs = self._finder.find(grey, self._bodies.usual)
         if not self._bodies.usual.area_px > 0:
             self._bodies.start([blobs], self.options.n_agents)
@@ -227,7 +234,7 @@ class FishTracker:
         )
 
     def _comparable(self, frame: Frame) -> Grey | None:
-        """Return a frame's grey as bright as the background; None where it cannot be."""
+        """Return a frame as bright as the background, its negative where animals are light."""
         background, finder = self._plain, self._finder
         if background is None or finder is None:
             return None
@@ -248,8 +255,13 @@ class FishTracker:
             return None
         if abs(gain - 1) >= _SAME:
             grey = np.asarray(cv2.convertScaleAbs(grey, alpha=1 / gain), np.uint8)
-        grey = soften(grey, self.options.method)
-        return grey if light else as_dark(grey, background, self.polarity)
+        return soften(grey, self.options.method)
+
+    def _heal(self, bright: Grey, tank: Background) -> None:
+        """Take out of the tank what a frame shows to have left it."""
+        healed_tank = self._healer.look(~bright if self.polarity == LIGHT else bright, tank)
+        if healed_tank is not tank:
+            self._take(healed_tank)
 
     def _told(self, time_s: float) -> list[Seen]:
         seen = self._trails.told(time_s)
