@@ -33,6 +33,12 @@ _OPTIONS = (
         type=click.Choice(SIDES),
         help="Where the camera overhead looks from, if not from above.",
     ),
+    click.option(
+        "--below-seen-from",
+        "below_side",
+        type=click.Choice(SIDES),
+        help="Where the camera below looks from, if not from below.",
+    ),
     click.option("--background", type=EXISTING, help="Image of the empty tank; default: learnt."),
     click.option(
         "--method",
@@ -81,7 +87,9 @@ def track_options(given: dict[str, Any]) -> TrackOptions:
             corners_px=_corners(given["corners"]),
             side=given["side"],
         ),
-        below=CameraChoice(source=given["below"], file=given["below_camera"]),
+        below=CameraChoice(
+            source=given["below"], file=given["below_camera"], side=given["below_side"]
+        ),
         tracker=TrackerOptions(
             method=given["method"],
             harris=given["harris"],

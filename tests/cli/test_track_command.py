@@ -4,9 +4,14 @@ import contextlib
 import json
 import shutil
 
+import cv2
+import numpy as np
 import pytest
 
+from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.tables import read_tracks
+from zfcal.online.cameras import read_camera, write_camera
+from zfcal.vision.camera import Homography
 from zfcal.vision.seen import METHODS
 from zfcal_cli import tracking
 from zfcal_cli.main import run
@@ -163,3 +168,74 @@ def test_a_watch_without_a_camera_says_so_and_ends(zfcal, tank):
     done = zfcal("watch", "trial", "--overhead", "no-such.avi", "--corners", CORNERS)
     assert done.code == 1
     assert "no-such.avi" in done.err
+
+
+IMAGE_ORDER = "-0.5,-0.5 199.5,-0.5 199.5,199.5 -0.5,199.5"
+
+
+def test_corners_in_image_order_are_an_error_that_shows_the_right_one(zfcal, tank, film):
+    """The numbers of its hint are tracked; the order as it was, with the side that it means."""
+    start = ["track", "trial", "--overhead", str(film), "--duration", "2s"]
+    done = zfcal(*start, "--corners", IMAGE_ORDER)
+    assert done.code == 1
+    assert "the arena is seen from below (mirrored), expected from above" in done.err
+    ready = done.err.partition("upright: '")[2].partition("'")[0]
+    assert ready == CORNERS
+    assert not (tank / "tracks").exists()
+    assert zfcal(*start, "--corners", ready).code == 0
+    done = zfcal(*start, "--corners", IMAGE_ORDER, "--seen-from", "below", "--force")
+    assert done.code == 0
+
+
+@pytest.fixture
+def robot_film(zfcal, tmp_path):
+    """Return a trial of two fish and a robot with the images of both cameras, of 4 s."""
+    words = ["--arena", "open-square", "--fish", 2, "--robot", "--seed", 3, "-q"]
+    assert zfcal("init", "t", *words).code == 0
+    words = ["--model", "t/models/000000.toml", "--duration", "4s", "--video", "-q"]
+    assert zfcal("simulate", "film", *words).code == 0
+    shutil.rmtree(tmp_path / "film" / "tracks")
+    return tmp_path / "film"
+
+
+def turned(film, name):
+    """Replace a camera's file by that of one that sees the tank from the other side."""
+    path = film / "cameras" / f"{name}.toml"
+    camera = read_camera(path)
+    pixels = np.array([[50, 50], [400, 60], [420, 400], [60, 390]], float)
+    flipped = pixels.copy()
+    flipped[:, 1] = camera.size_px[1] - 1 - pixels[:, 1]
+    matrix, _ = cv2.findHomography(flipped, camera.to_metres(pixels))
+    rows = tuple(tuple(float(value) for value in row) for row in matrix)
+    lineage = Lineage(schema="zfcal.camera/1", command="by hand")
+    write_camera(path, Homography(size_px=camera.size_px, matrix=rows), lineage)
+
+
+@pytest.mark.slow
+def test_seen_from_below_may_be_said_of_the_camera_below(zfcal, robot_film):
+    """Who has two cameras says it of the one of which it is true, and tracks as without a word."""
+    start = ["track", "film", "--below", "film/frames/below"]
+    assert zfcal(*start).code == 0
+    plain = read_tracks(robot_film / "tracks" / "000000.parquet")
+    assert zfcal(*start, "--seen-from", "below").code == 0
+    said = read_tracks(robot_film / "tracks" / "000000.parquet")
+    assert np.array_equal(plain.x_m, said.x_m)
+    turned(robot_film, "overhead")
+    assert zfcal(*start).code == 1
+    assert zfcal(*start, "--seen-from", "below").code == 0
+
+
+@pytest.mark.slow
+def test_a_camera_below_that_sees_the_leds_from_above_has_to_be_stated(zfcal, robot_film):
+    """By an option that the error names; said of one that looks from below it is an error too."""
+    done = zfcal("track", "film", "--below-seen-from", "above")
+    assert done.code == 1
+    assert "leave --below-seen-from out" in done.err
+    turned(robot_film, "below")
+    done = zfcal("track", "film")
+    assert done.code == 1
+    assert "as the camera below: the arena is seen from above (not mirrored)" in done.err
+    assert "say --below-seen-from above" in done.err
+    assert zfcal("track", "film", "--below-seen-from", "above").code == 0
+    lineage = read_lineage(robot_film / "tracks" / "000000.parquet")
+    assert lineage.options["below_seen_from"] == "above"

@@ -18,12 +18,21 @@ from zfcal.online.opening import OpenTrial
 from zfcal.online.sources import files_of, source_of
 from zfcal.vision.calibration import homography_from_corners
 from zfcal.vision.camera import Projection
-from zfcal.vision.handedness import check_corners, check_side
+from zfcal.vision.handedness import check_corners, check_side, seen_from
 from zfcal.vision.live import ArrivalClock
 from zfcal.vision.stamps import SAME_RATE, Shot, Source, check_rate, with_rate
 from zfcal.vision.video import is_live
 
 OVERHEAD, BELOW = "overhead", "below"
+
+_SAY = {
+    OVERHEAD: "say --seen-from below, if it looks up through the floor.",
+    BELOW: "say --below-seen-from above, if it looks down on the tank.",
+}
+_UNSAY = {
+    OVERHEAD: "leave --seen-from out, if it looks down on the tank.",
+    BELOW: "leave --below-seen-from out, if it looks up through the floor.",
+}
 
 _LIVE_RATE = 0.1
 """Arrival times of a dozen images tell a rate no better than that."""
@@ -68,6 +77,9 @@ class View:
         In place of a calibration.
     side
         From where it looks, as it was stated; None for what its file or its name says.
+    or_usual
+        Whether what was stated may be meant of the other camera: then it may as well look from
+        where its name says.
     """
 
     name: str
@@ -75,6 +87,7 @@ class View:
     file: Path | None
     corners_px: tuple[tuple[float, float], ...] | None
     side: str | None = None
+    or_usual: bool = False
 
     @property
     def is_live(self) -> bool:
@@ -107,7 +120,8 @@ class View:
         if self.file is None:
             corners = np.array(self.corners_px, np.float64)
             found = homography_from_corners(corners, arena.outline.bounds, size_px)
-            check_corners(found, corners, self.side or usual_side(self.name))
+            side = self._stated(found) or usual_side(self.name)
+            check_corners(found, corners, side)
             return found
         camera = read_camera(self.file)
         if camera.size_px != size_px:
@@ -117,8 +131,12 @@ class View:
                 f"{got}: it is the calibration of another camera, or of another setting.",
                 hint=f"Calibrate it with zfcal camera, or give its file with {_option(self)}.",
             )
-        check_view(camera, self.file, self.name, arena, side=self.side)
+        check_view(camera, self.file, self.name, arena, side=self._stated(camera))
         return camera
+
+    def _stated(self, camera: Projection) -> str | None:
+        usual = usual_side(self.name)
+        return usual if self.or_usual and seen_from(camera) == usual else self.side
 
 
 def check_view(
@@ -146,14 +164,14 @@ def check_view(
     """
     expected = side or stated_side(file) or usual_side(name)
     again = f"zfcal camera corners or points, --camera {name}, says what is wrong"
-    stated = " --seen-from below, if it looks up through the floor." if name == OVERHEAD else ""
+    other = _SAY[name] if expected == usual_side(name) else _UNSAY[name]
     x, y = arena.outline.centroid.coords[0]
     check_side(
         camera,
         expected,
         what=f"{file}, as the camera {name}",
         near_px=camera.to_pixels(np.array([x, y])),
-        hint=f"Tracks would be mirror images. Calibrate it again: {again}.{stated}",
+        hint=f"Tracks would be mirror images. Calibrate it again: {again}. Or {other}",
     )
 
 

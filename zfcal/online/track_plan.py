@@ -14,6 +14,7 @@ from zfcal.errors import InputError
 from zfcal.online.opening import OpenTrial
 from zfcal.online.rig import BELOW, OVERHEAD, CameraChoice, View, view_of
 from zfcal.vision.handedness import ABOVE
+from zfcal.vision.handedness import BELOW as SEEN_FROM_BELOW
 from zfcal.vision.robot import LedOptions
 from zfcal.vision.seen import TrackerOptions
 
@@ -125,6 +126,7 @@ class Plan:
             "duration_s": options.duration_s,
             "corners_px": _pairs(self.overhead.corners_px),
             "seen_from": None if self.overhead.side == ABOVE else self.overhead.side,
+            "below_seen_from": ABOVE if self.below and self.below.side == ABOVE else None,
             "robot_as_fish": options.robot_as_fish or None,
             **_changed(options.tracker, TrackerOptions(n_agents=options.tracker.n_agents)),
             **{f"led_{key}": value for key, value in _changed(options.leds, LedOptions()).items()},
@@ -153,6 +155,9 @@ def plan_of(opened: OpenTrial, options: TrackOptions) -> Plan:
         )
     below = view_of(opened, BELOW, options.below)
     _check_robot(opened, below, options)
+    if below is not None and overhead.side == SEEN_FROM_BELOW:
+        # Of two cameras, the one whose name says so may be meant.
+        overhead = dataclasses.replace(overhead, or_usual=True)
     for view in (overhead, below):
         if view is not None and view.is_live != overhead.is_live:
             raise InputError("One camera is live and the other a recording: give two alike.")
