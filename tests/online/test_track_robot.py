@@ -17,6 +17,7 @@ from zfcal.errors import InputError
 from zfcal.online.below import Below
 from zfcal.online.cameras import write_camera
 from zfcal.online.events import Note, Result, say_nothing
+from zfcal.online.opening import Task
 from zfcal.online.rig import CameraChoice
 from zfcal.online.setup import NewTrial, create_trial
 from zfcal.online.track import track
@@ -122,6 +123,56 @@ def test_the_robot_is_told_from_the_fish_in_every_frame(root, filmed):
     fish = tracks.take(tracks.kind == FISH)
     assert len(fish) == 2 * N
     assert len(np.unique(fish.agent)) == 2
+
+
+@pytest.fixture(scope="module")
+def without_lure(filmed, tmp_path_factory):
+    """Return images overhead of the fish alone, as where a robot drives beneath a dark floor."""
+    folder = tmp_path_factory.mktemp("without") / "overhead"
+    arena, look = load_arena("open-square", Path()), PRESETS["usual"]
+    fish = truth()
+    moments = swimming(fish.take(fish.kind == FISH), look, fps=FPS, seed=1)
+    above = OverheadPainter(arena, overhead_camera(arena), look, seed=1)
+    writer = FrameWriter(folder / "000000.mcap", "overhead")
+    for k in range(N):
+        writer.add(moments.at(k).time_s, encoded(above.paint(moments.at(k)), "jpeg"))
+    writer.close()
+    return folder
+
+
+def counted(root, options):
+    """Return the numbers of a run."""
+    heard = []
+    track(root, options, heard.append, task=Task(force=True))
+    (result,) = [event.value for event in heard if isinstance(event, Result)]
+    return result
+
+
+@pytest.mark.slow
+def test_exactly_as_many_animals_counts_the_robot_once(root, filmed, without_lure):
+    """Seen by both cameras or by the one below alone; a robot that nobody sees is missing."""
+    options = options_of(filmed)
+    both = counted(root, options)
+    assert (both["exact"], both["as_many_rows"]) == (N, N)
+    unseen = CameraChoice(source=str(without_lure), file=filmed / "overhead.toml")
+    alone = counted(root, dataclasses.replace(options, overhead=unseen))
+    assert alone["as_many_rows"] >= N - 2
+    assert alone["exact"] >= N - 5
+    assert alone["bad_frames"].get("too few", 0) <= 2
+    dark = options_of(filmed, source=str(filmed / "dark"))
+    neither = counted(root, dataclasses.replace(dark, overhead=unseen))
+    assert (neither["exact"], neither["bad_frames"]["too few"]) == (0, N)
+
+
+@pytest.mark.slow
+def test_a_robot_tracked_as_a_fish_is_one_animal_more(root, filmed):
+    """Without the camera below it cannot be told which one it is, but it counts."""
+    options = dataclasses.replace(options_of(filmed), below=CameraChoice(), robot_as_fish=True)
+    result = counted(root, options)
+    assert (result["exact"], result["as_many_rows"]) == (N, N)
+    tracks = read_tracks(root / "tracks" / "000000.parquet")
+    assert len(np.unique(tracks.agent)) == 3
+    assert np.all(tracks.kind == FISH)
 
 
 @pytest.mark.slow

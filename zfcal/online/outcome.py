@@ -125,6 +125,9 @@ class Outcome:
     ) -> tuple[str, ...]:
         """Return what was wrong with a frame, in words, and tell what is new."""
         words = list(dict.fromkeys(bad))
+        if len(poses.agents) >= self._plan.opened.trial.n_agents and "too few" in words:
+            # The camera overhead misses a robot that the one below sees: all are there.
+            words.remove("too few")
         if self._before is not None and _same(self._before, frame.image):
             words.append("repeated")
         if self._last is not None and frame.number > self._last[0] + 1:
