@@ -14,6 +14,7 @@ from zfcal.errors import (
     LockedError,
     SchemaError,
     StorageError,
+    TakenError,
     ZfcalError,
 )
 
@@ -33,7 +34,8 @@ def test_every_error_of_the_module_is_of_the_tree():
     kinds = {kind for kind in made if issubclass(kind, Exception)}
 
     assert kinds == {
-        ZfcalError, InputError, SchemaError, DamagedError, StorageError, ChangedError, LockedError,
+        ZfcalError, InputError, SchemaError, DamagedError, StorageError, TakenError, ChangedError,
+        LockedError,
     }  # fmt: skip
     assert all(issubclass(kind, ZfcalError) for kind in kinds)
     assert not issubclass(OSError, ZfcalError)

@@ -93,9 +93,15 @@ def fit_pose(lens: Lens, view: View, *, robust: bool = False) -> Camera:
         No ray of the lens reaches some pixel, or there is no pose.
     """
     refined = [
-        _refined_pose(lens, view, candidate, robust=robust)
+        camera
         for candidate in pose_candidates(lens, view)
+        if (camera := _refined_pose(lens, view, candidate, robust=robust)) is not None
     ]
+    if not refined:
+        raise InputError(
+            "The points are seen from no place that is not in their plane.",
+            hint="Check that pixels and metres belong together, line by line.",
+        )
     return min(refined, key=lambda camera: error_px(camera, view))
 
 
@@ -156,7 +162,8 @@ def project(
     return np.asarray(pixels, np.float64).reshape(-1, 2), pose_, focal, centre, coefficients
 
 
-def _refined_pose(lens: Lens, view: View, start: Camera, *, robust: bool) -> Camera:
+def _refined_pose(lens: Lens, view: View, start: Camera, *, robust: bool) -> Camera | None:
+    """Return the best pose near a first one; None where that ends in the plane itself."""
     matrix, distortion = np.array(lens.matrix, np.float64), np.array(lens.distortion, np.float64)
 
     def residuals(pose: Floats) -> Floats:
@@ -172,7 +179,7 @@ def _refined_pose(lens: Lens, view: View, start: Camera, *, robust: bool) -> Cam
         x_scale="jac",
         **method_of(robust=robust),
     )
-    return Camera.of(lens, found.x[:3], found.x[3:])
+    return _camera_or_none(lens, found.x[:3], found.x[3:])
 
 
 def method_of(*, robust: bool) -> dict[str, Any]:
