@@ -30,8 +30,8 @@ from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.scheduler import connect
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.simulate import Counts
-from zfcal.online.side_by_side import at_once, side_by_side
 from zfcal.parameters import natural
+from zfcal.stages.side_by_side import at_once, side_by_side
 
 SCHEDULES = {"default, 1 x 3000 steps": (1, 3000), "authors', 10 x 1800 steps": (10, 1800)}
 """Runs and steps of an evaluation."""

@@ -42,19 +42,19 @@ from zfcal.calibrate.objective import (
 )
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
 from zfcal.errors import InputError
-from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import calibrate
-from zfcal.online.events import say_nothing
-from zfcal.online.holdout import FixedModel, pooled_fish
-from zfcal.online.likelihood import estimate
-from zfcal.online.opening import OpenTrial, Task, open_trial
-from zfcal.online.rounds import RoundPlaces, read_control
-from zfcal.online.searching import CalibrateOptions
-from zfcal.online.segments import Segments
-from zfcal.online.setup import NewTrial, create_trial
-from zfcal.online.simulate import SimulateOptions, simulate
-from zfcal.online.windows import window_ends
 from zfcal.parameters import Parameters, to_genes
+from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
+from zfcal.stages.calibrate.calibrate import calibrate
+from zfcal.stages.calibrate.holdout import FixedModel, pooled_fish
+from zfcal.stages.calibrate.likelihood import estimate
+from zfcal.stages.calibrate.rounds import RoundPlaces, read_control
+from zfcal.stages.calibrate.searching import CalibrateOptions
+from zfcal.stages.events import say_nothing
+from zfcal.stages.init import NewTrial, create_trial
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.segments import Segments
+from zfcal.stages.simulate import SimulateOptions, simulate
+from zfcal.stages.windows import window_ends
 
 REAL = ("fish_only_six", "five-zebrafish", "Feedback_Initiative_model_1")
 """Recordings of `recordings.SOURCES`, if their folder is given."""
@@ -277,9 +277,9 @@ import sys, time
 begin_s, used_s = time.perf_counter(), time.process_time()
 from pathlib import Path
 from zfcal.artifacts.models import read_model
-from zfcal.online.events import say_nothing
-from zfcal.online.likelihood import estimate
-from zfcal.online.opening import open_trial
+from zfcal.stages.events import say_nothing
+from zfcal.stages.calibrate.likelihood import estimate
+from zfcal.stages.opening import open_trial
 opened = open_trial(Path(sys.argv[1]))
 start = read_model(opened.trial.root / opened.trial.model)
 for end_s in range(120, 601, 60):

@@ -32,18 +32,18 @@ from tracking_scores import as_tracks, differences, statistics_of, summary
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.tables import read_tracks
 from zfcal.behaviour.statistics import Statistics
+from zfcal.cameras.camera import Homography, Projection
+from zfcal.cameras.frames import Frame
+from zfcal.cameras.rig import overhead_camera
+from zfcal.tracking.fusing import Fuser
+from zfcal.tracking.hindsight import Hindsight
+from zfcal.tracking.region import region_of
+from zfcal.tracking.seen import METHODS, TrackerOptions
+from zfcal.tracking.tracker import FishTracker, follow
 from zfcal.tracks import FramePoses, Tracks, concatenate
-from zfcal.vision.camera import Homography, Projection
-from zfcal.vision.frames import Frame
-from zfcal.vision.fusing import Fuser
-from zfcal.vision.hindsight import Hindsight
-from zfcal.vision.look import look_of
-from zfcal.vision.region import region_of
-from zfcal.vision.render import OverheadPainter
-from zfcal.vision.rig import overhead_camera
-from zfcal.vision.seen import METHODS, TrackerOptions
-from zfcal.vision.swimming import swimming
-from zfcal.vision.tracker import FishTracker, follow
+from zfcal.virtual.images.look import look_of
+from zfcal.virtual.images.render import OverheadPainter
+from zfcal.virtual.images.swimming import swimming
 
 FPS = 15.0
 ARENA = "two-rooms"

@@ -30,8 +30,8 @@ from measuring import load, machine, table
 from regressions import Ratio, conclude, parser
 
 from zfcal.artifacts.tables import read_tracks
-from zfcal.online.camera_server import CameraServer
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
+from zfcal.virtual.camera_server import CameraServer
 
 TARGET_MS = 20.0
 FPS = 15

@@ -12,7 +12,7 @@ from diagnosis_summary import NAMELESS, NOTHING
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 
-from zfcal.report.theme import FISH, GROUND, INK, MODEL, MUTED, new_figure, save_png, style
+from zfcal.report.figures.theme import FISH, GROUND, INK, MODEL, MUTED, new_figure, save_png, style
 
 _SHADES = LinearSegmentedColormap.from_list("shades", (GROUND, FISH))
 _MARKS = ("o", "^", "s", "D")

@@ -13,8 +13,10 @@ from measuring import ROOT
 _CODE = (
     *diagnosis_trial.DIAGNOSIS_CODE,
     "benchmarks/diagnosis_film.py",
-    "zfcal/online",
-    "zfcal/vision",
+    "zfcal/stages",
+    "zfcal/virtual",
+    "zfcal/tracking",
+    "zfcal/cameras",
 )
 
 
@@ -40,11 +42,11 @@ def filmed(folder: Path, made: Any, asked: dict[str, Any]) -> Path:
     asked
         Its scenario, in an arena that comes with zfcal.
     """
-    from zfcal.online.film import FilmOptions, film, frames_folder
-    from zfcal.online.rig import BELOW, OVERHEAD, CameraChoice
-    from zfcal.online.setup import NewTrial, create_trial
-    from zfcal.online.track import track
-    from zfcal.online.track_plan import TrackOptions
+    from zfcal.stages.camera.rig import BELOW, OVERHEAD, CameraChoice
+    from zfcal.stages.init import NewTrial, create_trial
+    from zfcal.stages.track.plan import TrackOptions
+    from zfcal.stages.track.track import track
+    from zfcal.virtual.film import FilmOptions, film, frames_folder
 
     tank, seen = folder / "tank", folder / "trial"
     diagnosis_trial.lay_out(tank, made, asked)

@@ -52,12 +52,12 @@ DIAGNOSIS_CODE = (
     "zfcal/arena.py",
     "zfcal/parameters.py",
     "zfcal/tracks.py",
-    "zfcal/online/diagnose.py",
-    "zfcal/online/stretch.py",
-    "zfcal/online/import_.py",
-    "zfcal/artifacts/foreign",
+    "zfcal/stages/diagnose/diagnose.py",
+    "zfcal/stages/stretch.py",
+    "zfcal/stages/import_.py",
+    "zfcal/readers",
 )
-_EXTENSION = (*DIAGNOSIS_CODE, "zfcal/online", "zfcal/calibrate")
+_EXTENSION = (*DIAGNOSIS_CODE, "zfcal/stages", "zfcal/calibrate")
 
 
 def marks(sections: tuple[str, ...]) -> dict[str, str]:
@@ -69,9 +69,9 @@ def marks(sections: tuple[str, ...]) -> dict[str, str]:
 
 def lacks(section: str) -> str | None:
     """Return what a section cannot do without and zfcal does not have; None where it is there."""
-    if section == EXTEND and not _has("zfcal.online.extend"):
+    if section == EXTEND and not _has("zfcal.stages.extend.extend"):
         return "needs zfcal extend"
-    if section == VIDEO and not _has("zfcal.online.track"):
+    if section == VIDEO and not _has("zfcal.stages.track.track"):
         return "needs zfcal track"
     return None
 
@@ -181,8 +181,8 @@ def lay_out(root: Path, made: Any, asked: dict[str, Any]) -> None:
     from hidden.scenario import write_csv
     from hidden.worlds import geojson_of, tank_of
 
-    from zfcal.online.import_ import Source, import_tracks
-    from zfcal.online.setup import NewTrial, create_trial
+    from zfcal.stages.import_ import Source, import_tracks
+    from zfcal.stages.init import NewTrial, create_trial
 
     root.mkdir()
     arena, table = asked["arena"], root.parent / "tracks.csv"
@@ -205,7 +205,7 @@ def silent(_event: object) -> None:
 
 def _diagnosed(root: Path, job: Job) -> Row:
     """Return what ``zfcal diagnose`` says of a trial, and what that took."""
-    from zfcal.online.diagnose import DiagnoseOptions, diagnose
+    from zfcal.stages.diagnose.diagnose import DiagnoseOptions, diagnose
 
     options = DiagnoseOptions(quick=job.quick, n_workers=job.workers)
     path, wall_s, cpu_s = _timed(lambda: diagnose(root, options, silent))
@@ -249,9 +249,9 @@ def _said(document: dict[str, Any]) -> Row:
 def _extended(root: Path) -> Row:
     """Return what ``zfcal extend`` says of a trial that was diagnosed, and what that took."""
     from zfcal.calibrate.task import Settings
-    from zfcal.online.searching import CalibrateOptions
+    from zfcal.stages.calibrate.searching import CalibrateOptions
 
-    extend = importlib.import_module("zfcal.online.extend")
+    extend = importlib.import_module("zfcal.stages.extend.extend")
     settings = Settings(generations=GENERATIONS)
     options = extend.ExtendOptions(calibration=CalibrateOptions(settings=settings, n_workers=1))
     path, wall_s, cpu_s = _timed(lambda: extend.extend(root, options, silent))

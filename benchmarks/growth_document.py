@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from measuring import table
 
-from zfcal.report.theme import FISH, GROUP, MODEL, MUTED, ROBOT, new_figure, save_png, style
+from zfcal.report.figures.theme import FISH, GROUP, MODEL, MUTED, ROBOT, new_figure, save_png, style
 
 
 def draw(found: dict[str, Any], path: Path) -> None:

@@ -27,16 +27,16 @@ from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import Statistics, measure, measure_robot
 from zfcal.calibrate.objective import with_measured_speeds
-from zfcal.online.analyse import POOLED_FROM_S
-from zfcal.online.events import say_nothing
-from zfcal.online.holdout import evaluate_model
-from zfcal.online.likelihood import CERTAIN, estimate
-from zfcal.online.opening import OpenTrial
-from zfcal.online.rounds import score_table
-from zfcal.online.segments import Segments, segment_path, segment_starts
-from zfcal.online.windows import whole_segments
 from zfcal.parameters import Parameters
-from zfcal.report.statistics_figure import histogram_mean
+from zfcal.report.figures.statistics import histogram_mean
+from zfcal.stages.analyse.analyse import POOLED_FROM_S
+from zfcal.stages.calibrate.holdout import evaluate_model
+from zfcal.stages.calibrate.likelihood import CERTAIN, estimate
+from zfcal.stages.calibrate.rounds import score_table
+from zfcal.stages.events import say_nothing
+from zfcal.stages.opening import OpenTrial
+from zfcal.stages.segments import Segments, segment_path, segment_starts
+from zfcal.stages.windows import whole_segments
 from zfcal.tracks import FISH, ROBOT
 
 FEATURES = ("D", "W", "O", "T")

@@ -34,9 +34,9 @@ from zfcal import __version__
 from zfcal.artifacts.models import read_model
 from zfcal.behaviour.statistics import Statistics, measure, measure_robot
 from zfcal.errors import ZfcalError
-from zfcal.report.panels import write_picture
+from zfcal.report.figures.panels import write_picture
+from zfcal.report.figures.statistics import statistics_picture
 from zfcal.report.simulated import long_run
-from zfcal.report.statistics_figure import statistics_picture
 from zfcal.report.views import Round
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from measuring import table
 
-from zfcal.report.theme import BAND, FISH, GROUP, MODEL, MUTED, new_figure, save_png, style
+from zfcal.report.figures.theme import BAND, FISH, GROUP, MODEL, MUTED, new_figure, save_png, style
 from zfcal.report.views import PUBLISHED_S
 
 NOTHING = "–"

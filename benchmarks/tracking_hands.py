@@ -18,9 +18,9 @@ from bench_tracking import Film, drawn
 from measuring import table
 from tracking_measures import measures
 
-from zfcal.vision.frames import Frame
-from zfcal.vision.seen import TrackerOptions
-from zfcal.vision.tracker import FishTracker, follow
+from zfcal.cameras.frames import Frame
+from zfcal.tracking.seen import TrackerOptions
+from zfcal.tracking.tracker import FishTracker, follow
 
 SEEDS = (9104, 9106, 9205, 9206)
 N_FRAMES, LATE = 300, 150

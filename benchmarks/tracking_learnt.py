@@ -23,11 +23,11 @@ from measuring import table
 from tracking_measures import measures
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.vision.camera import Camera, Homography
-from zfcal.vision.frames import Frame
-from zfcal.vision.region import region_of
-from zfcal.vision.seen import TrackerOptions
-from zfcal.vision.tracker import FishTracker, follow
+from zfcal.cameras.camera import Camera, Homography
+from zfcal.cameras.frames import Frame
+from zfcal.tracking.region import region_of
+from zfcal.tracking.seen import TrackerOptions
+from zfcal.tracking.tracker import FishTracker, follow
 
 HELD_OUT = (("usual", 7301), ("usual", 7302), ("hard", 7303), ("clean", 7304))
 """Looks and seeds; the rules were made on seeds 1 to 4 and on test_A."""

@@ -12,7 +12,7 @@ from .output import Output
 from .streams import each_trial
 
 if TYPE_CHECKING:
-    from zfcal.online.streams import Work
+    from zfcal.stages.streams import Work
 
 
 @click.command("analyse")
@@ -55,9 +55,9 @@ def command(
         zfcal analyse day1 day2 --control alone1 --control alone2
         zfcal import tracks.csv trial --format csv | zfcal analyse -
     """
-    from zfcal.online.analyse import AnalyseOptions, analyse
-    from zfcal.online.opening import Task
-    from zfcal.online.segments import Segments
+    from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
+    from zfcal.stages.opening import Task
+    from zfcal.stages.segments import Segments
 
     options = AnalyseOptions(scoring=scoring, control=control)
     segments = Segments()

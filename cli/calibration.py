@@ -17,10 +17,10 @@ from .output import Output
 from .streams import STDIN, each_trial, trials_together
 
 if TYPE_CHECKING:
-    from zfcal.online.events import Tell
-    from zfcal.online.opening import Task
-    from zfcal.online.searching import CalibrateOptions
-    from zfcal.online.streams import Work
+    from zfcal.stages.calibrate.searching import CalibrateOptions
+    from zfcal.stages.events import Tell
+    from zfcal.stages.opening import Task
+    from zfcal.stages.streams import Work
 
     MakeTask = Callable[[frozenset[int] | None], Task]
 
@@ -96,8 +96,8 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         Two options contradict each other, or one could not take effect.
     """
     from zfcal.calibrate.task import Settings
-    from zfcal.online.opening import Task
-    from zfcal.online.searching import CalibrateOptions
+    from zfcal.stages.calibrate.searching import CalibrateOptions
+    from zfcal.stages.opening import Task
 
     _check_together(options)
     settings = Settings(
@@ -161,7 +161,7 @@ def each_round(
     out: Output, trials: tuple[str, ...], chosen: CalibrateOptions, task: MakeTask
 ) -> None:
     """Calibrate trials round by round; on a cluster, several trials at the same time."""
-    from zfcal.online.calibrate import calibrate
+    from zfcal.stages.calibrate.calibrate import calibrate
 
     def work(found: Work, tell: Tell) -> None:
         calibrate(found.root, chosen, tell, task=task(found.ends_s))
@@ -179,7 +179,7 @@ def span_task(
     chosen: tuple[CalibrateOptions, MakeTask],
 ) -> None:
     """Calibrate one pooled window of one trial."""
-    from zfcal.online.holdout import Span, calibrate_span
+    from zfcal.stages.calibrate.holdout import Span, calibrate_span
 
     if len(trials) != 1 or trials[0] == "-":
         raise click.UsageError("--window takes one trial, since -o names one file.")

@@ -50,7 +50,7 @@ def align(
         zfcal camera align trial
         zfcal camera align trial --overhead above.mp4 --below below.mp4
     """
-    from zfcal.online.camera_align import Recording, align_cameras
+    from zfcal.stages.camera.align import Recording, align_cameras
 
     recording = Recording(overhead=overhead, below=below, start_s=start_s, seconds=seconds)
     task = task_of(where)

@@ -103,8 +103,8 @@ def board(
         zfcal camera board shots/ --board 9x6 --square-mm 25 --charuco --model fisheye \\
             --lies floor.png --at 0.2,0.3,90 --trial trial --camera below
     """
-    from zfcal.online.camera_boards import BoardAt, BoardImages, make_from_boards
-    from zfcal.vision.boards import Board
+    from zfcal.cameras.boards import Board
+    from zfcal.stages.camera.boards import BoardAt, BoardImages, make_from_boards
 
     if (lies is None) != (at is None):
         raise click.UsageError("--lies and --at go together.")
@@ -144,8 +144,8 @@ def sheet(
     Example:
         zfcal camera sheet --board 9x6 --square-mm 25 --charuco -o board.png
     """
-    from zfcal.online.camera_boards import write_sheet
-    from zfcal.vision.boards import Board
+    from zfcal.cameras.boards import Board
+    from zfcal.stages.camera.boards import write_sheet
 
     def make() -> None:
         what = Board(columns=board[0], rows=board[1], square_m=square_mm / 1000, charuco=charuco)

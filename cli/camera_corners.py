@@ -44,7 +44,7 @@ def corners(
         zfcal camera corners 148,62 503,68 496,424 140,416 --size 640x480 \
             --trial trial --camera below
     """
-    from zfcal.online.camera_corners import Corners, make_from_corners
+    from zfcal.stages.camera.corners import Corners, make_from_corners
 
     given = Corners(
         px=tuple((x, y) for x, y in (numbers(text, 2) for text in corners)),

@@ -13,7 +13,7 @@ import click
 from .options import EXISTING, PLACE
 
 if TYPE_CHECKING:
-    from zfcal.online.camera_making import CameraTask, Found, Place
+    from zfcal.stages.camera.making import CameraTask, Found, Place
 
 Command = Callable[..., None]
 
@@ -87,7 +87,7 @@ def place_options(command: Command) -> Command:
 
 def aim_of(where: Mapping[str, Any], image: Path | None = None) -> tuple[Place, CameraTask]:
     """Return where a camera goes and how it is to be made, by the options of a command."""
-    from zfcal.online.camera_making import place_for
+    from zfcal.stages.camera.making import place_for
 
     out, trial, name = where["place"], where["trial"], where["name"]
     if (out is None) == (trial is None):
@@ -100,7 +100,7 @@ def aim_of(where: Mapping[str, Any], image: Path | None = None) -> tuple[Place, 
 
 def task_of(where: Mapping[str, Any], image: Path | None = None) -> CameraTask:
     """Return how a camera is to be made: --dry-run, --force and --figure."""
-    from zfcal.online.camera_making import CameraTask
+    from zfcal.stages.camera.making import CameraTask
 
     figure: Path | None = where["figure"]
     draw = None if figure is None else functools.partial(_draw, figure=figure, image=image)
@@ -110,7 +110,7 @@ def task_of(where: Mapping[str, Any], image: Path | None = None) -> CameraTask:
 def _draw(found: Found, *, figure: Path, image: Path | None) -> Path:
     from zfcal.artifacts.atomic import write_whole
     from zfcal.artifacts.images import read_image
-    from zfcal.report.camera_figure import draw_residuals, residuals_of
+    from zfcal.report.figures.camera import draw_residuals, residuals_of
 
     backdrop = None if image is None else read_image(image)
     residuals = residuals_of(found)

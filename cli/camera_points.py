@@ -58,7 +58,7 @@ def points(
         zfcal camera points below-marks.csv --lens below-lens.toml \
             -o below.toml --seen-from below
     """
-    from zfcal.online.camera_points import Points, make_from_points
+    from zfcal.stages.camera.points import Points, make_from_points
 
     if lens is not None and model is not None:
         raise click.UsageError("--lens has its model already: leave --model out.")
@@ -90,7 +90,7 @@ def older(
     Example:
         zfcal camera import cats2-below-camera.xml --trial trial --camera below
     """
-    from zfcal.online.camera_points import Points, make_from_older
+    from zfcal.stages.camera.points import Points, make_from_older
 
     given = Points(path=file, model=model, robust=robust)
     place, task = aim_of(where)

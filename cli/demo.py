@@ -14,7 +14,7 @@ from .output import Output
 from .report import write_page
 
 if TYPE_CHECKING:
-    from zfcal.online.opening import Task
+    from zfcal.stages.opening import Task
 
 
 @click.command("demo")
@@ -41,8 +41,8 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
         zfcal demo loop --closed-loop --duration 10min
         zfcal demo baseline --closed-loop --no-video --swims random --seed 3
     """
-    from zfcal.online.demo import run_demo
-    from zfcal.online.opening import Task
+    from zfcal.stages.opening import Task
+    from zfcal.virtual.demo import run_demo
 
     task = Task(force=force)
 
@@ -58,10 +58,10 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
 
 
 def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -> Path:
-    from zfcal.online.closed_loop import closed_loop
-    from zfcal.online.virtual_fish import FishOptions
-    from zfcal.online.virtual_trial import LOOP_SETTINGS, LoopOptions
     from zfcal.units import M_PER_MM
+    from zfcal.virtual.closed_loop import closed_loop
+    from zfcal.virtual.fish import FishOptions
+    from zfcal.virtual.trial import LOOP_SETTINGS, LoopOptions
 
     given = {name: value for name, value in asked.items() if value is not None}
     fish: dict[str, float] = {
@@ -84,7 +84,7 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
         ),
     )
     if asked["real_time"]:
-        from zfcal.online.live_loop import live_loop
+        from zfcal.virtual.live_loop import live_loop
 
         return live_loop(folder, options, given.get("budget_s", 50.0), out.tell, task=task)
     return closed_loop(folder, options, out.tell, task=task)

@@ -21,7 +21,7 @@ from .output import Output
 from .streams import each_trial
 
 if TYPE_CHECKING:
-    from zfcal.online.streams import Work
+    from zfcal.stages.streams import Work
 
 
 @click.command("diagnose")

@@ -14,9 +14,9 @@ from .output import Output
 from .streams import STDIN
 
 if TYPE_CHECKING:
-    from zfcal.online.diagnose import DiagnoseOptions
-    from zfcal.online.events import Event
-    from zfcal.online.opening import Task
+    from zfcal.stages.diagnose.diagnose import DiagnoseOptions
+    from zfcal.stages.events import Event
+    from zfcal.stages.opening import Task
 
 
 def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[DiagnoseOptions, Task]:
@@ -27,8 +27,8 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[Diagnos
     click.UsageError
         Two options contradict each other, or one could not take effect.
     """
-    from zfcal.online.diagnose import DiagnoseOptions
-    from zfcal.online.opening import Task
+    from zfcal.stages.diagnose.diagnose import DiagnoseOptions
+    from zfcal.stages.opening import Task
 
     _check_together(options, trials)
     noise_mm = options["noise_mm"]
@@ -55,8 +55,8 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 
 def diagnose_all(out: Output, roots: Iterable[Path], chosen: DiagnoseOptions, task: Task) -> None:
     """Diagnose trials, draw their pages, and say in words what each comes to."""
-    from zfcal.online.diagnose import diagnose
-    from zfcal.report.easel import Easel
+    from zfcal.report.diagnosis.easel import Easel
+    from zfcal.stages.diagnose.diagnose import diagnose
 
     with Easel() as easel:
         for root in roots:
@@ -68,8 +68,8 @@ def diagnose_all(out: Output, roots: Iterable[Path], chosen: DiagnoseOptions, ta
 def tell_and_warn(out: Output, root: Path, event: Event, *, in_words: bool = False) -> None:
     """Pass an event on; warn of findings that are not to be trusted, and say their verdict."""
     from zfcal.diagnose.document import read_document
-    from zfcal.online.events import Note, Result
-    from zfcal.report.diagnosis_words import fired_control, verdict_sentence
+    from zfcal.report.diagnosis.words import fired_control, verdict_sentence
+    from zfcal.stages.events import Note, Result
 
     out.tell(event)
     if not isinstance(event, Result):

@@ -124,9 +124,9 @@ def command(
         return
     if publish_zones is not None:
         raise click.UsageError("--publish-zones is for --publish.")
-    from zfcal.online.drive import DriveOptions, drive
-    from zfcal.online.opening import Task
-    from zfcal.online.pilot import Manner
+    from zfcal.drive.drive import DriveOptions, drive
+    from zfcal.drive.pilot import Manner
+    from zfcal.stages.opening import Task
 
     from .driving import DriveVoice
 
@@ -178,7 +178,7 @@ def _publish(
     out: Output, trial: Path, address: str, *, zones: str | None, duration_s: float | None
 ) -> None:
     """Send models to a rig; nothing is driven from here."""
-    from zfcal.online.publish import PublishOptions, publish
+    from zfcal.drive.publish import PublishOptions, publish
 
     _refuse(_DRIVING, "--publish: the rig drives its robot itself.")
     chosen = tuple(zone.strip() for zone in zones.split(",")) if zones else ()
@@ -188,7 +188,7 @@ def _publish(
 
 def _replay(out: Output, trial: Path) -> None:
     """Work the log out anew; of all options only those of talking can take effect."""
-    from zfcal.online.drive_replay import replay
+    from zfcal.drive.replay import replay
 
     idle = {*_DRIVING, "duration_s", "publish", "publish_zones"}
     _refuse(idle, "--replay: the log says.")

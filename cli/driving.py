@@ -16,8 +16,8 @@ from .output import Output
 from .status_line import StatusLine, describe_drive
 
 if TYPE_CHECKING:
-    from zfcal.online.drive_events import DriveStatus
-    from zfcal.online.events import Event
+    from zfcal.drive.events import DriveStatus
+    from zfcal.stages.events import Event
 
     Told: TypeAlias = Event | DriveStatus
 
@@ -65,7 +65,7 @@ class DriveVoice:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        from zfcal.online.events import Note
+        from zfcal.stages.events import Note
 
         if error is not None:
             self.because = _WHY.get(type(error).__name__) or str(error) or type(error).__name__
@@ -96,7 +96,7 @@ class DriveVoice:
                 self._problem = error
 
     def _say(self, at_s: float, told: Told) -> None:
-        from zfcal.online.drive_events import DriveStatus, line_of
+        from zfcal.drive.events import DriveStatus, line_of
 
         if isinstance(told, DriveStatus):
             self._line.show(describe_drive(told))

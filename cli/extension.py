@@ -14,8 +14,8 @@ from .output import Output
 from .streams import STDIN
 
 if TYPE_CHECKING:
-    from zfcal.online.extend import ExtendOptions
-    from zfcal.online.opening import Task
+    from zfcal.stages.extend.extend import ExtendOptions
+    from zfcal.stages.opening import Task
 
 
 def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[ExtendOptions, Task]:
@@ -27,9 +27,9 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[ExtendO
         Two options contradict each other, or one could not take effect.
     """
     from zfcal.calibrate.task import Settings
-    from zfcal.online.extend import ExtendOptions
-    from zfcal.online.opening import Task
-    from zfcal.online.searching import CalibrateOptions
+    from zfcal.stages.calibrate.searching import CalibrateOptions
+    from zfcal.stages.extend.extend import ExtendOptions
+    from zfcal.stages.opening import Task
 
     _check_together(options, trials)
     calibration = CalibrateOptions(
@@ -61,8 +61,8 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 
 def extend_one(out: Output, root: Path, chosen: ExtendOptions, task: Task) -> None:
     """Extend the model of one trial and draw the findings' page anew."""
-    from zfcal.online.extend import extend
-    from zfcal.report.easel import Easel
+    from zfcal.report.diagnosis.easel import Easel
+    from zfcal.stages.extend.extend import extend
 
     tell = functools.partial(tell_and_warn, out, root)
     with Easel(ahead=False) as easel:

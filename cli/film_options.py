@@ -12,7 +12,7 @@ import click
 from .options import EXISTING, PLACE
 
 if TYPE_CHECKING:
-    from zfcal.vision.look import Look
+    from zfcal.virtual.images.look import Look
 
 Command = Callable[..., None]
 
@@ -33,7 +33,7 @@ def film_options(command: Command) -> Command:
         given = {"--look": look, "--draw": changes, "--photograph": photograph}
         film = None
         if video or video_file is not None:
-            from zfcal.online.film import FilmOptions
+            from zfcal.virtual.film import FilmOptions
 
             film = FilmOptions(
                 look=_look(look, changes),
@@ -82,7 +82,7 @@ def film_options(command: Command) -> Command:
 
 
 def _look(preset: str | None, changes: tuple[str, ...]) -> Look:
-    from zfcal.vision.look import USUAL, look_of
+    from zfcal.virtual.images.look import USUAL, look_of
 
     return look_of(preset or USUAL, dict(map(_change, changes)))
 

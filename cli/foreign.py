@@ -88,7 +88,7 @@ def foreign_options(command: Command) -> Command:
 
 
 def import_options(given: Mapping[str, Any]) -> dict[str, object]:
-    """Return them in SI units, as `zfcal.artifacts.foreign.ImportOptions` names them."""
+    """Return them in SI units, as `zfcal.readers.ImportOptions` names them."""
     # By identity: a first frame of 0 equals False, and is given.
     options = {
         key: value for key, value in given.items() if value is not None and value is not False

@@ -48,8 +48,8 @@ def command(
         zfcal import video.npy ring --format idtracker --mm-per-px 1.08 --origin 0,1024 --flip-y
         zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
     """
-    from zfcal.online.import_ import Source, import_tracks
-    from zfcal.online.opening import Task
+    from zfcal.stages.import_ import Source, import_tracks
+    from zfcal.stages.opening import Task
 
     what = Source(
         path=source,

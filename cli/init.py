@@ -65,8 +65,8 @@ def command(
         zfcal init trial --arena two-rooms --fish 4 --robot --fps 15
         zfcal init tank --radius-m 0.25 --fish 6 --source "shoal 3, Tuesday"
     """
-    from zfcal.online.opening import Task
-    from zfcal.online.setup import NewTrial, create_trial
+    from zfcal.stages.init import NewTrial, create_trial
+    from zfcal.stages.opening import Task
 
     if n_fish is None:
         raise click.UsageError("Missing option '--fish'.")

@@ -44,8 +44,8 @@ def command(out: Output, files: tuple[Path, ...], *, png: Path | None) -> None:
 def _draw(out: Output, path: Path, png: Path) -> None:
     from zfcal.artifacts.arenas import read_arena
     from zfcal.artifacts.atomic import write_whole
-    from zfcal.online.events import Made
-    from zfcal.report.arena_figure import draw_arena
+    from zfcal.report.figures.arena import draw_arena
+    from zfcal.stages.events import Made
 
     arena = read_arena(path)
     write_whole(png, lambda part: draw_arena(arena, part))

@@ -1,7 +1,7 @@
 """What a command says, and where: paths or one JSON document out, all talk to stderr.
 
 The only place that writes to the two streams. What happened comes as the
-events of `zfcal.online.events`.
+events of `zfcal.stages.events`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .progress import Bars
 
 if TYPE_CHECKING:
     from zfcal.errors import ZfcalError
-    from zfcal.online.events import Event, LeftOut
+    from zfcal.stages.events import Event, LeftOut
 
 EXIT_DAMAGED = 3
 EXIT_INTERRUPTED = 130
@@ -119,7 +119,7 @@ class Output:
 
     def tell(self, event: Event) -> None:
         """Take one event of a stage."""
-        from zfcal.online import events as of
+        from zfcal.stages import events as of
 
         match event:
             case of.Made():
@@ -172,7 +172,7 @@ class Output:
 
     def left_out(self, path: Path, problem: str) -> None:
         """Tell of a file that is damaged."""
-        from zfcal.online.events import LeftOut
+        from zfcal.stages.events import LeftOut
 
         self._leave_out(LeftOut(path=path, problem=problem))
 

@@ -14,8 +14,8 @@ from .streams import each_trial
 
 if TYPE_CHECKING:
     from zfcal.errors import DamagedError
-    from zfcal.online.opening import Task
-    from zfcal.online.streams import Work
+    from zfcal.stages.opening import Task
+    from zfcal.stages.streams import Work
 
 _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
 _HINT = "Make it again, or copy it again from where it was made."
@@ -40,7 +40,7 @@ def command(
         zfcal report trial*/
         zfcal report day1 day2 day3 --out together
     """
-    from zfcal.online.opening import Task
+    from zfcal.stages.opening import Task
 
     roots: dict[Path, None] = {}
 
@@ -57,9 +57,6 @@ def command(
 
 def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) -> None:
     """Write the report of trials, unless it is up to date."""
-    from zfcal.online.events import LeftOut, Made, Planned, UpToDate
-    from zfcal.online.opening import at_work
-    from zfcal.online.settled import settled
     from zfcal.report.page import (
         PAGE,
         report_files,
@@ -67,6 +64,9 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
         report_reason,
         write_report,
     )
+    from zfcal.stages.events import LeftOut, Made, Planned, UpToDate
+    from zfcal.stages.opening import at_work
+    from zfcal.stages.settled import settled
 
     def work() -> None:
         reason = report_reason(roots, folder) or ("forced" if task.force else None)
@@ -86,6 +86,6 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
 
 
 def _damage(out: Output) -> Callable[[DamagedError], None]:
-    from zfcal.online.events import LeftOut
+    from zfcal.stages.events import LeftOut
 
     return lambda error: out.tell(LeftOut(path=Path(), problem=str(error), hint=error.hint))

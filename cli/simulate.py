@@ -13,7 +13,7 @@ from .options import EXISTING, PLACE, makes_artifacts, new_trial_options, seed_o
 from .output import Output
 
 if TYPE_CHECKING:
-    from zfcal.online.film import FilmOptions
+    from zfcal.virtual.film import FilmOptions
 
 
 @click.command("simulate")
@@ -55,8 +55,8 @@ def command(
         zfcal simulate alone --model my.toml --arena two-rooms --fish 5 --duration 600
         zfcal simulate filmed --model trial/models/000120.toml --duration 2min --video
     """
-    from zfcal.online.opening import Task
-    from zfcal.online.simulate import SimulateOptions, simulate
+    from zfcal.stages.opening import Task
+    from zfcal.stages.simulate import SimulateOptions, simulate
 
     def work() -> None:
         options = SimulateOptions(model=model, duration_s=duration_s, seed=seed, **new)
@@ -65,7 +65,7 @@ def command(
             simulate(trial, options, out.tell, task=task)
             return
         # What draws images takes a third of a second to import.
-        from zfcal.online.filming import simulate_on_film
+        from zfcal.virtual.filming import simulate_on_film
 
         simulate_on_film(trial, options, film, out.tell, task=task)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 if TYPE_CHECKING:
     from rich.live import Live
 
-    from zfcal.online.drive_events import DriveStatus
+    from zfcal.drive.events import DriveStatus
     from zfcal.online.watch_events import StageStatus, Status
 
 

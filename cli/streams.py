@@ -13,8 +13,8 @@ import click
 from .output import Output
 
 if TYPE_CHECKING:
-    from zfcal.online.events import Tell
-    from zfcal.online.streams import Work
+    from zfcal.stages.events import Tell
+    from zfcal.stages.streams import Work
 
 STDIN = "-"
 
@@ -57,7 +57,7 @@ def trials_together(
     n_threads
         Simulations that can be done at the same time.
     """
-    from zfcal.online.side_by_side import at_once, side_by_side
+    from zfcal.stages.side_by_side import at_once, side_by_side
 
     places: dict[Path, Path] = {}
     for trial in trials:
@@ -68,19 +68,19 @@ def trials_together(
 
 
 def _one_of_many(path: Path, work: Callable[[Work, Tell], None], tell: Tell) -> None:
-    from zfcal.online.streams import work_at
+    from zfcal.stages.streams import work_at
 
     work(work_at(path), tell)
 
 
 def _one(path: Path, work: Callable[[Work], None]) -> None:
-    from zfcal.online.streams import work_at
+    from zfcal.stages.streams import work_at
 
     work(work_at(path))
 
 
 def _each_line(out: Output, stream: TextIO, work: Callable[[Work], None]) -> None:
-    from zfcal.online.streams import Work, work_of
+    from zfcal.stages.streams import Work, work_of
 
     roots: dict[Path, None] = {}
 

@@ -12,7 +12,7 @@ from .durations import seconds
 from .options import EXISTING, PLACE, Command
 
 if TYPE_CHECKING:
-    from zfcal.online.track_plan import TrackOptions
+    from zfcal.stages.track.plan import TrackOptions
 
 METHODS = ("shi-tomasi", "silhouette")
 
@@ -75,10 +75,10 @@ def tracking_options(command: Command) -> Command:
 
 def track_options(given: dict[str, Any]) -> TrackOptions:
     """Return what the options ask for."""
-    from zfcal.online.rig import CameraChoice
-    from zfcal.online.track_plan import Pictures, TrackOptions
-    from zfcal.vision.robot import LedOptions
-    from zfcal.vision.seen import TrackerOptions
+    from zfcal.stages.camera.rig import CameraChoice
+    from zfcal.stages.track.plan import Pictures, TrackOptions
+    from zfcal.tracking.robot import LedOptions
+    from zfcal.tracking.seen import TrackerOptions
 
     return TrackOptions(
         overhead=CameraChoice(

@@ -18,9 +18,9 @@ from .status_line import StatusLine, describe
 from .tracking import track_options
 
 if TYPE_CHECKING:
-    from zfcal.online.searching import CalibrateOptions
     from zfcal.online.watch_events import Happened, Status
     from zfcal.online.watch_stages import WatchOptions
+    from zfcal.stages.calibrate.searching import CalibrateOptions
 
 DEFAULT_BUDGET_S = 50.0
 
@@ -40,8 +40,8 @@ def watch_options(trial: Path, options: Mapping[str, Any]) -> WatchOptions:
     click.UsageError
         One belongs to a stage that does not run, or two contradict each other.
     """
-    from zfcal.online.analyse import AnalyseOptions
     from zfcal.online.watch_stages import WatchOptions
+    from zfcal.stages.analyse.analyse import AnalyseOptions
 
     stages = _stages(trial, options)
     _check_together(options, stages)
@@ -130,7 +130,7 @@ class Voice:
         self._say(told)
 
     def _say(self, told: Happened) -> None:
-        from zfcal.online import events as of
+        from zfcal.stages import events as of
 
         event = told.event
         if isinstance(event, of.LeftOut):

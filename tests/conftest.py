@@ -41,6 +41,7 @@ def pytest_configure(config):
     # A shell lets what it starts in the background ignore Ctrl-C, and so would what tests start.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    config.pluginmanager.register(_module("wandering"), "wandering")
     if config.getoption("numprocesses", None):
         # For the workers, and what they start: they are side by side already, and threads that
         # wait for a matrix of ten rows take the processor from the other worker.
@@ -128,7 +129,7 @@ def streaming():
 @pytest.fixture(scope="session")
 def drawn_tank():
     """Return the module that draws frames of fish whose positions are known."""
-    return _module("vision/drawn_tank")
+    return _module("tracking/drawn_tank")
 
 
 def _module(name):

@@ -18,7 +18,13 @@ import sys
 import time
 from importlib import import_module
 
-STAGES = ("analyse", "calibrate", "drive", "import_", "track")
+STAGES = (
+    "zfcal.drive.drive",
+    "zfcal.stages.analyse.analyse",
+    "zfcal.stages.calibrate.calibrate",
+    "zfcal.stages.import_",
+    "zfcal.stages.track.track",
+)
 
 
 class Forks:
@@ -105,7 +111,7 @@ def load():
     from warming import count, estimate, tracker
 
     for name in STAGES:
-        import_module(f"zfcal.online.{name}")
+        import_module(name)
     settings = import_module("zfcal.calibrate.task").Settings
     settings.__init__.__kwdefaults__.update(LESS)
     count(3)

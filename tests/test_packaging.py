@@ -22,6 +22,7 @@ PLACES = {"zfcal": "zfcal", "schemas": "zfcal/schemas", "cli": "zfcal_cli"}
 
 TOP = "The command line stands on top"
 DOWN = "Imports point down, and siblings do not know each other"
+STAGES = "A command's stage knows only what all stages share, and those before it"
 ROOT = "No module imports the package root"
 PURE = "What computes opens no file, no window and no port"
 SILENT = "Only the command line talks to a person"
@@ -29,12 +30,17 @@ SILENT = "Only the command line talks to a person"
 CROSSED = {
     "a unit that knows the arena": (DOWN, "zfcal/units.py", "from zfcal import arena"),
     "a model that knows the scores": (DOWN, "zfcal/model/extra.py", "import zfcal.behaviour"),
-    "a report that knows the stages": (DOWN, "zfcal/report/extra.py", "import zfcal.online"),
+    "a report that knows the stages": (DOWN, "zfcal/report/extra.py", "import zfcal.stages"),
     "a package that no layer names": (DOWN, "zfcal/extra/__init__.py", "X = 1"),
     "a library that knows its commands": (TOP, "zfcal/online/extra.py", "import zfcal_cli"),
     "a module that imports the root": (ROOT, "zfcal/tracks.py", "from zfcal import __version__"),
     "a statistic that opens a file": (PURE, "zfcal/behaviour/extra.py", "import pyarrow"),
-    "a stage that prints": (SILENT, "zfcal/online/extra.py", "import rich"),
+    "a stage that prints": (SILENT, "zfcal/stages/extra.py", "import rich"),
+    "a stage that knows a later one": (
+        STAGES,
+        "zfcal/stages/analyse/extra.py",
+        "import zfcal.stages.extend",
+    ),
 }
 """Ways to break the layers: the contract that must notice, a module, a line in it."""
 

@@ -58,7 +58,7 @@ def estimate():
 
 def tracker():
     """Do what a tracker does before its first frame."""
-    from zfcal.vision.fitting import prepare
+    from zfcal.tracking.fitting import prepare
 
     prepare()
 

@@ -19,9 +19,10 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import PoseWriter
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.settings import name_camera
-from zfcal.online import extend
-from zfcal.online.diagnose import KnownNoise
-from zfcal.report import arena_figure, gather, page
+from zfcal.report import gather, page
+from zfcal.report.figures import arena as arena_figure
+from zfcal.stages.diagnose.diagnose import KnownNoise
+from zfcal.stages.extend import extend
 from zfcal.tracks import FISH, AgentPose, FramePoses
 from zfcal_cli.main import run
 
@@ -247,11 +248,11 @@ def quick(make_diagnosis):
         patch.setattr(page, "render_page", lambda *_: "drawn")
         patch.setattr(gather, "_simulated", lambda *_: None)
         patch.setattr(arena_figure, "_GRID_POINTS", 8)
-        patch.setattr("zfcal.online.diagnose._engine", answer)
-        patch.setattr("zfcal.online.diagnose._estimate", estimate)
-        patch.setattr("zfcal.report.diagnosis_drawing.png_of", lambda _: b"drawn")
+        patch.setattr("zfcal.stages.diagnose.diagnose._engine", answer)
+        patch.setattr("zfcal.stages.diagnose.diagnose._estimate", estimate)
+        patch.setattr("zfcal.report.diagnosis.drawing.png_of", lambda _: b"drawn")
         patch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
-        patch.setattr("zfcal.report.easel.Easel.prepare", lambda _: None)
+        patch.setattr("zfcal.report.diagnosis.easel.Easel.prepare", lambda _: None)
         # Nobody pulls the plug.
         patch.setattr(os, "fsync", lambda _: None)
         yield

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from zfcal.online.cameras import read_camera
+from zfcal.stages.camera.cameras import read_camera
 
 CORNERS = ("50,450", "450,450", "450,50", "50,50")
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from zfcal.artifacts import foreign
+from zfcal import readers
 from zfcal.artifacts.lock import lock
 from zfcal_cli.foreign import FORMATS, import_options
 
@@ -43,7 +43,7 @@ def test_import_takes_options_in_the_units_of_people(zfcal):
 
 def test_the_formats_are_those_of_the_library():
     """Written out in the command, which must not load the library for its help."""
-    assert set(FORMATS) == set(foreign.FORMATS)
+    assert set(FORMATS) == set(readers.FORMATS)
 
 
 @pytest.mark.parametrize(
@@ -319,9 +319,9 @@ def test_a_demo_ends_with_figures(zfcal, monkeypatch):
     quick = Settings(
         population=4, generations=1, steps=20, n_confirmed=1, long_runs=1, long_s=20, n_windows=4
     )
-    monkeypatch.setattr("zfcal.online.demo.DURATION_S", 120.0)
-    monkeypatch.setattr("zfcal.online.demo.FPS", 5.0)
-    monkeypatch.setattr("zfcal.online.demo.SETTINGS", quick)
+    monkeypatch.setattr("zfcal.virtual.demo.DURATION_S", 120.0)
+    monkeypatch.setattr("zfcal.virtual.demo.FPS", 5.0)
+    monkeypatch.setattr("zfcal.virtual.demo.SETTINGS", quick)
     done = zfcal("demo", "here")
     assert done.code == 0
     assert "Figures: here/trial/report" in done.err

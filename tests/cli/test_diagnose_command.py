@@ -7,7 +7,7 @@ import pytest
 
 from zfcal.artifacts.validation import check
 from zfcal.diagnose.findings import Note
-from zfcal.online.diagnose import KnownNoise
+from zfcal.stages.diagnose.diagnose import KnownNoise
 
 
 @pytest.fixture
@@ -19,17 +19,17 @@ def answered(monkeypatch, make_diagnosis):
         questions.append(question)
         return make_diagnosis(question.arena, question.model)
 
-    monkeypatch.setattr("zfcal.online.diagnose._engine", engine)
+    monkeypatch.setattr("zfcal.stages.diagnose.diagnose._engine", engine)
     monkeypatch.setattr(
-        "zfcal.online.diagnose._estimate",
+        "zfcal.stages.diagnose.diagnose._estimate",
         lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
     )
     monkeypatch.setattr(
-        "zfcal.report.diagnosis_drawing.png_of", lambda picture: picture.title.encode()
+        "zfcal.report.diagnosis.drawing.png_of", lambda picture: picture.title.encode()
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
     # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.easel.Easel.prepare", lambda _easel: None)
+    monkeypatch.setattr("zfcal.report.diagnosis.easel.Easel.prepare", lambda _easel: None)
     return questions
 
 
@@ -84,7 +84,7 @@ def test_a_control_that_fires_is_a_warning(
     """Extending does not go on in silence either."""
     note = Note(name="controls", says="NEGATIVE CONTROL FIRES: a shuffled turn. Do not trust it.")
     monkeypatch.setattr(
-        "zfcal.online.diagnose._engine",
+        "zfcal.stages.diagnose.diagnose._engine",
         lambda question, _: make_diagnosis(question.arena, question.model, names=(), notes=(note,)),
     )
     found = zfcal(command, "trial")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from zfcal.artifacts.validation import check
-from zfcal.online.drive_events import DriveStatus, line_of
-from zfcal.online.events import Made, Note, Progress, Result
+from zfcal.drive.events import DriveStatus, line_of
+from zfcal.stages.events import Made, Note, Progress, Result
 from zfcal_cli import driving
 from zfcal_cli.driving import DriveVoice
 from zfcal_cli.main import Terminated

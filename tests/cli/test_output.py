@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from zfcal.errors import InputError, LockedError
-from zfcal.online.events import LeftOut, Made, Note, Planned, Progress, Result, UpToDate
+from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, Result, UpToDate
 from zfcal_cli.output import Output
 
 

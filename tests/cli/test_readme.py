@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.tables import read_tracks
-from zfcal.online.cameras import read_camera
+from zfcal.stages.camera.cameras import read_camera
 from zfcal.tracks import ROBOT
 
 

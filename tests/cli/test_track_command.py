@@ -10,9 +10,9 @@ import pytest
 
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.tables import read_tracks
-from zfcal.online.cameras import read_camera, write_camera
-from zfcal.vision.camera import Homography
-from zfcal.vision.seen import METHODS
+from zfcal.cameras.camera import Homography
+from zfcal.stages.camera.cameras import read_camera, write_camera
+from zfcal.tracking.seen import METHODS
 from zfcal_cli import tracking
 from zfcal_cli.main import run
 

@@ -159,7 +159,7 @@ def test_quantiles_of_chi_square_are_those_of_scipy(share, df):
 @pytest.mark.slow
 def test_a_tracker_starts_without_the_statistics_of_scipy():
     """Their import takes as long as that of all the rest."""
-    line = "import sys, zfcal.online.track; print('scipy.stats' in sys.modules)"
+    line = "import sys, zfcal.stages.track.track; print('scipy.stats' in sys.modules)"
 
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
 

@@ -5,8 +5,8 @@ import pytest
 
 from hidden.chain import Chain, filmed, measure, sampled
 from hidden.scenario import Scenario, make_trial, write_csv
-from zfcal.artifacts.foreign.csv import read_csv
-from zfcal.artifacts.foreign.options import ImportOptions
+from zfcal.readers.csv import read_csv
+from zfcal.readers.options import ImportOptions
 
 
 @pytest.fixture(scope="module")

@@ -51,7 +51,7 @@ from importlib import import_module
 for name in sys.argv[1:]:
     import_module(name)
 from zfcal.model.kernels.random import seeded
-from zfcal.vision._kernels import moments
+from zfcal.tracking._kernels import moments
 print(seeded._cache._cache_path, moments._cache._cache_path)
 """
 
@@ -140,7 +140,7 @@ def test_kernels_are_kept_and_a_second_start_is_warm(tmp_path):
 
 def test_other_kernels_keep_their_place_whoever_comes_first(tmp_path):
     """The tracker's stand beside their source, the model's in its folder, in either order."""
-    names = ["zfcal.model.compiled", "zfcal.vision._kernels"]
+    names = ["zfcal.model.compiled", "zfcal.tracking._kernels"]
     kept = {k: v for k, v in os.environ.items() if k not in {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"}}
     places = [
         subprocess.run(

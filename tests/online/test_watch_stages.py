@@ -7,14 +7,14 @@ import pytest
 
 from zfcal.artifacts.models import read_result
 from zfcal.artifacts.validation import check
-from zfcal.online.analyse import AnalyseOptions, analyse
-from zfcal.online.calibrate import calibrate
-from zfcal.online.events import LeftOut, Made, Note, say_nothing
-from zfcal.online.opening import Task
-from zfcal.online.recording import STRETCH_KEY
-from zfcal.online.skipping import skipped_ends, skipped_path
 from zfcal.online.watch_events import Happened, Skipped, Takes, told_by
 from zfcal.online.watch_stages import AnalyseStage, CalibrateStage, Turn, has_ended
+from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
+from zfcal.stages.calibrate.calibrate import calibrate
+from zfcal.stages.events import LeftOut, Made, Note, say_nothing
+from zfcal.stages.opening import Task
+from zfcal.stages.recording import STRETCH_KEY
+from zfcal.stages.skipping import skipped_ends, skipped_path
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_offline_after_a_skip_there_is_nothing_to_do(trial, quick, heard):
 def test_a_late_round_gets_what_is_left(trial, within, heard, monkeypatch, now_s, budget_s):
     """Of 60 s since its tracks were there, less 5 s, at least 5 s."""
     given = []
-    monkeypatch.setattr("zfcal.online.calibrate.calibrate", spy(given))
+    monkeypatch.setattr("zfcal.stages.calibrate.calibrate.calibrate", spy(given))
     stage(trial, within, now_s)(Turn(seen_s={120: 0.0}, due_after_s=60.0), heard.append)
     assert [event.budget_s for event in heard if isinstance(event, Takes)] == [budget_s]
     assert given == [budget_s]
@@ -101,7 +101,7 @@ def spy(given):
 
 def test_without_hurry_the_budget_is_whole(trial, within, heard, monkeypatch):
     """A recording that has ended waits for nobody."""
-    monkeypatch.setattr("zfcal.online.calibrate.calibrate", spy([]))
+    monkeypatch.setattr("zfcal.stages.calibrate.calibrate.calibrate", spy([]))
     stage(trial, within, 1000.0)(Turn(seen_s={120: 0.0}), heard.append)
     assert [event.budget_s for event in heard if isinstance(event, Takes)] == [50.0]
 
@@ -160,7 +160,7 @@ def test_a_recording_ends_where_its_last_segment_says_so(tmp_path, make_trial, m
     assert not has_ended(root, whole)
     said = {180: [0.0, 240.0]}
     monkeypatch.setattr(
-        "zfcal.online.recording.read_extra",
+        "zfcal.stages.recording.read_extra",
         lambda path: {STRETCH_KEY: said[int(path.stem)]} if int(path.stem) in said else {},
     )
     assert has_ended(root, whole)

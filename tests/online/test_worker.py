@@ -8,13 +8,13 @@ import time
 import pytest
 
 from zfcal.errors import ZfcalError
-from zfcal.online.events import Note
 from zfcal.online.worker import Done, Failure, Worker
+from zfcal.stages.events import Note
 
 JOB = """
 import logging, os, time
 from zfcal.errors import DamagedError, InputError, LockedError
-from zfcal.online.events import Note
+from zfcal.stages.events import Note
 
 def job(order, tell):
     if order == "error":

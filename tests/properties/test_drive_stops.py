@@ -2,7 +2,7 @@
 
 The pilot, the driver, its watchdog, the helper's logic, both writers and the simulated robot are
 the real ones; processes, threads and the serial port are played by one loop of 5 ms. What
-happens to real processes is in ``tests/online/test_drive_stops_really.py``.
+happens to real processes is in ``tests/drive/test_drive_stops_really.py``.
 """
 
 import dataclasses
@@ -24,11 +24,10 @@ from hypothesis.stateful import (
 )
 
 from zfcal.artifacts.models import read_model
+from zfcal.drive.clock import WallClock
+from zfcal.drive.driving import Crew, Driver
+from zfcal.drive.pilot import InForce, Manner
 from zfcal.model.packing import pack
-from zfcal.online.drive_clock import WallClock
-from zfcal.online.driving import Crew, Driver
-from zfcal.online.opening import open_trial
-from zfcal.online.pilot import InForce, Manner
 from zfcal.parameters import from_genes, to_genes
 from zfcal.robot import events
 from zfcal.robot.body import WHEEL_LIMIT_M_S, Pose
@@ -48,6 +47,7 @@ from zfcal.robot.lastword import (
 from zfcal.robot.motion import Goal
 from zfcal.robot.plausible import is_frame
 from zfcal.robot.simulated import SimulatedFishBot, Traits
+from zfcal.stages.opening import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 
@@ -58,7 +58,7 @@ def _load(folder, name):
     return module
 
 
-driven = _load("online/driven.py", "driven")
+driven = _load("drive/driven.py", "driven")
 counted = _load("robot/counted.py", "counted")
 
 STEP_S = 0.005

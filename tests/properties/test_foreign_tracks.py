@@ -8,11 +8,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis.extra.numpy import arrays
 
-from zfcal.artifacts.foreign import ImportOptions, import_foreign
-from zfcal.artifacts.foreign.assemble import assemble
-from zfcal.artifacts.foreign.pickles import load_plain
-from zfcal.artifacts.foreign.raw import Grid
 from zfcal.errors import InputError
+from zfcal.readers import ImportOptions, import_foreign
+from zfcal.readers.assemble import assemble
+from zfcal.readers.pickles import load_plain
+from zfcal.readers.raw import Grid
 
 HERE = Path("tracks.npy")
 

@@ -20,9 +20,9 @@ from zfcal.behaviour.located import locate
 from zfcal.behaviour.rows import statistics_to_rows
 from zfcal.behaviour.statistics import measure, measure_robot
 from zfcal.parameters import gene_names, natural
-from zfcal.report import theme
+from zfcal.report.figures import theme
+from zfcal.report.figures.panels import compose
 from zfcal.report.page import write_report
-from zfcal.report.panels import compose
 from zfcal.report.seen import see
 from zfcal.report.views import (
     FEATURE_NAMES,

@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from zfcal.report import theme
+from zfcal.report.figures import theme
 
 OPTIONS = (
     "--headless",

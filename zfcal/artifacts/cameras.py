@@ -1,7 +1,7 @@
-"""Camera files: what a calibration found, as TOML; what the numbers mean is in `zfcal.vision`.
+"""Camera files: what a calibration found, as TOML; `zfcal.cameras` says what the numbers mean.
 
 A file may hold a lens alone, a lens with a pose, or a homography. The older rig's XML
-is read in `older_cameras`; from file to camera goes `zfcal.online.cameras`.
+is read in `older_cameras`; from file to camera goes `zfcal.stages.camera.cameras`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,1 @@
-"""The stages of the pipeline on a trial directory, and how they are strung together.
-
-Each stage reads closed files and makes what is missing or stale. It tells what
-happens through a callback; nothing here prints.
-"""
+"""`zfcal watch`: what has arrived, which stage runs next, and the processes that work."""

@@ -18,7 +18,7 @@ from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import first_line
 from zfcal.artifacts.places import check_inside
 from zfcal.artifacts.reading import open_regular
-from zfcal.online.segments import STEP_S
+from zfcal.stages.segments import STEP_S
 from zfcal.trial import CONFIG_NAME, second_of
 
 SETTLED_S = 0.5

@@ -16,12 +16,8 @@ from typing import final
 
 from zfcal.artifacts.lock import lock
 from zfcal.errors import InputError, ZfcalError
-from zfcal.online import events as of
 from zfcal.online.arrivals import FOLDERS, Arrivals, Arrived, Signature, segment_ends
 from zfcal.online.hints import Hints, reason_to_poll
-from zfcal.online.opening import open_trial
-from zfcal.online.segments import segment_starts
-from zfcal.online.skipping import skipped_ends
 from zfcal.online.watch_events import (
     Happened,
     Skipped,
@@ -42,8 +38,12 @@ from zfcal.online.watch_stages import (
     WatchOptions,
     has_ended,
 )
-from zfcal.online.windows import window_ends
 from zfcal.online.worker import Done, Failure, Worker
+from zfcal.stages import events as of
+from zfcal.stages.opening import open_trial
+from zfcal.stages.segments import segment_starts
+from zfcal.stages.skipping import skipped_ends
+from zfcal.stages.windows import window_ends
 from zfcal.units import SEGMENT_S
 
 _TICK_S = 0.25

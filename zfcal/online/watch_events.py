@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from zfcal.online import events as of
+from zfcal.stages import events as of
 
 EVENT = "zfcal.watch-event/1"
 
@@ -130,27 +130,16 @@ WatchTell: TypeAlias = Callable[[Happened | Status], None]
 
 def told_by(stage: str, event: object, at_s: float) -> Happened | None:
     """Return what a stage's event is in the log; None for what is not logged."""
-    kind, values = said(event)
+    kind, values = _line_of(event)
     if not kind:
         return None
     spoken = event if isinstance(event, of.Event) else None
     return Happened(at_s=at_s, kind=kind, stage=stage, values=values, event=spoken)
 
 
-def said(event: object) -> tuple[str, dict[str, Any]]:
+def _line_of(event: object) -> tuple[str, dict[str, Any]]:
     """Return an event's kind in a line of JSON, and its values; an empty kind for none."""
     match event:
-        case of.Made():
-            return "made", {"path": str(event.path), "reason": event.reason}
-        case of.UpToDate():
-            return "up-to-date", {"path": str(event.path)}
-        case of.LeftOut():
-            words = {"path": str(event.path), "problem": event.problem, "hint": event.hint}
-            return "left-out", words
-        case of.Note():
-            return "note", {"text": event.text, "warning": event.warning}
-        case of.Result():
-            return "result", {"value": event.value}
         case Takes():
             return "takes", {"window_end_s": event.end_s, "budget_s": event.budget_s}
         case Skipped():
@@ -160,4 +149,4 @@ def said(event: object) -> tuple[str, dict[str, Any]]:
                 "because": event.because,
                 "path": None if event.path is None else str(event.path),
             }
-    return "", {}
+    return of.as_line(event)

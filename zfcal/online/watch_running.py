@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from zfcal.online import events as of
 from zfcal.online.arrivals import Signature
 from zfcal.online.watch_events import StageStatus
 from zfcal.online.watch_stages import NICENESS
 from zfcal.online.worker import Job, Worker
+from zfcal.stages import events as of
 
 
 @dataclass(slots=True, kw_only=True)

@@ -12,19 +12,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from zfcal.online.events import LeftOut, Planned, Tell, UpToDate
-from zfcal.online.opening import Task, open_trial
-from zfcal.online.recording import starts_between, stretch_of
-from zfcal.online.segments import Segments, segment_path, segment_starts
-from zfcal.online.skipping import write_skipped
 from zfcal.online.turns import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, Takes
 from zfcal.online.worker import Job
+from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
+from zfcal.stages.opening import Task, open_trial
+from zfcal.stages.recording import starts_between, stretch_of
+from zfcal.stages.segments import Segments, segment_path, segment_starts
+from zfcal.stages.skipping import write_skipped
 
 if TYPE_CHECKING:
-    from zfcal.online.analyse import AnalyseOptions
-    from zfcal.online.searching import CalibrateOptions
-    from zfcal.online.track_plan import TrackOptions
+    from zfcal.stages.analyse.analyse import AnalyseOptions
+    from zfcal.stages.calibrate.searching import CalibrateOptions
+    from zfcal.stages.track.plan import TrackOptions
 
 TRACK, ANALYSE, CALIBRATE = STAGES = ("track", "analyse", "calibrate")
 
@@ -90,7 +90,7 @@ class TrackStage:
 
     def __call__(self, _: object, tell: Tell) -> Outcome:
         """Track, or go on tracking."""
-        from zfcal.online.track import track
+        from zfcal.stages.track.track import track
 
         ear = _Ear(tell=tell)
         track(self.root, self.options, ear.hear)
@@ -107,7 +107,7 @@ class AnalyseStage:
 
     def __call__(self, turn: Turn, tell: Tell) -> Outcome:
         """Make what is missing or stale."""
-        from zfcal.online.analyse import analyse
+        from zfcal.stages.analyse.analyse import analyse
 
         ear = _Ear(tell=tell)
         task = Task(ends_s=frozenset(turn.seen_s))
@@ -141,7 +141,7 @@ class CalibrateStage:
 
         Without any window it gets ready for the first.
         """
-        from zfcal.online.calibrate import calibrate
+        from zfcal.stages.calibrate.calibrate import calibrate
 
         ear = _Ear(tell=tell)
         if not turn.seen_s:
@@ -171,7 +171,7 @@ class CalibrateStage:
     def _get_ready(self) -> None:
         """Have the simulator compiled, or loaded."""
         from zfcal.calibrate.search import warm_up
-        from zfcal.online.calibrate import make_group
+        from zfcal.stages.calibrate.calibrate import make_group
 
         warm_up(make_group(open_trial(self.root), self.options))
 
@@ -181,7 +181,7 @@ class CalibrateStage:
         A round with a budget is made once: made again it would differ, and it is
         the record of what the robot was driven by.
         """
-        from zfcal.online.calibrate import calibrate
+        from zfcal.stages.calibrate.calibrate import calibrate
 
         planned: dict[int, str] = {}
 

@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any, NoReturn, TypeAlias, final
 
 from zfcal.errors import DamagedError, LockedError, ZfcalError
-from zfcal.online.events import Event, Note, Tell
+from zfcal.stages.events import Event, Note, Tell
 
 Job: TypeAlias = Callable[[Any, Tell], Any]
 """What a stage does with an order; it must be known by its name to another process."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from zfcal.artifacts.lineage import to_json
-from zfcal.report.parameters_figure import values_of
+from zfcal.report.figures.parameters import values_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _COMPARED = {

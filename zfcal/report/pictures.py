@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from zfcal.report.arena_figure import arena_picture
-from zfcal.report.panels import Picture
-from zfcal.report.parameters_figure import parameters_picture
-from zfcal.report.scores_figure import scores_picture
-from zfcal.report.statistics_figure import statistics_picture
-from zfcal.report.tracks_figure import tracks_picture
+from zfcal.report.figures.arena import arena_picture
+from zfcal.report.figures.panels import Picture
+from zfcal.report.figures.parameters import parameters_picture
+from zfcal.report.figures.scores import scores_picture
+from zfcal.report.figures.statistics import statistics_picture
+from zfcal.report.figures.tracks import tracks_picture
 from zfcal.report.views import MODEL, ROBOT, SOCIAL, TrialView
 from zfcal.units import WINDOW_S
 

@@ -8,11 +8,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from zfcal.artifacts.lineage import Lineage, to_json
-from zfcal.report import theme
 from zfcal.report.contents import Section
+from zfcal.report.figures import theme
+from zfcal.report.figures.panels import Entry, Picture, entry_svg, panel_svg
 from zfcal.report.intervals import interval_tables
 from zfcal.report.numbers import lineage_table, tables, trials_table
-from zfcal.report.panels import Entry, Picture, entry_svg, panel_svg
 from zfcal.report.summary import gaps, statements
 from zfcal.report.trials_summary import gaps_of_trials, statements_of_trials
 from zfcal.report.views import TrialView

@@ -14,8 +14,8 @@ import numpy as np
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.contents import Statement
+from zfcal.report.figures.statistics import histogram_mean
 from zfcal.report.integration import NOT_COMPARED
-from zfcal.report.statistics_figure import histogram_mean
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Mark, TrialView
 
 _NEAR = 0.97

@@ -1,0 +1,187 @@
+"""From a file of another program to the segments of a trial."""
+
+import numpy as np
+import pytest
+
+from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.tables import read_tracks
+from zfcal.errors import InputError
+from zfcal.stages.events import Made, Note, UpToDate, say_nothing
+from zfcal.stages.import_ import Source, import_tracks
+from zfcal.stages.init import NewTrial, create_trial
+from zfcal.stages.opening import Task
+from zfcal.tracks import KINDS, ROBOT
+
+
+def write_csv(path, tracks, *, scale=1.0, shift=0.0):
+    """Write tracks as CSV, with positions scaled and shifted."""
+    lines = ["time_s,agent,kind,x_m,y_m"]
+    for row in range(len(tracks)):
+        x, y = scale * tracks.x_m[row] + shift, scale * tracks.y_m[row] + shift
+        kind = KINDS[tracks.kind[row]]
+        lines.append(f"{tracks.time_s[row]:.4f},{tracks.agent[row]},{kind},{x:.5f},{y:.5f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def csv_source(path, **options):
+    """Return a CSV file as what to import."""
+    return Source(path=path, format="csv", options=options)
+
+
+@pytest.fixture
+def trial(tmp_path):
+    """Return an empty trial: 3 fish and a robot in a square metre, 5 Hz."""
+    root = tmp_path / "trial"
+    new = NewTrial(n_fish=3, n_robots=1, fps=5.0, side_m=1.0)
+    create_trial(root, new, say_nothing)
+    return root
+
+
+@pytest.fixture
+def csv(tmp_path, wandering):
+    """Return 130 s of 3 fish and a robot as a CSV file."""
+    return write_csv(tmp_path / "tracks.csv", wandering(130, n_robots=1))
+
+
+def test_an_import_makes_closed_segments(trial, csv, heard, wandering):
+    """130 s are two minutes and a part, with the file's positions and kinds."""
+    import_tracks(trial, csv_source(csv), heard.append)
+    names = [event.path.name for event in heard if isinstance(event, Made)]
+    assert names == ["000000.parquet", "000060.parquet", "000120.parquet"]
+    found, wanted = read_tracks(trial / "tracks" / "000060.parquet"), wandering(130, n_robots=1)
+    rows = (wanted.time_s >= 60) & (wanted.time_s < 120)
+    assert np.allclose(found.x_m, wanted.x_m[rows], atol=1e-5)
+    assert np.array_equal(found.kind, wanted.kind[rows])
+
+
+def test_lineage_names_the_file_by_its_hash_and_not_its_place(trial, csv, heard):
+    """And the options that bear on the numbers."""
+    import_tracks(trial, csv_source(csv), heard.append)
+    lineage = read_lineage(trial / "tracks" / "000000.parquet")
+    assert list(lineage.inputs) == ["tracks.csv"]
+    assert (lineage.command, lineage.options) == ("import", {"format": "csv", "fps": 5.0})
+
+
+def test_the_second_import_does_nothing(trial, csv, heard, read_all):
+    """Nor does it read the file's rows again."""
+    import_tracks(trial, csv_source(csv), heard.append)
+    before = read_all(trial)
+    heard.clear()
+    import_tracks(trial, csv_source(csv), heard.append)
+    assert {type(event) for event in heard} == {UpToDate}
+    assert len(heard) == 3
+    assert read_all(trial) == before
+
+
+def test_an_import_that_was_killed_is_finished(trial, csv, heard, read_all):
+    """Its last segments are missing, the first ones up to date."""
+    import_tracks(trial, csv_source(csv), heard.append)
+    whole = read_all(trial)
+    (trial / "tracks" / "000120.parquet").unlink()
+    import_tracks(trial, csv_source(csv), heard.append)
+    assert read_all(trial) == whole
+
+
+def test_a_changed_file_is_imported_anew(trial, csv, heard, wandering):
+    """The reason names it."""
+    import_tracks(trial, csv_source(csv), heard.append)
+    heard.clear()
+    write_csv(csv, wandering(130, n_robots=1, seed=2))
+    import_tracks(trial, csv_source(csv), heard.append)
+    reasons = {event.reason for event in heard if isinstance(event, Made)}
+    assert reasons == {"input tracks.csv changed"}
+
+
+def test_a_rate_that_is_not_the_trial_s_is_refused(trial, csv, heard):
+    """Both are named."""
+    with pytest.raises(InputError, match=r"fps is 5 Hz, --fps says 15"):
+        import_tracks(trial, csv_source(csv, fps=15.0), heard.append)
+    import_tracks(trial, csv_source(csv, fps=5.0), heard.append)
+
+
+def test_tracks_that_all_lie_outside_are_refused_with_both_ranges(
+    trial, tmp_path, heard, wandering
+):
+    """Somebody forgot the origin; nothing is written."""
+    far = write_csv(tmp_path / "far.csv", wandering(70), shift=3.0)
+    with pytest.raises(InputError, match=r"span x 3\.\d+ to 3\.\d+ m") as error:
+        import_tracks(trial, csv_source(far), heard.append)
+    assert "--origin" in error.value.hint
+    assert not (trial / "tracks").exists()
+
+
+def test_tracks_that_lie_outside_in_part_are_counted(trial, tmp_path, heard, wandering):
+    """Shifted by half a metre about half the walk leaves the tank: a warning with the share."""
+    off = write_csv(tmp_path / "off.csv", wandering(70, n_robots=1), shift=0.5)
+    import_tracks(trial, csv_source(off), heard.append)
+    warnings = [event.text for event in heard if isinstance(event, Note) and event.warning]
+    assert len(warnings) == 1
+    assert "positions lie outside the arena" in warnings[0]
+    assert "--flip-y" in warnings[0]
+
+
+def test_positions_just_outside_are_counted_as_at_the_wall(trial, tmp_path, heard):
+    """One of two rows lies 5 mm outside the square metre: that is said, and no warning."""
+    path = tmp_path / "near.csv"
+    path.write_text("time_s,agent,x_m,y_m\n0.0,0,0.5,0.5\n0.2,0,1.005,0.5\n")
+    import_tracks(trial, csv_source(path), heard.append)
+    (note,) = [e for e in heard if isinstance(e, Note) and "positions lie" in e.text]
+    assert note.text.startswith("1 of 2 positions lie up to 10 mm outside")
+    assert not note.warning
+
+
+def test_robots_can_come_from_a_file_of_their_own(trial, tmp_path, heard, wandering):
+    """All of its agents are robots, under ids that no fish has."""
+    fish = write_csv(tmp_path / "fish.csv", wandering(70))
+    robot = write_csv(tmp_path / "robot.csv", wandering(70, n_fish=1, seed=5))
+    source = Source(path=fish, format="csv", options={}, robot_tracks=robot)
+    import_tracks(trial, source, heard.append)
+    found = read_tracks(trial / "tracks" / "000000.parquet")
+    assert set(found.agent[found.kind == ROBOT]) == {3}
+    assert list(read_lineage(trial / "tracks" / "000000.parquet").inputs) == [
+        "fish.csv",
+        "robot.csv",
+    ]
+
+
+def test_a_robot_in_a_trial_without_one_is_refused(tmp_path, csv, heard):
+    """trial.toml says who is in the tank."""
+    root = tmp_path / "alone"
+    create_trial(root, NewTrial(n_fish=3, fps=5.0, side_m=1.0), heard.append)
+    with pytest.raises(InputError, match="robot"):
+        import_tracks(root, csv_source(csv), heard.append)
+
+
+def test_without_a_format_the_file_s_looks_decide(trial, csv, tmp_path, heard):
+    """What was taken is said; what looks like nothing is refused."""
+    import_tracks(trial, Source(path=csv, format=None, options={}), heard.append)
+    assert any("--format csv" in getattr(event, "text", "") for event in heard)
+    (tmp_path / "poem.txt").write_text("Tyger Tyger\n")
+    poem = Source(path=tmp_path / "poem.txt", format=None, options={})
+    with pytest.raises(InputError, match="no known format"):
+        import_tracks(trial, poem, heard.append, task=Task(force=True))
+
+
+def test_into_no_trial_is_refused_with_the_command_that_makes_one(tmp_path, csv, heard):
+    """An import does not guess the arena."""
+    with pytest.raises(InputError, match="not a trial") as error:
+        import_tracks(tmp_path / "nowhere", csv_source(csv), heard.append)
+    assert "zfcal init" in error.value.hint
+
+
+def test_a_dry_run_says_why_and_writes_nothing(trial, csv, heard):
+    """Three segments are missing."""
+    import_tracks(trial, csv_source(csv), heard.append, task=Task(dry_run=True))
+    planned = [event.reason for event in heard if hasattr(event, "reason")]
+    assert planned == ["missing"] * 3
+    assert not (trial / "tracks").exists()
+
+
+def test_fewer_agents_than_the_trial_states_are_told(trial, tmp_path, heard, wandering):
+    """Three fish and no robot into a trial of three fish and a robot: only the robot is missed."""
+    source = write_csv(tmp_path / "fish.csv", wandering(70))
+    import_tracks(trial, csv_source(source), heard.append)
+    (warning,) = [event.text for event in heard if isinstance(event, Note) and event.warning]
+    assert "no frame holds more than 0 robots" in warning
+    assert "states 1" in warning

@@ -1,0 +1,100 @@
+"""Reading segments: each once, and no more of them in memory than is bearable."""
+
+import pytest
+
+from zfcal.behaviour.located import join
+from zfcal.behaviour.statistics import measure
+from zfcal.errors import InputError
+from zfcal.stages import segments as module
+from zfcal.stages.segments import Segments, segment_hashes, segment_path
+from zfcal.tracks import FISH
+
+STARTS = [0, 60, 120, 180]
+
+
+@pytest.fixture
+def reads(monkeypatch):
+    """Return a list that hears which segments are read from the disk."""
+    heard, locate = [], module._locate
+
+    def watch(opened, path, start_s):
+        heard.append(start_s)
+        return locate(opened, path, start_s)
+
+    monkeypatch.setattr(module, "_locate", watch)
+    return heard
+
+
+def pooled(segments, root, starts, heard):
+    """Return what a reader pools of some segments."""
+    opened = segments.open(root)
+    return segments.pool(opened, segment_hashes(root, starts), heard.append)
+
+
+def fish_of(root, starts):
+    """Return what the fish of some segments did, all points at once."""
+    segments = Segments()
+    opened = segments.open(root)
+    points = join([segments.read(opened, start) for start in starts])
+    return measure(points.of_kind(FISH), opened.arena)
+
+
+def test_a_longer_pool_reads_only_what_is_new(make_trial, heard, reads):
+    """Window after window, every segment is read once."""
+    root, segments = make_trial(seconds=240, n_robots=1), Segments()
+    for n in (2, 3, 4):
+        found = pooled(segments, root, STARTS[:n], heard)
+        assert (found.pool.fish().distance == fish_of(root, STARTS[:n]).distance).all()
+    assert [reads.count(start) for start in STARTS] == [1 + 3, 1 + 3, 1 + 2, 1 + 1]
+
+
+@pytest.mark.parametrize("starts", [STARTS[:2], STARTS[1:], [0, 60, 180]])
+def test_another_stretch_is_pooled_anew(make_trial, heard, starts):
+    """A shorter one, one that begins later, one with a gap."""
+    root, segments = make_trial(seconds=240), Segments()
+    pooled(segments, root, STARTS, heard)
+    found = pooled(segments, root, starts, heard)
+    assert list(found.hashes) == starts
+    assert (found.pool.fish().transition == fish_of(root, starts).transition).all()
+
+
+def test_a_segment_that_has_changed_is_not_in_the_pool_any_more(make_trial, heard):
+    """Its hash is another: what was pooled with it is thrown away."""
+    root, other, segments = make_trial("a"), make_trial("b", seed=2), Segments()
+    before = pooled(segments, root, STARTS[:2], heard).pool.fish()
+    segment_path(root, 60).write_bytes(segment_path(other, 60).read_bytes())
+    after = pooled(segments, root, STARTS, heard).pool.fish()
+    assert (after.distance == fish_of(root, STARTS).distance).all()
+    assert (before.distance != fish_of(root, STARTS[:2]).distance).any()
+
+
+def test_a_damaged_segment_is_told_each_time_and_counts_nothing(make_trial, heard):
+    """Until it is mended; whoever asks again hears of it again."""
+    root, segments = make_trial(seconds=240), Segments()
+    path = segment_path(root, 60)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100])
+    for n in (3, 4):
+        found = pooled(segments, root, STARTS[:n], heard)
+        assert list(found.problems) == [60]
+    assert [event.path for event in heard] == [path, path]
+    path.write_bytes(whole)
+    assert pooled(segments, root, STARTS, heard).problems == {}
+    assert len(heard) == 2
+
+
+def test_no_more_points_are_remembered_than_is_bearable(make_trial, reads, monkeypatch):
+    """Of four segments the last three stay, however little memory they may take."""
+    monkeypatch.setattr(module, "_REMEMBERED", 1)
+    root, segments = make_trial(seconds=240), Segments()
+    opened = segments.open(root)
+    for start in (*STARTS, *STARTS[1:], 0):
+        segments.read(opened, start)
+    assert reads == [*STARTS, 0]
+
+
+def test_a_segment_that_is_missing_has_no_hash(make_trial):
+    """It is named."""
+    root = make_trial(seconds=120)
+    with pytest.raises(InputError, match=r"tracks/000120.parquet: no such file"):
+        segment_hashes(root, [0, 120])

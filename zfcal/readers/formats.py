@@ -1,0 +1,213 @@
+"""The formats that can be imported, and what each needs to be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from zfcal.artifacts.limits import check_size
+from zfcal.artifacts.reading import open_regular, unreadable
+from zfcal.errors import InputError
+from zfcal.readers.assemble import Imported
+from zfcal.readers.cats import read_cats
+from zfcal.readers.csv import read_csv
+from zfcal.readers.deeplabcut import read_deeplabcut
+from zfcal.readers.guess import guess_format
+from zfcal.readers.idtracker import read_idtracker
+from zfcal.readers.mot import read_mot
+from zfcal.readers.movement import read_movement
+from zfcal.readers.options import ImportOptions, given
+from zfcal.readers.sleap import read_sleap
+from zfcal.readers.text import check_unpacked
+from zfcal.readers.trajectorytools import read_trajectorytools
+from zfcal.readers.trex import read_trex
+from zfcal.tracks import Tracks
+
+Reader = Callable[[Path, ImportOptions], Imported]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A foreign format.
+
+    Parameters
+    ----------
+    name
+        As in ``--format``.
+    reads
+        Program and files, in words.
+    units
+        Units that the file has: ``m``, ``cm`` or ``px``; pixels need a scale.
+    missing
+        How a missing position is written.
+    reader
+        Reads a file.
+    options
+        The `SPECIAL` import options that it can make use of.
+    folder
+        Whether it reads a folder of files.
+    """
+
+    name: str
+    reads: str
+    units: tuple[str, ...]
+    missing: str
+    reader: Reader
+    options: frozenset[str] = field(default_factory=frozenset)
+    folder: bool = False
+
+
+_POSES = frozenset({"keypoint", "body_axis"})
+
+_ALL = (
+    Format(
+        name="csv",
+        reads="a row per agent and frame: time_s, agent, x_m, y_m (.csv)",
+        units=("m", "px"),
+        missing="empty or NaN",
+        reader=read_csv,
+        options=frozenset({"columns", "first_frame"}),
+    ),
+    Format(
+        name="cats",
+        reads="CATS2, the older rig: positions-*.txt and trajectory .xml",
+        units=("m",),
+        missing="NaN, or exactly (0, 0)",
+        reader=read_cats,
+    ),
+    Format(
+        name="trex",
+        reads="TRex: .npz or .csv of an individual, or the folder of all",
+        units=("cm", "px"),
+        missing="infinity, or missing = 1",
+        reader=read_trex,
+        options=frozenset({"keypoint"}),
+        folder=True,
+    ),
+    Format(
+        name="idtracker",
+        reads="idtracker.ai .h5, .npy, .csv; idTracker trajectories*.txt",
+        units=("px",),
+        missing="NaN",
+        reader=read_idtracker,
+    ),
+    Format(
+        name="trajectorytools",
+        reads="trajectorytools .npy: arrays or dictionaries",
+        units=("px",),
+        missing="NaN",
+        reader=read_trajectorytools,
+    ),
+    Format(
+        name="mot",
+        reads="MOTChallenge .csv: frame, id, x, y, width, height, confidence",
+        units=("px",),
+        missing="no row, NaN, or x = y = -1 without a box",
+        reader=read_mot,
+        options=frozenset({"box", "first_frame"}),
+    ),
+    Format(
+        name="sleap",
+        reads="SLEAP analysis .h5",
+        units=("px",),
+        missing="NaN",
+        reader=read_sleap,
+        options=_POSES,
+    ),
+    Format(
+        name="deeplabcut",
+        reads="DeepLabCut .csv and .h5, one animal or several",
+        units=("px",),
+        missing="empty or NaN",
+        reader=read_deeplabcut,
+        options=_POSES,
+    ),
+    Format(
+        name="movement",
+        reads="movement .nc (netCDF): poses or boxes",
+        units=("px", "m", "cm", "mm"),
+        missing="NaN",
+        reader=read_movement,
+        options=_POSES,
+    ),
+)
+
+_SHARED = {"idtracker", "trajectorytools"}
+"""Two formats with files in common."""
+
+FORMATS: dict[str, Format] = {known.name: known for known in _ALL}
+"""Every format by the name that ``--format`` takes."""
+
+
+def read_foreign(path: Path, name: str, options: ImportOptions) -> Tracks:
+    """Return the tracks of a foreign file, in metres.
+
+    Parameters
+    ----------
+    path
+        A file, or a folder where the format has one.
+    name
+        A key of `FORMATS`.
+    options
+        What the file does not tell.
+
+    Raises
+    ------
+    InputError
+        The format is unknown, an option cannot take effect, or the file is
+        wrong: the message says where, what was expected and what was found.
+    """
+    return import_foreign(path, name, options).tracks
+
+
+def import_foreign(path: Path, name: str, options: ImportOptions) -> Imported:
+    """Return the tracks of a foreign file with notes on what a person should know.
+
+    Parameters
+    ----------
+    path, name, options
+        As for `read_foreign`.
+    """
+    chosen = _chosen(path, name)
+    useless = given(options) - chosen.options
+    if useless:
+        takes = ", ".join(sorted(chosen.options)) or "none such"
+        raise InputError(
+            f"{path}: {', '.join(sorted(useless))} cannot take effect: format {name!r} takes "
+            f"{takes}."
+        )
+    try:
+        return chosen.reader(path, options)
+    except InputError as error:
+        other = guess_format(path)
+        if other not in {None, name} and {other, name} != _SHARED:
+            error.hint = f"{error.hint} The file looks like --format {other}.".lstrip()
+        raise
+
+
+def _chosen(path: Path, name: str) -> Format:
+    if not path.exists():
+        raise InputError(f"{path}: no such file.")
+    if name not in FORMATS:
+        other = guess_format(path)
+        raise InputError(
+            f"Format {name!r} is unknown, expected one of {', '.join(FORMATS)}.",
+            hint=f"{path} looks like --format {other}" if other else "",
+        )
+    chosen = FORMATS[name]
+    if path.is_dir() and not chosen.folder:
+        raise InputError(f"{path}: expected a file for format {name!r}, got a folder.")
+    if not path.is_dir():
+        _check_file(path)
+    return chosen
+
+
+def _check_file(path: Path) -> None:
+    """Refuse what the readers, which take names, would wait for or be drowned by."""
+    try:
+        with open_regular(path) as file:
+            check_size(path, file.seek(0, 2))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    check_unpacked(path)

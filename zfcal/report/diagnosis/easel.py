@@ -1,0 +1,117 @@
+"""Who draws a diagnosis: processes that load what drawing needs while it is computed."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import threading
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from multiprocessing import active_children, get_context, parent_process
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from zfcal.diagnose.document import Sheet
+from zfcal.report.diagnosis import page as diagnosis_page
+
+_HANDS = 2
+"""One for the PNGs, one for the page."""
+
+
+class Easel:
+    """Draws pages of findings; a context, at whose end its processes are gone.
+
+    Parameters
+    ----------
+    ahead
+        Whether processes get ready when they are told that there will be something to draw.
+    """
+
+    def __init__(self, *, ahead: bool = True) -> None:
+        self._ahead = ahead
+        self._pool: ProcessPoolExecutor | None = None
+        self._hands: set[BaseProcess] = set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._let_go(at_once=kind is not None)
+
+    def prepare(self) -> None:
+        """Start the processes, unless they are there: a page will be drawn in a while."""
+        if self._ahead and self._pool is None:
+            # Where none can be had, the page is drawn without.
+            self._ahead = self._begin()
+
+    def reason(self, folder: Path, findings_sha256: str) -> str | None:
+        """Return why a page must be drawn, as `page.reason`."""
+        return diagnosis_page.reason(folder, findings_sha256)
+
+    def files(self, folder: Path) -> list[Path]:
+        """Return the page that is there and its pictures."""
+        return diagnosis_page.files(folder)
+
+    def write(self, folder: Path, sheet: Sheet) -> list[Path]:
+        """Draw pictures and page as `page.write` does."""
+        if self._pool is not None:
+            try:
+                return diagnosis_page.write(folder, sheet, self._pool)
+            except BrokenExecutor:
+                # One was killed, for want of memory, say: it can be done here as well.
+                self._let_go(at_once=True)
+        return diagnosis_page.write(folder, sheet)
+
+    def _begin(self) -> bool:
+        """Start the processes; whether they could be."""
+        others = set(active_children())
+        # An interrupt from the keyboard goes to all processes. Those that draw say nothing of it,
+        # whoever began them does; they are born with it held back.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            spawn = get_context("spawn")
+            self._pool = ProcessPoolExecutor(_HANDS, mp_context=spawn, initializer=_get_ready)
+            # Each starts when there is something to do and nobody at leisure.
+            for _ in range(_HANDS):
+                self._pool.submit(int)
+        except OSError:
+            begun = False
+        else:
+            begun = True
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            self._hands = set(active_children()) - others
+        if not begun:
+            self._let_go(at_once=True)
+        return begun
+
+    def _let_go(self, *, at_once: bool) -> None:
+        if self._pool is None:
+            return
+        if at_once:
+            # Nobody waits until they have loaded what will not be needed.
+            for hand in self._hands:
+                hand.terminate()
+        self._pool.shutdown(cancel_futures=True)
+        self._pool = None
+
+
+def _get_ready() -> None:
+    """Load what drawing needs, and end with the process that one draws for."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    importlib.import_module("zfcal.report.diagnosis.drawing")
+
+
+def _end_with_parent() -> None:
+    # Without that one who waits for work would wait for good.
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,204 @@
+"""Pictures of one finding: where in the tank, when, in whom, and by distance, speed or time."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.diagnose.pictured import Curve, Parts, Pictured
+from zfcal.report.figures import theme
+from zfcal.report.figures.arena import arena_size_in, paint_walls
+from zfcal.report.figures.panels import PANEL_IN, Entry, Panel, Picture
+
+Floats = NDArray[np.float64]
+
+_WIDTH_IN = 3.2
+_BAR_IN = 0.65
+_FEWEST_STEPS = 10
+"""A square in which fewer steps began is left empty: its mean is chance."""
+
+_DEEPEST = 0.98
+"""The squares above this quantile share the deepest colour."""
+
+WITHOUT, WITH, MEASURED = theme.MODEL, theme.GROUP, theme.FISH
+
+
+def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) -> Picture:
+    """Return the picture of one finding.
+
+    Parameters
+    ----------
+    name
+        The effect's.
+    number
+        Its place among the findings, from 1.
+    pictured
+        What to show.
+    arena
+        The tank.
+    """
+    width_in, height_in = arena_size_in(arena, _WIDTH_IN)
+    place = Panel(
+        title="Where",
+        alt=_describe_place(name, pictured),
+        draw=partial(_draw_place, pictured=pictured, arena=arena),
+        size_in=(width_in + _BAR_IN, height_in),
+    )
+    made = [
+        place,
+        _parts_panel("When", pictured.minutes, _draw_minutes, "minute"),
+        _curve_panel(pictured.curve),
+        _parts_panel("In whom", pictured.agents, _draw_agents, "track"),
+    ]
+    return Picture(
+        name=f"{number}-{slug(name)}",
+        title=f"{number}. {name}",
+        short=name,
+        panels=[panel for panel in made if panel is not None],
+        columns=2,
+        key=(
+            Entry(label="measured", colour=MEASURED, mark="points", marker="o"),
+            Entry(label="model without the effect", colour=WITHOUT, mark="dash", marker="^"),
+            Entry(label="model with it", colour=WITH, mark="line", marker="D"),
+            Entry(label="95 % of a right model", colour=theme.BAND, mark="band"),
+        ),
+        note="The score tells how much more of the effect the fish show than the model expects: "
+        "zero where the model is right, in standard deviations of a single step. The map is of "
+        "the model without the effect.",
+    )
+
+
+def slug(name: str) -> str:
+    """Return a name that can be part of a file's.
+
+    >>> slug("generic:heading:wall")
+    'generic-heading-wall'
+    """
+    return re.sub(r"[^a-zA-Z0-9]+", "-", name).strip("-").lower()
+
+
+def shown_places(pictured: Pictured) -> Floats:
+    """Return the map's scores, NaN in squares with too few steps, shape (row, column)."""
+    return np.where(pictured.place_n >= _FEWEST_STEPS, pictured.place, np.nan)
+
+
+def _describe_place(name: str, pictured: Pictured) -> str:
+    scores = shown_places(pictured)
+    if np.isnan(scores).all():
+        return f"Map of the tank: too few steps to show where {name} is missing."
+    row, column = np.unravel_index(int(np.nanargmax(np.abs(scores))), scores.shape)
+    x_m, y_m = (
+        pictured.origin_m[axis] + (index + 0.5) * pictured.cell_m
+        for axis, index in ((0, column), (1, row))
+    )
+    return (
+        f"Map of the tank: the score of {name} is largest in size, {scores[row, column]:.2f}, "
+        f"at x = {x_m:.2f} m, y = {y_m:.2f} m."
+    )
+
+
+def _draw_place(axes: Axes, *, pictured: Pictured, arena: Arena) -> None:
+    axes.grid(visible=False)
+    paint_walls(axes, arena)
+    scores = shown_places(pictured)
+    rows, columns = scores.shape
+    (x0, y0), cell_m = pictured.origin_m, pictured.cell_m
+    known = np.abs(scores[~np.isnan(scores)])
+    limit = float(np.quantile(known, _DEEPEST)) if known.size else 1.0
+    image = axes.imshow(
+        np.ma.masked_invalid(scores),
+        extent=(x0, x0 + columns * cell_m, y0, y0 + rows * cell_m),
+        origin="lower",
+        cmap="RdBu_r",
+        vmin=-max(limit, 1e-3),
+        vmax=max(limit, 1e-3),
+        interpolation="nearest",
+        zorder=1,
+    )
+    image.set_clip_path(axes.patches[0])
+    # Inside the axes' own room: a bar beside them would be squeezed out where scales are equal.
+    place = axes.inset_axes((1.02, 0.2, 0.035, 0.6))
+    bar = axes.figure.colorbar(image, cax=place, extend="both", ticks=MaxNLocator(4))
+    bar.set_label("score (0 = as expected)")
+    bar.outline.set_visible(False)
+
+
+def _parts_panel(title: str, parts: Parts, draw: Callable[..., None], unit: str) -> Panel | None:
+    known = parts.n > 0
+    if not known.any():
+        return None
+    said = []
+    for name, scores in (("without", parts.before), ("with", parts.after)):
+        outside = int((np.abs(scores[known]) > parts.half_width[known]).sum())
+        said.append(f"{outside} {name} the effect")
+    return Panel(
+        title=title,
+        alt=f"Score by {unit}, {int(known.sum())} in all; outside a right model's 95 %: "
+        f"{' and '.join(said)}.",
+        draw=partial(draw, parts=parts),
+    )
+
+
+def _draw_minutes(axes: Axes, *, parts: Parts) -> None:
+    minute = parts.label + 0.5
+    half = parts.half_width
+    axes.fill_between(minute, -half, half, color=theme.BAND, alpha=0.3, lw=0, step="mid")
+    axes.axhline(0, color=theme.MUTED, lw=0.8)
+    axes.plot(minute, parts.before, color=WITHOUT, ls="--", marker="^", zorder=3)
+    axes.plot(minute, parts.after, color=WITH, marker="D", zorder=3)
+    axes.set(xlabel="minute of the trial", ylabel="score")
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+
+
+def _draw_agents(axes: Axes, *, parts: Parts) -> None:
+    at = np.arange(len(parts.label))
+    half = parts.half_width
+    axes.use_sticky_edges = False
+    axes.bar(at, 2 * half, bottom=-half, width=0.7, color=theme.BAND, alpha=0.3, lw=0)
+    axes.axhline(0, color=theme.MUTED, lw=0.8)
+    axes.plot(at, parts.before, color=WITHOUT, ls="none", marker="^", ms=6, zorder=3)
+    axes.plot(at, parts.after, color=WITH, ls="none", marker="D", ms=5, zorder=3)
+    axes.set(xlabel="track", ylabel="score", xlim=(-0.6, len(at) - 0.4))
+    theme.name_ticks(axes, at, [str(label) for label in parts.label])
+
+
+def _curve_panel(curve: Curve) -> Panel | None:
+    known = ~np.isnan(curve.observed)
+    if not known.any():
+        return None
+    errors = [
+        float(np.sqrt(np.nanmean((curve.observed - expected)[known] ** 2)))
+        for expected in (curve.before, curve.after)
+    ]
+    return Panel(
+        title=f"By {_without_unit(curve.cue_name)}",
+        alt=f"{curve.response_name} against {curve.cue_name}: the model misses what was measured "
+        f"by {errors[0]:.3g} without the effect and by {errors[1]:.3g} with it (root mean square).",
+        draw=partial(_draw_curve, curve=curve),
+        size_in=PANEL_IN,
+    )
+
+
+def _draw_curve(axes: Axes, *, curve: Curve) -> None:
+    axes.plot(curve.cue, curve.before, color=WITHOUT, ls="--", marker="^")
+    axes.plot(curve.cue, curve.after, color=WITH, marker="D")
+    axes.plot(curve.cue, curve.observed, color=MEASURED, ls="none", marker="o", ms=6, zorder=4)
+    axes.set(xlabel=_lines(curve.cue_name, 42), ylabel=_lines(curve.response_name, 28))
+    axes.xaxis.set_major_locator(MaxNLocator(6))
+
+
+def _without_unit(name: str) -> str:
+    return re.sub(r" \([^()]*\)$", "", name)
+
+
+def _lines(text: str, width: int) -> str:
+    """Return a label on lines that a panel has room for."""
+    return "\n".join(textwrap.wrap(text, width, break_long_words=False))

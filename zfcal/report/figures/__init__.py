@@ -1,0 +1,1 @@
+"""One figure a file, and what they share: panels and colours."""

@@ -1,0 +1,265 @@
+"""What the animals did beside what the calibrated model does: D, W, O and T."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import PowerNorm
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.behaviour.histograms import bin_edges, frequencies, similarity
+from zfcal.behaviour.statistics import Statistics
+from zfcal.report.figures import theme
+from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
+
+Floats = NDArray[np.float64]
+Limits = tuple[float, float]
+
+FISH_CASE = "fish"
+MODEL_CASE = "model"
+ROBOT_CASE = "robot"
+COLOURS = MappingProxyType(
+    {FISH_CASE: theme.FISH, MODEL_CASE: theme.MODEL, ROBOT_CASE: theme.ROBOT}
+)
+_MANY_ZONES = 5
+_READING = (
+    "Each bar is the share of all observations in its zone; the last bin also holds what lies "
+    "beyond it. In the transition tables a row tells where an animal is one step later."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Histogram:
+    """What one panel of bins shows.
+
+    Parameters
+    ----------
+    counts
+        Ten counts for each case.
+    limits
+        Range of the bins.
+    axis
+        Label of the x axis.
+    """
+
+    counts: Mapping[str, NDArray[np.int64]]
+    limits: Limits
+    axis: str
+
+
+def statistics_picture(cases: Mapping[str, Statistics], arena: Arena, *, title: str) -> Picture:
+    """Return the picture of all scored statistics, the cases over each other.
+
+    Parameters
+    ----------
+    cases
+        ``fish`` and, where there are any, ``model`` and ``robot``.
+    arena
+        Gives the zones and the ranges of the bins.
+    title
+        Of which window the statistics are.
+    """
+    colours = theme.zone_colours(arena.zone_names)
+    panels: list[Panel] = []
+    for index, zone in enumerate(arena.zone_names):
+        counts = {case: stats.distance[index] for case, stats in cases.items()}
+        shown = _Histogram(counts=counts, limits=arena.bins.distance_m, axis="distance (m)")
+        panels.append(_histogram(f"Between two fish, {zone}", shown, colours[zone]))
+    for index, zone in enumerate(arena.zone_names):
+        counts = {case: stats.wall[index] for case, stats in cases.items()}
+        shown = _Histogram(
+            counts=counts, limits=arena.bins.wall_distance_m, axis="distance to the wall (m)"
+        )
+        panels.append(_histogram(f"To the wall, {zone}", shown, colours[zone]))
+    panels.append(_occupation(cases, arena.zone_names))
+    panels.extend(_transitions(case, stats) for case, stats in cases.items())
+    return Picture(
+        name="statistics",
+        title=title,
+        short="Statistics",
+        panels=panels,
+        key=tuple(_entry(case) for case in cases),
+        columns=len(arena.zone_names) if 1 < len(arena.zone_names) < _MANY_ZONES else 3,
+        note=_note(cases),
+    )
+
+
+def _note(cases: Mapping[str, Statistics]) -> str:
+    parts = [_READING]
+    if MODEL_CASE in cases:
+        parts.append(
+            "The number in a panel is the similarity of fish and model there, 1 for equal."
+        )
+    if ROBOT_CASE in cases:
+        parts.append("For the robot, distances between two fish are those of robot and fish.")
+    return " ".join(parts)
+
+
+def _entry(case: str) -> Entry:
+    labels = {
+        FISH_CASE: "fish, as observed",
+        MODEL_CASE: "calibrated model, long simulation",
+        ROBOT_CASE: "robot, as observed",
+    }
+    if case == FISH_CASE:
+        return Entry(label=labels[case], colour=COLOURS[case], mark="bar")
+    mark: Mark = "line" if case == MODEL_CASE else "dot"
+    marker = theme.MARKER_OF[COLOURS[case]]
+    return Entry(label=labels[case], colour=COLOURS[case], mark=mark, marker=marker)
+
+
+def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
+    means = "; ".join(
+        f"{case} mean {mean:.3f} m"
+        for case, counts in shown.counts.items()
+        if not np.isnan(mean := histogram_mean(counts, shown.limits))
+    )
+    return Panel(
+        title=title,
+        alt=f"Histogram, {title.lower()}: {means or 'no observation'}.",
+        draw=partial(_draw_histogram, shown=shown),
+        colour=colour,
+    )
+
+
+def histogram_mean(counts: NDArray[np.int64], limits: Limits) -> float:
+    """Return the mean that a histogram of ten bins tells, from their centres.
+
+    Parameters
+    ----------
+    counts : ndarray, shape (10,)
+    limits
+        Range of the bins; what lies beyond counts as in the last one.
+
+    Returns
+    -------
+    float
+        In the unit of the limits; NaN without a count.
+    """
+    total = counts.sum()
+    return float(counts @ _centres(limits) / total) if total else float("nan")
+
+
+def _centres(limits: Limits) -> Floats:
+    edges = bin_edges(limits)
+    return (edges[1:] + edges[:-1]) / 2
+
+
+def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
+    edges, centres = bin_edges(shown.limits), _centres(shown.limits)
+    top = 0.0
+    for case, counts in shown.counts.items():
+        share = frequencies(counts)
+        if np.isnan(share).all():
+            continue
+        top = max(top, float(share.max()))
+        if case == FISH_CASE:
+            width = 0.92 * (edges[1] - edges[0])
+            axes.bar(centres, share, width=width, color=COLOURS[case], alpha=0.45, lw=0)
+        else:
+            style = "-" if case == MODEL_CASE else ":"
+            marker = theme.MARKER_OF[COLOURS[case]]
+            axes.plot(centres, share, color=COLOURS[case], ls=style, marker=marker)
+    axes.set(xlabel=shown.axis, ylabel="share", xlim=shown.limits, ylim=(0, top * 1.22 or 1))
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    _remark(axes, shown.counts)
+
+
+def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]]) -> None:
+    """Write how alike fish and model are, or who was never seen here."""
+    empty = [case for case, values in counts.items() if not values.sum()]
+    text = ""
+    if len(empty) == len(counts):
+        text = "none seen"
+    elif empty:
+        text = "none seen: " + ", ".join(empty)
+    elif {FISH_CASE, MODEL_CASE} <= counts.keys():
+        text = f"similarity {float(similarity(counts[FISH_CASE], counts[MODEL_CASE])):.2f}"
+    axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
+
+
+def _occupation(cases: Mapping[str, Statistics], zones: Sequence[str]) -> Panel:
+    shares = {case: frequencies(stats.occupation) for case, stats in cases.items()}
+    said = "; ".join(
+        f"{case} " + ", ".join(f"{zone} {s:.0%}" for zone, s in zip(zones, share, strict=True))
+        for case, share in shares.items()
+        if not np.isnan(share).any()
+    )
+    return Panel(
+        title="Share of time in each zone",
+        alt=f"Bars of the share of time in each zone: {said or 'no observation'}.",
+        draw=partial(_draw_occupation, cases=cases, zones=zones),
+    )
+
+
+def _draw_occupation(axes: Axes, *, cases: Mapping[str, Statistics], zones: Sequence[str]) -> None:
+    at = np.arange(len(zones))
+    width = 0.8 / len(cases)
+    hatches = {ROBOT_CASE: "....", MODEL_CASE: "////"}
+    top = 0.0
+    for index, (case, stats) in enumerate(cases.items()):
+        share = 100 * np.nan_to_num(frequencies(stats.occupation))
+        top = max(top, float(share.max()))
+        x = at + (index - (len(cases) - 1) / 2) * width
+        bars = axes.bar(x, share, width=0.92 * width, color=COLOURS[case], alpha=0.45, lw=0)
+        if case in hatches:
+            for bar in bars:
+                bar.set(hatch=hatches[case], edgecolor=theme.GROUND, alpha=0.6)
+        for left, value in zip(x, share, strict=True):
+            axes.annotate(
+                f"{value:.0f}", (left, value), xytext=(0, 2), textcoords="offset points",
+                ha="center", fontsize=8,
+            )  # fmt: skip
+    theme.name_ticks(axes, at, zones)
+    colours = theme.zone_colours(zones)
+    for label, zone in zip(axes.get_xticklabels(), zones, strict=True):
+        label.set(color=colours[zone], fontweight="bold")
+    axes.set(ylabel="% of the time", ylim=(0, top * 1.22 or 1))
+    axes.grid(visible=False, axis="x")
+    _remark(axes, {case: stats.occupation for case, stats in cases.items()})
+
+
+def _transitions(case: str, stats: Statistics) -> Panel:
+    zones = stats.zone_names
+    share = frequencies(stats.transition)
+    stays = ", ".join(
+        f"{zone} {share[z, z]:.0%}" for z, zone in enumerate(zones) if not np.isnan(share[z, z])
+    )
+    return Panel(
+        title=f"Transitions in one step, {case}",
+        alt=f"Table of transitions of the {case} between zones; stays: {stays or 'none seen'}.",
+        draw=partial(_draw_transitions, share=share, zones=zones),
+        size_in=(PANEL_IN[0], max(PANEL_IN[1], 0.5 * len(zones) + 1.1)),
+        colour=COLOURS[case],
+    )
+
+
+def _draw_transitions(axes: Axes, *, share: Floats, zones: Sequence[str]) -> None:
+    # Stays are near one and moves near zero: a square root makes both visible.
+    axes.pcolormesh(share, cmap="Blues", norm=PowerNorm(0.5, 0.0, 1.0), rasterized=False)
+    for row, column in np.ndindex(share.shape):
+        value = share[row, column]
+        known = not np.isnan(value)
+        axes.text(
+            column + 0.5,
+            row + 0.5,
+            f"{value:.3f}" if known and value else ("0" if known else "none"),
+            ha="center",
+            va="center",
+            color="#fbfcfd" if known and value > 0.3 else "#101418" if known else theme.MUTED,
+        )
+    at = np.arange(len(zones)) + 0.5
+    theme.name_ticks(axes, at, zones)
+    axes.set_yticks(at, [theme.wrapped(zone) for zone in zones])
+    axes.invert_yaxis()
+    axes.grid(visible=False)
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    axes.set(xlabel="to", ylabel="from")

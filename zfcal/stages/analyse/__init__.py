@@ -1,0 +1,1 @@
+"""`zfcal analyse`: statistics of windows, controls and scores."""

@@ -1,0 +1,1 @@
+"""`zfcal calibrate`: rounds, the likelihood that seeds them, held-out minutes."""

@@ -1,0 +1,317 @@
+"""One pooled window of a trial: a model calibrated on it, and what a model scores there.
+
+For recordings whose behaviour is to be learnt from one half and judged on the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.arena import Arena
+from zfcal.artifacts.atomic import check_free, discard
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.settings import read_trial
+from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.located import join
+from zfcal.behaviour.scores import Scores
+from zfcal.behaviour.statistics import Statistics, measure
+from zfcal.calibrate.ceiling import measure_ceiling
+from zfcal.calibrate.confirm import confirm
+from zfcal.calibrate.objective import Objective, Purpose, SeedSource
+from zfcal.calibrate.task import Settings
+from zfcal.calibrate.task import Task as RoundTask
+from zfcal.errors import InputError
+from zfcal.model.simulate import Counts, pack, simulate_counts
+from zfcal.parameters import Parameters, to_genes
+from zfcal.stages.calibrate.calibrate import calibrate_options, make_group
+from zfcal.stages.calibrate.likelihood import estimate
+from zfcal.stages.calibrate.rounds import (
+    MODEL,
+    checkpoint_key,
+    result_table,
+    score_table,
+    summary_of,
+)
+from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
+from zfcal.stages.events import Made, Result, Tell
+from zfcal.stages.opening import OpenTrial, Task, at_work, reason_to_make
+from zfcal.stages.segments import STEP_S, Segments, segment_path, segment_starts
+from zfcal.stages.settled import settled
+from zfcal.tracks import FISH
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Which stretch to learn from, and which to judge on.
+
+    Parameters
+    ----------
+    train_s, held_out_s
+        From and to, in seconds since trial start; None to judge on nothing.
+    output
+        Where the model goes; its table ``[result]`` holds the scores.
+    """
+
+    output: Path
+    train_s: tuple[int, int]
+    held_out_s: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        held_out = self.held_out_s
+        if held_out and max(self.train_s[0], held_out[0]) < min(self.train_s[1], held_out[1]):
+            raise InputError(
+                f"The window {_text(self.train_s)} and the held-out {_text(held_out)} overlap.",
+                hint="What is held out must not be learnt from.",
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluation:
+    """What a model scores on a stretch of a trial, and what it could score at best."""
+
+    scores: Scores
+    ceiling: Ceiling
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedModel:
+    """A group that swims as one model says, whatever the genes: a `Simulator`.
+
+    Parameters
+    ----------
+    arena
+        Where it swims.
+    template
+        The model, with its own speeds and effects.
+    n_agents, n_fish
+        Fish and robots, and how many of them are fish.
+    n_workers
+        Threads.
+    """
+
+    arena: Arena
+    template: Parameters
+    n_agents: int
+    n_fish: int
+    n_workers: int = 1
+
+    def with_template(self, template: Parameters) -> FixedModel:  # noqa: ARG002 - the protocol's
+        """Return itself: the model is what is judged, speeds and all."""
+        return self
+
+    def simulate(
+        self, genes: Floats, *, n_counted: int, n_steps: int, seeds: NDArray[np.uint64]
+    ) -> Counts:
+        """Return counts with leading axes (genome, run); all genomes are the model."""
+        return simulate_counts(
+            pack([self.template] * len(genes), self.arena),
+            self.arena,
+            n_agents=self.n_agents,
+            n_counted=n_counted,
+            n_robots=self.n_agents - self.n_fish,
+            n_steps=n_steps,
+            seeds=seeds,
+            n_threads=self.n_workers,
+        )
+
+
+def evaluate_model(
+    root: Path,
+    parameters: Parameters,
+    span_s: tuple[int, int],
+    *,
+    seed: int = 0,
+    segments: Segments | None = None,
+) -> Evaluation:
+    """Return what a model scores against the fish of a stretch of a trial.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    parameters
+        The model, which is taken as it is, measured speeds included.
+    span_s
+        From and to, in seconds since trial start.
+    seed
+        Of the simulations: 10 x 1800 s for the score, and 200 windows as long as
+        the stretch for the ceiling.
+    segments
+        What was read before.
+    """
+    opened = (segments := segments or Segments()).open(root)
+    control, _ = pooled_fish(opened, segments, span_s)
+    group = FixedModel(
+        arena=opened.arena,
+        template=parameters,
+        n_agents=opened.trial.n_agents,
+        n_fish=opened.trial.n_fish,
+        n_workers=CalibrateOptions().workers,
+    )
+    settings = Settings(window_s=float(span_s[1] - span_s[0]))
+    task = RoundTask(
+        group=group,
+        control=control,
+        seeds=SeedSource(trial_seed=seed, window_end_s=span_s[1]),
+    )
+    genome = to_genes(parameters)
+    judge: Objective = task.confirmation(settings)
+    confirmed = confirm(judge, genome[None, :])
+    ceiling = measure_ceiling(
+        group,
+        genome,
+        long_run=confirmed.long_run,
+        n_steps=task.steps_of(settings.window_s),
+        seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
+    )
+    return Evaluation(scores=confirmed.scores, ceiling=ceiling)
+
+
+def pooled_fish(
+    opened: OpenTrial, segments: Segments, span_s: tuple[int, int]
+) -> tuple[Statistics, list[int]]:
+    """Return the statistics of the fish in a stretch, and the starts of its segments.
+
+    Raises
+    ------
+    InputError
+        The stretch holds no segment, or no fish.
+    DamagedError
+        A segment is damaged.
+    """
+    start_s, end_s = span_s
+    starts = [s for s in segment_starts(opened.trial.root) if start_s - STEP_S < s < end_s]
+    if not starts:
+        raise InputError(
+            f"{opened.trial.root}: has no tracks from {start_s} s to {end_s} s.",
+            hint=f"Import them first: zfcal import SRC {opened.trial.root}",
+        )
+    points = join([segments.read(opened, start) for start in starts]).between(start_s, end_s)
+    statistics = measure(points.of_kind(FISH), opened.arena)
+    if not statistics.occupation.sum():
+        raise InputError(
+            f"{opened.trial.root}: no fish was seen inside the arena from {start_s} s to {end_s} s."
+        )
+    return statistics, starts
+
+
+def calibrate_span(
+    root: Path,
+    span: Span,
+    options: CalibrateOptions,
+    tell: Tell,
+    *,
+    task: Task | None = None,
+) -> None:
+    """Calibrate a model on one pooled window and judge it on what was held out.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    span
+        What to learn from, what to judge on, and where the model goes.
+    options
+        How to calibrate.
+    tell
+        Hears of the artifact, of the result, and of each generation.
+    task
+        How to go about it.
+    """
+    task = task or Task()
+    # First: where there is no trial no lock is to lie.
+    read_trial(root)
+    with at_work(root, "calibrate", task):
+        settled(lambda: _calibrate_span(root, span, options, tell, task=task), tell)
+
+
+def _calibrate_span(
+    root: Path, span: Span, options: CalibrateOptions, tell: Tell, *, task: Task
+) -> None:
+    segments, output = Segments(), span.output
+    opened = segments.open(root)
+    control, starts = pooled_fish(opened, segments, span.train_s)
+    if span.held_out_s:
+        starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
+    expected = _lineage(opened, options, span, starts)
+    ignore = ("generations",) if options.budget_s is not None else ()
+    reason = reason_to_make(output, expected, task, tell, ignore=ignore)
+    if reason is None:
+        return
+    check_free(output)
+    settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
+    group = make_group(opened, options)
+    estimated = None
+    if options.seed_likelihood:
+        estimated = estimate(opened, group.template, span.train_s, tell)
+    round_task = RoundTask(
+        group=group,
+        control=control,
+        guests=None if estimated is None else estimated.genes,
+        seeds=SeedSource(trial_seed=expected.seed or 0, window_end_s=span.train_s[1]),
+    )
+    checkpoint = output.with_name(f".{output.name}.checkpoint")
+    result = run_search(
+        round_task,
+        replace(options, settings=settings),
+        checkpoint,
+        tell,
+        key=checkpoint_key(expected),
+    )
+    judged = _judge(opened, span, result.champion, expected.seed or 0, segments)
+    baselines = baseline_scores(round_task, options, result)
+    likelihood = None if estimated is None else estimated.table
+    table = {**result_table(result, baselines, likelihood), **judged}
+    made = replace(expected, options={**expected.options, "generations": result.generations})
+    write_model(output, result.champion, made, table)
+    discard(checkpoint)
+    tell(Made(path=output, reason=reason))
+    tell(Result(value={"path": str(output), **summary_of(result, baselines), **judged}))
+
+
+def _lineage(
+    opened: OpenTrial, options: CalibrateOptions, span: Span, starts: list[int]
+) -> Lineage:
+    trial = opened.trial
+    files = [segment_path(trial.root, start) for start in starts]
+    files += [trial.root / trial.model, *opened.arena_files]
+    said = calibrate_options(opened, options, generations=options.generations_asked)
+    stretches: dict[str, JSON] = {
+        "fps": trial.fps,
+        "window": _text(span.train_s),
+        "held_out": _text(span.held_out_s) if span.held_out_s else None,
+    }
+    return Lineage(
+        schema=MODEL,
+        command="calibrate",
+        options={**said, **stretches},
+        seed=trial.seed if options.seed is None else options.seed,
+        inputs=hash_inputs(trial.root, files),
+    )
+
+
+def _judge(
+    opened: OpenTrial, span: Span, champion: Parameters, seed: int, segments: Segments
+) -> dict[str, JSON]:
+    """Score the starting model and the champion on what was held out."""
+    if span.held_out_s is None:
+        return {}
+    trial = opened.trial
+    start = read_model_for(trial.root / trial.model, opened.arena, dt_s=trial.dt_s)
+    scored: dict[str, JSON] = {"window": _text(span.held_out_s)}
+    for name, model in (("before", start), ("after", champion)):
+        found = evaluate_model(trial.root, model, span.held_out_s, seed=seed, segments=segments)
+        scored[name] = score_table(found.scores, found.ceiling)
+    return {"held_out": scored}
+
+
+def _text(span_s: tuple[int, int]) -> str:
+    return f"{span_s[0]}:{span_s[1]}"

@@ -1,0 +1,163 @@
+"""One search for a model: what is asked of it, how it is kept, and what it has to beat.
+
+What it starts from and where its result goes is the business of those who ask for it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from zfcal.artifacts.atomic import check_free
+from zfcal.artifacts.lineage import JSON
+from zfcal.calibrate.baselines import random_search, unchanged
+from zfcal.calibrate.pace import Deadline
+from zfcal.calibrate.rounds import RoundResult, calibrate_window
+from zfcal.calibrate.scheduler import Cluster
+from zfcal.calibrate.search import Progress as Search
+from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
+from zfcal.calibrate.task import Task as RoundTask
+from zfcal.errors import InputError
+from zfcal.stages.calibrate.rounds import Checkpoint
+from zfcal.stages.events import Progress, Tell
+from zfcal.stages.taken import unless_taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrateOptions:
+    """How to calibrate.
+
+    Parameters
+    ----------
+    settings
+        How much a round does; bears on the result.
+    budget_s
+        Wall-clock seconds a round may take; None for no limit. The artifact
+        records the generations that were run, not the budget.
+    seed
+        None for the trial's.
+    n_workers
+        Threads; None for one a core. The numbers do not depend on it.
+    baselines
+        Whether to score random search and the last model beside the champion.
+    seed_likelihood
+        Whether the maximum-likelihood estimate from the window's tracks joins the
+        first population; False is the paper's way.
+    cluster
+        Who simulates instead of this machine's threads. The numbers do not depend
+        on it.
+    """
+
+    settings: Settings = field(default_factory=Settings)
+    budget_s: float | None = None
+    seed: int | None = None
+    n_workers: int | None = None
+    baselines: bool = False
+    seed_likelihood: bool = True
+    cluster: Cluster | None = None
+
+    def __post_init__(self) -> None:
+        if self.budget_s is not None and not self.budget_s > 0:
+            raise InputError(f"A budget must be a positive time, got {self.budget_s!r} s.")
+        if self.budget_s is not None and self.settings.generations is not None:
+            raise InputError(
+                "A round ends after --generations or with its --budget, not with both.",
+                hint="Give one of them; the artifact records the generations that were run.",
+            )
+
+    @property
+    def generations_asked(self) -> int:
+        """Generations of a round that has no budget."""
+        asked = self.settings.generations
+        return DEFAULT_GENERATIONS if asked is None else asked
+
+    @property
+    def workers(self) -> int:
+        """Threads to use."""
+        return self.n_workers or len(os.sched_getaffinity(0))
+
+    def deadline(self) -> Deadline | None:
+        """Return when a round that starts now has to be over."""
+        if self.budget_s is None:
+            return None
+        return Deadline(ends_s=time.monotonic() + self.budget_s, clock=time.monotonic)
+
+
+def run_search(
+    round_task: RoundTask,
+    options: CalibrateOptions,
+    checkpoint: Path,
+    tell: Tell,
+    *,
+    key: str,
+) -> RoundResult:
+    """Calibrate, with a checkpoint after every generation; go on where a killed run was.
+
+    Parameters
+    ----------
+    round_task
+        What to calibrate on what.
+    options
+        How.
+    checkpoint
+        Where to keep it; the caller removes it when the result is written. Where a folder
+        stands there, nothing is kept, and that is told.
+    tell
+        Hears of each generation.
+    key
+        What a checkpoint must agree in to be of use.
+    """
+    at_most = options.generations_asked if options.budget_s is None else None
+    started_s = time.monotonic()
+    stage = f"window to {round_task.seeds.window_end_s} s"
+    kept = Checkpoint(checkpoint, key)
+    is_kept = False
+    with unless_taken(checkpoint, tell):
+        check_free(checkpoint)
+        is_kept = True
+
+    def watch(search: Search) -> None:
+        if is_kept:
+            kept.save(search)
+        done, total = search.state.generation, options.generations_asked
+        if options.budget_s is not None:
+            done, total = int(time.monotonic() - started_s), math.ceil(options.budget_s)
+        tell(Progress(stage=stage, done=min(done, total), total=total))
+
+    return calibrate_window(
+        round_task,
+        options.settings,
+        deadline=options.deadline(),
+        watch=watch,
+        resume=kept.load(at_most=at_most),
+    )
+
+
+def baseline_scores(
+    round_task: RoundTask, options: CalibrateOptions, result: RoundResult
+) -> dict[str, JSON]:
+    """Return S of what the round has to beat; empty unless baselines are asked for.
+
+    Parameters
+    ----------
+    round_task
+        Of the round.
+    options
+        Say whether, and how long an evaluation is.
+    result
+        Random search gets as many evaluations as it took.
+    """
+    if not options.baselines:
+        return {}
+    n = result.evaluations
+    luck = random_search(round_task, options.settings, n_evaluations=n)
+    scores = {"random_search": luck.scores.S}
+    if round_task.previous is not None:
+        champion = round_task.previous.champion
+        scores["last_window_unchanged"] = unchanged(
+            round_task, options.settings, genes=champion
+        ).scores.S
+    return {name: None if math.isnan(value) else value for name, value in scores.items()}

@@ -1,0 +1,1 @@
+"""`zfcal camera`, and which cameras and images a trial has."""

@@ -1,0 +1,157 @@
+"""The images of a trial: whatever `zfcal.cameras.video` opens, and MCAP image segments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import final
+
+from zfcal.artifacts.frame_files import FrameWriter, read_frames
+from zfcal.artifacts.freshness import relative_to
+from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.mcap_files import Overview
+from zfcal.cameras.live import ArrivalClock
+from zfcal.cameras.sequence import images_of
+from zfcal.cameras.stamps import Problem, Shot, Source
+from zfcal.cameras.video import decoded, encoded, is_live, open_source
+from zfcal.errors import InputError
+from zfcal.stages.recording import hash_sources
+from zfcal.stages.segments import STEP_S
+
+_EPOCH_S = 1e8
+"""Later than this since the start of a trial: the times count from 1970."""
+
+
+def source_of(text: str, *, fps: float, clock: ArrivalClock) -> Source:
+    """Return the source that words name: as `open_source`, or MCAP files."""
+    path = Path(text)
+    if not is_live(text) and (path.suffix == ".mcap" or any(path.glob("*.mcap"))):
+        return RecordedFrames(path)
+    return open_source(text, fps=fps, clock=clock)
+
+
+def files_of(root: Path, text: str) -> dict[str, str]:
+    """Return the hashes of a source's files as lineage states them; empty for a live camera."""
+    if is_live(text):
+        return {}
+    images = images_of(text)
+    paths = [Path(text)] if images is None or Path(text).is_dir() else images
+    found: dict[str, str] = {}
+    for path in paths:
+        hashes = hash_sources(root, path)
+        if relative_to(root, path).startswith(".."):
+            # A name with a folder would be looked for in the trial.
+            hashes = {name.replace("/", ":"): digest for name, digest in hashes.items()}
+        found |= hashes
+    return found
+
+
+@final
+class RecordedFrames:
+    """Camera images in an MCAP file, or in a folder of them such as ``frames/overhead``.
+
+    Parameters
+    ----------
+    path
+        The file or folder.
+
+    Raises
+    ------
+    InputError
+        It holds no images.
+    DamagedError
+        It is no MCAP file.
+    """
+
+    is_live = False
+
+    def __init__(self, path: Path) -> None:
+        self.name = str(path)
+        self.rate_hz: float | None = None
+        self.length_s: float | None = None
+        self.notes: list[str] = []
+        self.problems: list[Problem] = []
+        self._path = path
+        first = next(iter(read_frames(path)), None)
+        if first is None:
+            raise InputError(f"{path}: holds no images.", hint=f"See: zfcal inspect {path}")
+        self._zero_s = first[0] if first[0] >= _EPOCH_S else 0.0
+
+    def shots(self) -> Iterator[Shot]:
+        """Yield the images; what cannot be read goes to `problems`."""
+        found = Overview()
+        for time_s, data in read_frames(self._path, found=found):
+            image = decoded(data)
+            if image is None:
+                self.problems.append(
+                    Problem(
+                        says=f"{self.name}: the image of {time_s:.3f} s cannot be decoded.",
+                        hint="Copy the file again from where it was recorded.",
+                    )
+                )
+                continue
+            yield Shot(time_s=time_s - self._zero_s, image=image)
+        if found.problem:
+            self.problems.append(
+                Problem(
+                    says=f"{self.name}: {found.problem}; {found.lost_bytes} bytes are lost.",
+                    hint="Copy it again from where it was recorded; what could be read is tracked.",
+                )
+            )
+
+
+@final
+class Recorder:
+    """Writes the images of a live camera as ``frames/CAMERA/NNNNNN.mcap``, minute by minute.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    camera
+        ``overhead`` or ``below``.
+    form
+        ``jpeg`` or ``png``.
+    lineage
+        Where the images come from.
+    """
+
+    def __init__(self, root: Path, camera: str, form: str, lineage: Lineage) -> None:
+        self.paths: list[Path] = []
+        self._folder = root / "frames" / camera
+        self._camera = camera
+        self._form = form
+        self._lineage = lineage
+        self._writer: FrameWriter | None = None
+        self._start_s = -1
+
+    def keep(self, shot: Shot) -> Shot:
+        """Record an image and return it as the recording will give it back."""
+        start_s = int((shot.time_s + 1e-6) // STEP_S) * STEP_S
+        if start_s != self._start_s:
+            self.close()
+            self._begin(start_s)
+        data = encoded(shot.image, self._form)
+        assert self._writer is not None  # noqa: S101 - for the type checker
+        self._writer.add(shot.time_s, data)
+        image = decoded(data)
+        return shot if image is None else Shot(time_s=shot.time_s, image=image)
+
+    def _begin(self, start_s: int) -> None:
+        """Open the file of a minute; what an interrupted run left of it comes first."""
+        path = self._folder / f"{start_s:06d}.mcap"
+        part = path.with_name(f".{path.name}.taken-up")
+        part.unlink(missing_ok=True)
+        self._writer = FrameWriter(part, self._camera, lineage=self._lineage)
+        self._start_s = start_s
+        if path.exists():
+            for time_s, data in read_frames(path):
+                self._writer.add(time_s, data)
+        part.replace(path)
+        self.paths.append(path)
+
+    def close(self) -> None:
+        """Close the file that is written."""
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None

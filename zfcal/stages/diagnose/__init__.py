@@ -1,0 +1,1 @@
+"""`zfcal diagnose`: what is asked of a window of tracks, and what is kept."""

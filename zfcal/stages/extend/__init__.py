@@ -1,0 +1,1 @@
+"""`zfcal extend`: an effect is added, and the gap on held-out minutes measured."""

@@ -1,0 +1,218 @@
+"""From the tracks of another program to the segments of a trial."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.errors import InputError
+from zfcal.readers import ImportOptions, guess_format, import_foreign
+from zfcal.stages.events import Note, Tell, UpToDate
+from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
+from zfcal.stages.recording import (
+    TRACKS,
+    Recording,
+    check_same_source,
+    hash_sources,
+    stale_segments,
+    starts_of_recording,
+    write_segments,
+)
+from zfcal.stages.segments import segment_path
+from zfcal.stages.settled import settled
+from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
+
+_LIMITS = {"n_fish", "n_robots"}
+"""Options that come from trial.toml and change no number."""
+
+_OUTSIDE_SHARE = 0.2
+"""More positions than this outside the tank: units or axes are likely wrong."""
+
+_AXES_HINT = (
+    "Check the scale (--mm-per-px), the origin (--origin), and whether y counts down (--flip-y)."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """What to import.
+
+    Parameters
+    ----------
+    path
+        A file, or a folder where the format has one.
+    format
+        A key of `zfcal.readers.FORMATS`; None to go by the file's looks.
+    options
+        What the file does not tell; its ``fps`` None for that of the trial.
+    robot_tracks
+        A file of the same format in which every agent is a robot.
+    """
+
+    path: Path
+    format: str | None
+    options: dict[str, object]
+    robot_tracks: Path | None = None
+
+
+def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None = None) -> None:
+    """Import the tracks of another program into a trial.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    source
+        What to import, and how to read it.
+    tell
+        Hears of every segment, and of what a person should know of the file.
+    task
+        A forced one replaces the tracks of another source.
+
+    Raises
+    ------
+    InputError
+        The trial does not exist, or the file is wrong or does not fit it.
+    """
+    task = task or Task()
+    opened = open_trial(root)
+    name = source.format or _guessed(source.path, tell)
+    options = _options(opened, source.options)
+    with at_work(root, "import", task):
+        settled(lambda: _import(opened, source, (name, options), tell, task=task), tell)
+
+
+def _import(
+    opened: OpenTrial, source: Source, form: tuple[str, ImportOptions], tell: Tell, *, task: Task
+) -> None:
+    root, (name, options) = opened.trial.root, form
+    lineage = _lineage(opened, source, name, options)
+    check_same_source(opened.trial, lineage, task)
+    starts = starts_of_recording(root)
+    if starts and not stale_segments(opened.trial, lineage, starts, task):
+        for start in starts:
+            tell(UpToDate(path=segment_path(root, start)))
+        return
+    tracks = _read(source, name, options, tell)
+    tell_outside(opened, tracks, tell)
+    tell_missing(opened, tracks, tell)
+    recording = Recording(
+        tracks=tracks,
+        end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
+        lineage=lineage,
+        extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
+    )
+    write_segments(opened.trial, recording, tell, task=task)
+
+
+def _guessed(path: Path, tell: Tell) -> str:
+    if not path.exists():
+        raise InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
+    name = guess_format(path)
+    if name is None:
+        raise InputError(
+            f"{path}: looks like no known format.", hint="Say what it is with --format."
+        )
+    tell(Note(text=f"{path}: read as --format {name}."))
+    return name
+
+
+def _options(opened: OpenTrial, given: dict[str, object]) -> ImportOptions:
+    trial = opened.trial
+    fps = given.get("fps")
+    if fps is not None and not math.isclose(float(str(fps)), trial.fps, rel_tol=1e-6):
+        raise InputError(
+            f"{trial.config}: fps is {trial.fps:g} Hz, --fps says {fps} Hz.",
+            hint=f"Both must be the rate of the recording: correct one of them (zfcal init "
+            f"{trial.root} --force --fps {fps} ... writes the trial anew).",
+        )
+    known = {key: value for key, value in given.items() if value is not None}
+    limits = {"n_fish": trial.n_fish, "n_robots": trial.n_robots, "fps": trial.fps}
+    return ImportOptions(**{**known, **limits})  # type: ignore[arg-type]
+
+
+def _lineage(opened: OpenTrial, source: Source, name: str, options: ImportOptions) -> Lineage:
+    given: dict[str, JSON] = {
+        field.name: getattr(options, field.name)
+        for field in dataclasses.fields(ImportOptions)
+        if field.name not in _LIMITS and getattr(options, field.name) != field.default
+    }
+    root = opened.trial.root
+    inputs = hash_sources(root, source.path)
+    if source.robot_tracks is not None:
+        inputs |= hash_sources(root, source.robot_tracks)
+        given["robot_tracks"] = source.robot_tracks.name
+    return Lineage(
+        schema=TRACKS, command="import", options={"format": name, **given}, inputs=inputs
+    )
+
+
+def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Tracks:
+    found = import_foreign(source.path, name, options)
+    for note in found.notes:
+        tell(Note(text=f"{source.path}: {note}"))
+    if source.robot_tracks is None:
+        return found.tracks
+    # Everybody in that file is a robot, whatever the file calls it.
+    alone = dataclasses.replace(options, n_fish=options.n_robots, robots=())
+    robots = import_foreign(source.robot_tracks, name, alone).tracks
+    shift = int(found.tracks.agent.max()) + 1 - int(robots.agent.min())
+    robots = dataclasses.replace(
+        robots,
+        agent=(robots.agent + shift).astype(np.int32),
+        kind=np.full(len(robots), ROBOT, dtype=np.int8),
+    )
+    return concatenate([found.tracks, robots])
+
+
+def tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
+    """Warn of fish or robots that trial.toml states and no frame of the tracks shows."""
+    trial = opened.trial
+    for kind, word, stated in ((FISH, "fish", trial.n_fish), (ROBOT, "robots", trial.n_robots)):
+        _, counts = np.unique(tracks.frame[tracks.kind == kind], return_counts=True)
+        most = int(counts.max(initial=0))
+        if most < stated:
+            text = (
+                f"{trial.root}: no frame holds more than {most} {word}, {trial.config} states "
+                f"{stated}; models are simulated with those of trial.toml. Correct it, or name "
+                "the robots with --robots."
+            )
+            tell(Note(text=text, warning=True))
+
+
+def tell_outside(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
+    """Say how many positions lie outside the arena.
+
+    Raises
+    ------
+    InputError
+        All of them do.
+    """
+    arena = opened.arena
+    xy_m = np.stack([tracks.x_m, tracks.y_m], axis=-1)
+    settled_m, n_settled = arena.settle(xy_m)
+    n_void = int((arena.zone_of(settled_m) == 0).sum())
+    n = len(tracks)
+    if n_void > _OUTSIDE_SHARE * n:
+        x0, y0, x1, y1 = arena.outline.bounds
+        problem = (
+            f"{opened.trial.root}: {n_void} of {n} positions lie outside the arena: the tracks "
+            f"span x {tracks.x_m.min():.3f} to {tracks.x_m.max():.3f} m, "
+            f"y {tracks.y_m.min():.3f} to {tracks.y_m.max():.3f} m, the arena {arena.name} "
+            f"x {x0:.3f} to {x1:.3f} m, y {y0:.3f} to {y1:.3f} m."
+        )
+        if n_void == n:
+            raise InputError(problem, hint=_AXES_HINT)
+        tell(Note(text=f"{problem} {_AXES_HINT}", warning=True))
+    elif n_void or n_settled:
+        limit_mm = 1000 * arena.wall_tolerance_m
+        text = (
+            f"{n_settled} of {n} positions lie up to {limit_mm:g} mm outside the arena and count "
+            f"as at the wall; {n_void} lie farther out and do not count."
+        )
+        tell(Note(text=text))

@@ -1,0 +1,219 @@
+"""Cutting tracks into closed segments, for whoever brings them: import or simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from zfcal.artifacts.atomic import remove
+from zfcal.artifacts.freshness import relative_to
+from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
+from zfcal.artifacts.reading import hash_of, hold_steady
+from zfcal.artifacts.tables import read_extra, write_tracks
+from zfcal.errors import DamagedError, InputError
+from zfcal.stages.events import Made, Note, Progress, Tell
+from zfcal.stages.opening import Task, reason_to_make
+from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.stages.taken import unless_taken
+from zfcal.tracks import Tracks
+from zfcal.trial import Trial
+
+TRACKS = "zfcal.tracks/1"
+
+STRETCH_KEY = "recording_s"
+"""Extra metadata of every segment: the seconds from which and to which the recording goes."""
+
+_SLACK_S = 1e-6
+"""A time this little before a segment's start is the start, but for rounding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """Tracks of a whole trial, and where they come from.
+
+    Parameters
+    ----------
+    tracks
+        All rows.
+    end_s
+        The second up to which the recording went, also if nobody was seen.
+    lineage
+        Of every segment.
+    extra
+        Further metadata of every segment.
+    """
+
+    tracks: Tracks
+    end_s: float
+    lineage: Lineage
+    extra: Mapping[str, JSON] = field(default_factory=dict)
+
+
+def hash_sources(root: Path, path: Path) -> dict[str, str]:
+    """Return how a source is recorded: the hash of each of its files, by name.
+
+    A name is the path relative to the trial, or begins with the bare name of a
+    source outside it: where it lay on somebody's disk does not bear on the result.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    path
+        A file, or a folder of files.
+    """
+    files = sorted(part for part in path.rglob("*") if part.is_file()) if path.is_dir() else [path]
+    outside = relative_to(root, path).startswith("..")
+    found = {}
+    for part in files:
+        # Readers of films and of other programs' tracks open it by its name.
+        hold_steady(part)
+        name = part.relative_to(path.parent).as_posix() if outside else relative_to(root, part)
+        found[name] = hash_of(part)
+    return found
+
+
+def check_same_source(trial: Trial, lineage: Lineage, task: Task) -> None:
+    """Refuse to replace tracks that came from somewhere else.
+
+    Raises
+    ------
+    InputError
+        A segment was made by another command or from a file of another name,
+        and the task is not forced.
+    """
+    if task.force:
+        return
+    for start in segment_starts(trial.root):
+        path = segment_path(trial.root, start)
+        try:
+            found = read_lineage(path)
+        except (DamagedError, InputError):
+            # It says not where it comes from: it is replaced as stale.
+            continue
+        same = found.command == lineage.command and set(found.inputs) == set(lineage.inputs)
+        if not (same or (found.command == lineage.command == "simulate")):
+            names = ", ".join(found.inputs) or "no file"
+            raise InputError(
+                f"{path}: comes from {found.command} of {names}, expected none or "
+                f"{', '.join(lineage.inputs)}.",
+                hint="One trial holds one recording: make another trial, or replace these "
+                "tracks with --force.",
+            )
+
+
+def starts_of_recording(root: Path) -> list[int]:
+    """Return the starts of all segments that the recording has, written yet or not.
+
+    Every segment says how far the whole recording goes, so that an import that was
+    killed half-way is known to be unfinished. Empty where no segment says so.
+    """
+    for start in segment_starts(root):
+        try:
+            stretch = read_extra(segment_path(root, start)).get(STRETCH_KEY)
+        except (DamagedError, InputError):
+            continue
+        if isinstance(stretch, list):
+            first_s, end_s = (float(str(edge)) for edge in stretch)
+            return starts_between(first_s, end_s)
+    return []
+
+
+def stretch_of(path: Path) -> tuple[float, float] | None:
+    """Return from where to where a segment says that its recording goes; None for no word."""
+    try:
+        said = read_extra(path).get(STRETCH_KEY)
+    except (DamagedError, InputError):
+        return None
+    if not isinstance(said, list) or len(said) != 2:
+        return None
+    return float(str(said[0])), float(str(said[1]))
+
+
+def starts_between(first_s: float, end_s: float) -> list[int]:
+    """Return the starts of the segments that a stretch of time touches, in seconds.
+
+    >>> starts_between(61.0, 180.0)
+    [60, 120]
+    """
+    first = int((first_s + _SLACK_S) // STEP_S) * STEP_S
+    return list(range(first, max(int(np.ceil(end_s - _SLACK_S)), first + 1), STEP_S))
+
+
+def stale_segments(trial: Trial, lineage: Lineage, starts: list[int], task: Task) -> bool:
+    """Return whether a segment is to be made, or one is there that does not belong."""
+    silent = Task(force=task.force)
+    told: list[object] = []
+    reasons = (
+        reason_to_make(segment_path(trial.root, start), lineage, silent, told.append)
+        for start in starts
+    )
+    return any(reasons) or bool(set(segment_starts(trial.root)) - set(starts))
+
+
+def write_segments(trial: Trial, recording: Recording, tell: Tell, *, task: Task) -> None:
+    """Write the segments of a recording that are missing or stale, in order.
+
+    Parameters
+    ----------
+    trial
+        Where they go.
+    recording
+        What they hold. A minute in which nobody was seen has a segment without
+        rows; the last segment may be a part.
+    tell
+        Hears of each.
+    task
+        Whether to write at all.
+    """
+    parts = list(cut(recording.tracks, recording.end_s))
+    stretch: list[JSON] = [float(recording.tracks.time_s[0]), recording.end_s]
+    for number, (start, tracks) in enumerate(parts, start=1):
+        path = segment_path(trial.root, start)
+        reason = reason_to_make(path, recording.lineage, task, tell)
+        if reason:
+            end_s = min(recording.end_s, float(start + STEP_S))
+            extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
+            with unless_taken(path, tell):
+                write_tracks(path, tracks, recording.lineage, extra=extra)
+                tell(Made(path=path, reason=reason))
+        tell(Progress(stage="segments", done=number, total=len(parts)))
+    _remove_others(trial, {start for start, _ in parts}, tell, task=task)
+
+
+def cut(tracks: Tracks, end_s: float) -> Iterator[tuple[int, Tracks]]:
+    """Cut tracks into segments of 60 s, from the first row's to the last part.
+
+    Parameters
+    ----------
+    tracks
+        Sorted by frame.
+    end_s
+        The second up to which the recording went.
+
+    Yields
+    ------
+    start : int
+        The second at which the segment starts.
+    tracks : Tracks
+        The rows with ``start <= time_s < start + 60``; maybe none.
+    """
+    starts = starts_between(float(tracks.time_s[0]), end_s)
+    edges = np.searchsorted(tracks.time_s, np.array([*starts, np.inf]) - _SLACK_S)
+    for start, low, high in zip(starts, edges, edges[1:], strict=False):
+        yield start, tracks.take(slice(int(low), int(high)))
+
+
+def _remove_others(trial: Trial, starts: set[int], tell: Tell, *, task: Task) -> None:
+    """Remove the segments that an earlier, longer recording of the same source left."""
+    for start in set(segment_starts(trial.root)) - starts:
+        path = segment_path(trial.root, start)
+        if task.dry_run:
+            tell(Note(text=f"would remove {path}: the recording does not reach there any more."))
+            continue
+        with unless_taken(path, tell):
+            remove(path)
+            tell(Note(text=f"{path}: removed, the recording does not reach there any more."))

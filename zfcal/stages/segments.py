@@ -1,0 +1,256 @@
+"""The closed track segments of a trial, located in its arena.
+
+Windows overlap, and a pipe visits the same segments again and again, so what was
+located is remembered, by the content of the file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import OrderedDict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import final
+
+from zfcal.arena import Arena
+from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.limits import check_size
+from zfcal.artifacts.reading import (
+    hash_of,
+    numbered_of,
+    one_content,
+    open_regular,
+    unreadable,
+)
+from zfcal.artifacts.tables import read_extra, read_tracks
+from zfcal.behaviour.located import Located, locate
+from zfcal.behaviour.pooling import Pool
+from zfcal.behaviour.sampling import sample
+from zfcal.errors import DamagedError, InputError, ZfcalError
+from zfcal.stages.events import LeftOut, Tell
+from zfcal.stages.opening import OpenTrial, open_trial
+from zfcal.tracks import Tracks
+from zfcal.units import SEGMENT_S
+
+STEP_S = int(SEGMENT_S)
+END_KEY = "end_s"
+"""Extra metadata of a segment: the second up to which the recording filled it."""
+
+_REMEMBERED = 200_000
+"""Points kept in memory, some 12 MB: two hours of five agents at 5 Hz."""
+
+_AT_LEAST = 3
+"""Segments kept in memory however many points they hold: those of a window."""
+
+
+def segment_name(start_s: int) -> str:
+    """Return the path of the segment that starts at a second, relative to its trial."""
+    return f"tracks/{start_s:06d}.parquet"
+
+
+def segment_path(root: Path, start_s: int) -> Path:
+    """Return the place of the segment that starts at a second."""
+    return root / segment_name(start_s)
+
+
+def segment_hashes(root: Path, starts: Iterable[int]) -> dict[int, str]:
+    """Return the SHA-256 of segments by the second at which they start.
+
+    Raises
+    ------
+    InputError
+        One is missing or cannot be read.
+    """
+    return {start: hash_of(f"{root}/{segment_name(start)}") for start in starts}
+
+
+def segment_starts(root: Path) -> list[int]:
+    """Return the seconds at which the segments of a trial start, in order.
+
+    Segments start on whole minutes; other files in ``tracks/`` are none.
+    """
+    found = numbered_of(root / "tracks", ".parquet")
+    return [second for second in found if second % STEP_S == 0]
+
+
+def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
+    """Return the files that can be opened and are not too large; the others are told as left out.
+
+    Nobody looks at what they hold: a file that nothing is made from may change.
+    """
+    found = []
+    for path in paths:
+        problem = _problem_of(path)
+        if problem is None:
+            found.append(path)
+        else:
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
+    return found
+
+
+def _problem_of(path: Path) -> ZfcalError | None:
+    try:
+        with open_regular(path) as file:
+            check_size(path, file.seek(0, os.SEEK_END))
+    except OSError as error:
+        return unreadable(path, error)
+    except DamagedError as error:
+        return error
+    return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pooled:
+    """What everybody did over some segments.
+
+    Parameters
+    ----------
+    pool
+        The counts. They grow when more segments are pooled: ask before that.
+    hashes
+        SHA-256 of each segment, by its start.
+    problems
+        By their start, those that cannot be read and count nothing, and why.
+    """
+
+    pool: Pool
+    hashes: dict[int, str] = field(default_factory=dict)
+    problems: dict[int, ZfcalError] = field(default_factory=dict)
+
+
+@final
+class Segments:
+    """Reads the segments of trials, each once.
+
+    A trial's settings may change between two questions; what depends on them is
+    then located anew.
+    """
+
+    def __init__(self) -> None:
+        self._located: OrderedDict[tuple[str, ...], Located] = OrderedDict()
+        self._arenas: dict[tuple[str, str], Arena] = {}
+        self._pooled: dict[tuple[str, ...], Pooled] = {}
+
+    def open(self, root: Path) -> OpenTrial:
+        """Open a trial; as long as its arena file stays, it is the very same arena."""
+        with one_content():
+            opened = open_trial(root)
+            hashes = hash_inputs(root, opened.arena_files)
+        key = (str(root.absolute()), "".join(hashes.values()) or opened.trial.arena)
+        arena = self._arenas.setdefault(key, opened.arena)
+        return OpenTrial(trial=opened.trial, arena=arena)
+
+    def read(self, opened: OpenTrial, start_s: int) -> Located:
+        """Return where everybody was in a segment.
+
+        Raises
+        ------
+        DamagedError
+            The file is damaged, of another schema, or holds what no tracker writes.
+        """
+        path = segment_path(opened.trial.root, start_s)
+        # What is remembered under a hash was read from the bytes that have it.
+        with one_content():
+            key = (str(path.absolute()), hash_of(path), *_clock(opened))
+            if key not in self._located:
+                self._located[key] = _locate(opened, path, start_s)
+                self._forget()
+        return self._located[key]
+
+    def _forget(self) -> None:
+        n_points = sum(map(len, self._located.values()))
+        while n_points > _REMEMBERED and len(self._located) > _AT_LEAST:
+            _, oldest = self._located.popitem(last=False)
+            n_points -= len(oldest)
+
+    def read_or_tell(self, opened: OpenTrial, start_s: int, tell: Tell) -> Located | None:
+        """Return what `read` does; None for a segment that is left out, which is told."""
+        try:
+            return self.read(opened, start_s)
+        except (DamagedError, InputError) as error:
+            path = segment_path(opened.trial.root, start_s)
+            tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+            return None
+
+    def pool(self, opened: OpenTrial, hashes: dict[int, str], tell: Tell) -> Pooled:
+        """Return what everybody did over some segments, each of which is read once.
+
+        Where the segments that were pooled the last time come first again,
+        unchanged, the others are added to them.
+
+        Parameters
+        ----------
+        opened
+            The trial.
+        hashes
+            The segments by their start, in order of time, from `segment_hashes`.
+        tell
+            Hears of segments that are left out.
+        """
+        key = (str(opened.trial.root.absolute()), *_clock(opened))
+        known = self._pooled.get(key)
+        if known is None or [*known.hashes.items()] != [*hashes.items()][: len(known.hashes)]:
+            known = self._pooled[key] = Pooled(pool=Pool(opened.arena))
+        for start, digest in [*hashes.items()][len(known.hashes) :]:
+            try:
+                known.pool.add(self.read(opened, start))
+            except (DamagedError, InputError) as error:
+                known.problems[start] = error
+            known.hashes[start] = digest
+        for start, problem in known.problems.items():
+            path = segment_path(opened.trial.root, start)
+            tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
+        return known
+
+
+def _clock(opened: OpenTrial) -> tuple[str, ...]:
+    """Return what else bears on where everybody was; an arena that was opened stays the same."""
+    return str(opened.trial.fps), str(opened.trial.dt_s), str(id(opened.arena))
+
+
+def _locate(opened: OpenTrial, path: Path, start_s: int) -> Located:
+    trial = opened.trial
+    tracks = read_tracks(path)
+    end_s = start_s + SEGMENT_S
+    check_times(path, tracks, start_s)
+    try:
+        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
+    except InputError as error:
+        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
+    return locate(samples, opened.arena)
+
+
+def check_times(path: Path, tracks: Tracks, start_s: int) -> None:
+    """Refuse a segment whose rows lie outside the minute that its name states.
+
+    Raises
+    ------
+    DamagedError
+        They do.
+    """
+    end_s = start_s + SEGMENT_S
+    if len(tracks) and not (tracks.time_s[0] >= start_s and tracks.time_s[-1] < end_s):
+        raise DamagedError(
+            f"{path}: holds the times {tracks.time_s[0]:.6g} s to {tracks.time_s[-1]:.6g} s, "
+            f"expected {start_s} s to {end_s:.6g} s.",
+            hint="The name says where a segment starts: give the file its own name back.",
+        )
+
+
+def is_whole(root: Path, start_s: int, *, fps: float) -> bool:
+    """Return whether the recording went on to the end of a segment.
+
+    The importer writes down where it ended; without that a segment is whole when
+    its last row lies within two frames of the end. A damaged one counts as whole:
+    whoever reads it says what is wrong.
+    """
+    path = segment_path(root, start_s)
+    try:
+        end_s = read_extra(path).get(END_KEY)
+        if not isinstance(end_s, int | float):
+            time_s = read_tracks(path).time_s
+            end_s = time_s[-1] + 2 / fps if len(time_s) else start_s
+    except (DamagedError, InputError):
+        return True
+    return bool(end_s >= start_s + SEGMENT_S - 0.5 / fps)

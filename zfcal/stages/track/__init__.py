@@ -1,0 +1,1 @@
+"""`zfcal track`: from a recording's images to closed segments of tracks."""

@@ -1,0 +1,1 @@
+"""From images to tracks: the empty tank, blobs, animals, identities and the robot."""

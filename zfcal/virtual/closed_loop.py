@@ -1,0 +1,134 @@
+"""A virtual experiment in lock-step: fish, a robot, a tracker, and the loop around them.
+
+Time is that of the frames. A frame is what the fish and the robot make of it; the drive
+hears of it as of any frame, and says to the robot's serial port what it would say on a
+rig; the robot moves on to the next frame. Rounds of analysis and calibration run when a
+rig would have ended them: a process beside the loop begins with a window when it has
+ended, and the loop waits for it where its model is due. All is fed by files, so that the
+trial can be done over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from zfcal.robot.virtual_process import VirtualProcess
+from zfcal.stages.events import Progress, Tell
+from zfcal.stages.opening import Task
+from zfcal.stages.segments import STEP_S
+from zfcal.virtual.eyes import VirtualEyes
+from zfcal.virtual.fish import VirtualFish
+from zfcal.virtual.lockstep import LockstepDriver
+from zfcal.virtual.rounds import RoundsBeside, Windows, do_rounds, rounds_beside
+from zfcal.virtual.trial import (
+    FPS,
+    Experiment,
+    Eyes,
+    Files,
+    LoopOptions,
+    Noisy,
+    clear,
+    fish_of,
+    is_whole,
+    keep,
+    prepare,
+    robot_of,
+)
+
+ROUND_S = 55.0
+"""After so many seconds a rig has analysed and calibrated a window that has ended."""
+
+_TOLD_EVERY = 150
+
+
+def closed_loop(
+    folder: Path,
+    options: LoopOptions,
+    tell: Tell,
+    *,
+    task: Task | None = None,
+) -> Path:
+    """Run a virtual experiment.
+
+    Parameters
+    ----------
+    folder
+        Gets ``tank/``, the truth: a trial with exact tracks, and the true parameters of
+        each minute in ``models/``; and ``trial/``, what a rig would have recorded and made.
+    options
+        What happens.
+    tell
+        Hears of every file.
+    task
+        A forced one begins anew; one that is whole is done over only by the stages.
+
+    Returns
+    -------
+    Path
+        The trial.
+    """
+    task = task or Task()
+    experiment = prepare(folder, options, tell, task)
+    if not task.force and is_whole(experiment):
+        do_rounds(Windows.of(experiment), tell)
+        return experiment.root
+    clear(experiment)
+    with rounds_beside(experiment, tell) as rounds:
+        with robot_of(experiment, stepped=True) as robot:
+            driver = LockstepDriver(experiment.trial, robot.port, tell, after_s=ROUND_S)
+            try:
+                _run(Parts(experiment, robot, driver, rounds), tell)
+            finally:
+                driver.close()
+        keep(experiment)
+        rounds.finish()
+    return experiment.root
+
+
+class Parts(NamedTuple):
+    """What makes up a loop."""
+
+    experiment: Experiment
+    robot: VirtualProcess
+    driver: LockstepDriver
+    rounds: RoundsBeside
+
+
+def _run(parts: Parts, tell: Tell) -> None:
+    experiment, robot, driver, rounds = parts
+    options, fish = experiment.options, fish_of(experiment)
+    with eyes_of(experiment, fish) as eyes:
+        files = Files(experiment, fish, eyes)
+        n_frames, ended_s, due_s = round(options.duration_s * FPS), 2 * STEP_S, 2 * STEP_S + ROUND_S
+        for number in range(n_frames):
+            at = robot.control.ask("advance", to_s=number / FPS, received=driver.n_sent)
+            where = np.array([at["x_m"], at["y_m"], at["heading_rad"]])
+            seen = files.add(fish.next_frame(where))
+            if seen.time_s >= ended_s:
+                rounds.begin()
+                ended_s += STEP_S
+            if seen.time_s >= due_s:
+                rounds.wait()
+                due_s += STEP_S
+            driver.take(seen)
+            if number % _TOLD_EVERY == 0:
+                tell(Progress(stage="closed loop", done=number, total=n_frames))
+        files.finish()
+
+
+@contextlib.contextmanager
+def eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
+    """Give who tracks: cameras and a tracker, or the truth with noise."""
+    if not experiment.options.video:
+        yield Noisy(fish)
+        return
+    eyes = VirtualEyes(experiment.trial)
+    try:
+        yield eyes
+    finally:
+        eyes.close()
