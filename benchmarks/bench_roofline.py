@@ -20,8 +20,8 @@ from measuring import load, machine, table
 from regressions import Ratio, conclude, parser, written
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.compiled import kernel, lean
-from zfcal.model.geometry import Tank, nearest_wall, zone_of
+from zfcal.model.kernels.compiled import kernel, lean
+from zfcal.model.kernels.geometry import Tank, nearest_wall, zone_of
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight, see_first
 from zfcal.model.kernels.random import next_word, seeded, uniform
 from zfcal.model.kernels.run import advance, record_run, start

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from zfcal.model.geometry import Tank, zone_exact
+from zfcal.model.kernels.geometry import Tank, zone_exact
 from zfcal.model.kernels.world import Packed
 
 Floats = NDArray[np.float64]

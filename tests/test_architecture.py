@@ -10,7 +10,7 @@ from zfcal_cli.main import COMMANDS
 MOST_MODULES = 30
 MOST_IMPORTS = 6
 UNLIMITED = {"zfcal.diagnose"}
-DEEP = {"zfcal.diagnose", "zfcal.model"}
+DEEP = {"zfcal.diagnose"}
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from zfcal.model.compiled import cache_folder
+from zfcal.model.kernels.compiled import cache_folder
 
 ROUND = "--generations 1 --population 4 --steps 20 --seed 1 --no-seed-likelihood"
 

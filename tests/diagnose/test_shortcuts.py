@@ -9,7 +9,7 @@ import pytest
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import with_effect
-from zfcal.model.geometry import zone_of
+from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.scores import factor_score, mixture_score
 from zfcal.model.kernels.world import TRAIT, X, Y
 from zfcal.model.packing import pack

@@ -11,11 +11,11 @@ from pathlib import Path
 import numba
 import pytest
 
-from zfcal.model import compiled
+from zfcal.model.kernels import compiled
 
 _REPORT = """
 import numpy as np
-from zfcal.model import compiled
+from zfcal.model.kernels import compiled
 from zfcal.model.kernels.random import seeded
 print(compiled.KEPT, compiled.is_warm(), int(seeded(np.uint64(1))[0]), compiled.is_warm())
 """
@@ -59,14 +59,16 @@ print(seeded._cache._cache_path, moments._cache._cache_path)
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
     """Return a copy of the model's sources, of which the module takes itself for a part."""
-    package = Path(compiled.__file__).parent
+    package = Path(compiled.__file__).parents[1]
     ignored = shutil.ignore_patterns("__pycache__")
     copy = shutil.copytree(package, tmp_path / "model", ignore=ignored)
-    monkeypatch.setattr(compiled, "__file__", str(copy / "compiled.py"))
+    monkeypatch.setattr(compiled, "__file__", str(copy / "kernels" / "compiled.py"))
     return copy
 
 
-@pytest.mark.parametrize("name", ["kernels/random.py", "geometry.py", "effects/alignment.py"])
+@pytest.mark.parametrize(
+    "name", ["kernels/random.py", "kernels/geometry.py", "effects/alignment.py"]
+)
 def test_a_change_of_any_source_leads_to_another_folder(name, copied):
     """Of the generator, which run.py only inlines; of the geometry; of an effect."""
     before = compiled.cache_folder()
@@ -140,7 +142,7 @@ def test_kernels_are_kept_and_a_second_start_is_warm(tmp_path):
 
 def test_other_kernels_keep_their_place_whoever_comes_first(tmp_path):
     """The tracker's stand beside their source, the model's in its folder, in either order."""
-    names = ["zfcal.model.compiled", "zfcal.tracking._kernels"]
+    names = ["zfcal.model.kernels.compiled", "zfcal.tracking._kernels"]
     kept = {k: v for k, v in os.environ.items() if k not in {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"}}
     places = [
         subprocess.run(

@@ -12,11 +12,11 @@ import shapely
 from scipy import stats
 
 from zfcal.arena import make_arena
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import zone_of
 from zfcal.model.kernels import crowd as crowds
+from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.crowd_cells import look_near, make_crowd, sort, weigh_rings
 from zfcal.model.kernels.crowd_runs import record_crowd_run
+from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.perception import LENGTH_M, make_sight, most_sr, see
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import record_run

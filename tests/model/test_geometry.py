@@ -12,7 +12,7 @@ from numba import njit
 
 from zfcal.arena import Zone, make_arena
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.geometry import nearest_wall, zone_exact, zone_of
+from zfcal.model.kernels.geometry import nearest_wall, zone_exact, zone_of
 from zfcal.model.tank import make_tank
 
 HOLE = make_arena(

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from zfcal.arena import Bins, Zone, make_arena
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import best_within, clearance, nearest_wall, zone_exact, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import best_within, clearance, nearest_wall, zone_exact, zone_of
 from zfcal.model.tank import make_tank
 
 EPS = 2e-7

@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from zfcal.arena import make_arena
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.world import (
     LEFT_AT_S,
     LEFT_S,
@@ -24,7 +25,6 @@ from zfcal.model.kernels.world import (
     Y,
     remember,
 )
-from zfcal.model.rooms import find_rooms
 from zfcal.model.simulate import tank_of
 from zfcal.model.tank import make_tank
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from zfcal.model.compiled import kernel
+from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.heading import PATIENCE
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import make_sight

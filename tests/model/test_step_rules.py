@@ -14,7 +14,7 @@ from scipy import stats
 
 from zfcal.arena import Bins, make_arena
 from zfcal.errors import InputError
-from zfcal.model.compiled import kernel
+from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.random import next_word, seeded
 from zfcal.model.kernels.run import advance, record_run

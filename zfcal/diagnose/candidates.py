@@ -11,7 +11,7 @@ from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
 from zfcal.model.effects.generic import PREFIX
-from zfcal.model.rooms import find_rooms
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
 

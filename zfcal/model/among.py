@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded

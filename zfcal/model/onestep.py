@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_grid
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import Sight, make_sight

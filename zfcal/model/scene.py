@@ -19,8 +19,8 @@ from zfcal.errors import InputError
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.kernels.scene import fill_states
 from zfcal.model.kernels.world import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
-from zfcal.model.simulate import tank_of
 from zfcal.model.steps import ANGLES, landing_shares
+from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
 from zfcal.units import HEADING_MIN_STEP_M
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.heading import apply_move
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight

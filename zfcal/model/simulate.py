@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
@@ -12,12 +11,11 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.geometry import Tank
 from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
 from zfcal.model.kernels.run import Counts, count_runs, record_run
 from zfcal.model.kernels.world import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
-from zfcal.model.tank import make_tank
+from zfcal.model.tank import tank_of
 from zfcal.parameters import Parameters
 from zfcal.units import BURN_IN_S
 
@@ -41,16 +39,6 @@ MOST_IN_FULL = 32
 
 _JOB_STEPS = 20_000
 """Agent-steps in a piece of work: some milliseconds, much more than a call costs."""
-
-
-def tank_of(arena: Arena) -> Tank:
-    """Return the kernels' arrays of an arena, made once per process."""
-    return _tank(arena.outline.wkb, arena)
-
-
-@lru_cache(maxsize=8)
-def _tank(_outline: bytes, arena: Arena) -> Tank:
-    return make_tank(arena)
 
 
 def burn_in_steps(dt_s: float) -> int:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, clearance, nearest_wall, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.likelihood import PER_CELL
 from zfcal.model.kernels.perception import make_sight, see
-from zfcal.model.simulate import tank_of
+from zfcal.model.tank import tank_of
 from zfcal.tracks import Samples
 from zfcal.units import HEADING_MIN_STEP_M
 

@@ -12,15 +12,16 @@ parts, marked by the same rule.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import ASK, FINE, Tank, crosses, segment_distance2, zone_exact
-from zfcal.model.rooms import make_rooms
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import ASK, FINE, Tank, crosses, segment_distance2, zone_exact
+from zfcal.model.kernels.rooms import make_rooms
 
 _CELLS_LONG_SIDE = 480
 _BLOCK = 16
@@ -233,6 +234,16 @@ def _fill_fine(tank: Tank, half_diagonal_m: float) -> NDArray[np.uint8]:
                     left = fine[at - 1] if part % FINE > 0 else ASK
                     fine[at] = left if left != ASK else zone_exact(x, y, tank)
     return fine
+
+
+def tank_of(arena: Arena) -> Tank:
+    """Return the kernels' arrays of an arena, made once per process."""
+    return _tank(arena.outline.wkb, arena)
+
+
+@lru_cache(maxsize=8)
+def _tank(_outline: bytes, arena: Arena) -> Tank:
+    return make_tank(arena)
 
 
 def make_tank(arena: Arena, *, cells: int = _CELLS_LONG_SIDE) -> Tank:

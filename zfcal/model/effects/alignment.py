@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook, inlined
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
+from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.world import FOLLOWS, HX, HY, ZONE
 

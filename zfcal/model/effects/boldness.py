@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from zfcal.arena import Arena
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.world import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
-from zfcal.model.rooms import find_rooms
 
 
 @hook(FACTOR)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.world import LEFT_S, ROOM
 

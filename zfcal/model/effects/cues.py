@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import inlined
 from zfcal.model.effects.base import EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, beyond, cut, quickness
+from zfcal.model.kernels.compiled import inlined
 from zfcal.model.kernels.world import TIME, X, Y
 
 REFERENCE = "Fortin et al. 2005, Ecology 86: 1320-1330"

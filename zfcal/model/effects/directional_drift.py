@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SLOWEST_M_S, SPEED_M_S, cut, tilt
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 
 _MOST = 4.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from zfcal.model.compiled import inlined
 from zfcal.model.effects.base import Company
+from zfcal.model.kernels.compiled import inlined
 from zfcal.model.kernels.world import (
     EXIT,
     FOLLOWS,

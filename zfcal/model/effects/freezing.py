@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.world import DT_S, SPEED
 

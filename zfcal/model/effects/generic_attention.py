@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.cues import REFERENCE, bearing, number, too_far
 from zfcal.model.effects.forms import apart, needs_neighbour
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.world import HX, HY
 

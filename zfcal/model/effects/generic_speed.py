@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from zfcal.arena import Arena
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.cues import (
     FIXED,
@@ -22,6 +21,7 @@ from zfcal.model.effects.cues import (
 )
 from zfcal.model.effects.forms import apart, beyond, nearest_seen, needs_neighbour, times_faster
 from zfcal.model.effects.places import places
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY, SPEED, WALL, X, Y
 

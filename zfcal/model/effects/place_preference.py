@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import tilt
 from zfcal.model.effects.places import places
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.world import X, Y
 

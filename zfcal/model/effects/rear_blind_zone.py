@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.world import HX, HY, X, Y
 

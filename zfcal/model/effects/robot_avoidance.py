@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import apart, tilt
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
 from zfcal.model.kernels.world import KIND, X, Y
 

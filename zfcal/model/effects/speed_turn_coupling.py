@@ -6,9 +6,9 @@ turning less at speed for the model: the same joint law.
 
 from __future__ import annotations
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.world import HX, HY
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 
 

@@ -5,9 +5,9 @@ The base model forgets it: along a wall both ways are alike.
 
 from __future__ import annotations
 
-from zfcal.model.compiled import hook
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import sense_along, tilt
+from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.world import FOLLOWS, HX, HY, TAU_X, TAU_Y
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
+from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.hooks import (
     call_component,
     call_factor,

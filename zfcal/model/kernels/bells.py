@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.compiled import inlined, kernel
+from zfcal.model.kernels.compiled import inlined, kernel
 
 _HALVINGS = 10
 LEAST = -250.0

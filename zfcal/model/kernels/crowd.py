@@ -16,9 +16,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, lean
-from zfcal.model.geometry import Tank, best_within, zone_of
+from zfcal.model.kernels.compiled import inlined, lean
 from zfcal.model.kernels.crowd_cells import CLOSE_M, Crowd, in_ring, look_near, sort, weigh_rings
+from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.heading import (
     REDRAWS,
     REJECTIONS,

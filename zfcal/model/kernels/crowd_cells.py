@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
-from zfcal.model.geometry import Tank
+from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.perception import (
     LENGTH_M,
     Sight,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
 from zfcal.model.kernels.bells import exponential, one_over_integral
+from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.likelihood import PER_CELL
 
 Floats = NDArray[np.float64]

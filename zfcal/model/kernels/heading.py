@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel, lean
-from zfcal.model.geometry import Tank, best_within, zone_of
+from zfcal.model.kernels.compiled import inlined, kernel, lean
+from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_speed
 from zfcal.model.kernels.mixture import gather, spun, tilt, toward_one, weigh
 from zfcal.model.kernels.perception import Sight

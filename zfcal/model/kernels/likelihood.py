@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import kernel
+from zfcal.model.kernels.compiled import kernel
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
-from zfcal.model.geometry import Tank
+from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.world import ZONE, X, Y
 
 _BINS = 10

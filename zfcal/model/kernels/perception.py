@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel, lean
+from zfcal.model.kernels.compiled import inlined, kernel, lean
 
 LENGTH_M = 0.02
 WIDTH_M = 0.02

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel, lean
-from zfcal.model.geometry import Tank
+from zfcal.model.kernels.compiled import inlined, kernel, lean
+from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.heading import apply_move, draw_move
 from zfcal.model.kernels.pairs import bin_of
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import kernel
-from zfcal.model.geometry import Tank, zone_of
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.kernels.world import (
     DT_S,

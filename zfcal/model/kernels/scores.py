@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import kernel
 from zfcal.model.kernels.bells import one_over_integral
+from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.extended import bell, make_cells
 
 Floats = NDArray[np.float64]

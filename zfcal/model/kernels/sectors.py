@@ -16,9 +16,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, lean
-from zfcal.model.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.bells import LEAST, exponential, one_over_integral
+from zfcal.model.kernels.compiled import inlined, lean
+from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.random import sine, uniform
 from zfcal.model.kernels.staircase import SCALE_AT, TAKE
 from zfcal.model.kernels.world import (

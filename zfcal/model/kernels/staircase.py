@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
+from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.random import next_word, sine, uniform
 
 STEPS = 64

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
-from zfcal.model.geometry import Tank, clearance, nearest_wall, zone_of
+from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.hooks import call_sight
 from zfcal.model.kernels.perception import Sight, in_vectors, see, see_first
 from zfcal.model.kernels.random import uniform

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.model.compiled import inlined, kernel
-from zfcal.model.rooms import Rooms
+from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.rooms import Rooms
 
 ASK = 255
 """Mark of a cell that a border crosses."""

@@ -37,7 +37,7 @@ _type_of: Any = types.unliteral
 def cache_folder() -> Path | None:
     """Return the folder for this very version of the model's sources; None without a home."""
     digest = hashlib.sha256()
-    here = Path(__file__).parent
+    here = Path(__file__).parents[1]
     for path in sorted(here.rglob("*.py")):
         digest.update(f"{path.relative_to(here).as_posix()}\0".encode() + path.read_bytes())
     asked = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
