@@ -8,7 +8,8 @@ from scipy.optimize import linear_sum_assignment
 
 from zfcal.tracking.assign import assign
 from zfcal.tracking.background import background_of
-from zfcal.tracking.detect import Corners, Limits, compare, find_blobs, shape_of
+from zfcal.tracking.blobs import shape_of
+from zfcal.tracking.detect import Corners, Limits, compare, find_blobs
 from zfcal.tracking.splitting import by_clusters, by_darkness
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.tracking.detect import Blob, Shape
+from zfcal.tracking.blobs import Blob, Shape
 from zfcal.tracking.identity import Identities
 from zfcal.tracking.trail import Detection, Trail
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from zfcal.tracking.detect import Blob, Shape
+from zfcal.tracking.blobs import Blob, Shape
 from zfcal.tracking.trail import Detection, Trail
 from zfcal.tracking.usual import Bodies, Body
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zfcal.tracking.detect import Blob, Shape, shape_of
+from zfcal.tracking.blobs import Blob, Shape, shape_of
 from zfcal.tracking.fitting import fit
 from zfcal.tracking.splitting import by_clusters, by_darkness
 from zfcal.tracking.trail import Detection, Trail

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.tracking.background import Background, Grey
-from zfcal.tracking.detect import Blob, Contrast, Corners, Limits, compare, find_blobs
+from zfcal.tracking.blobs import Blob
+from zfcal.tracking.detect import Contrast, Corners, Limits, compare, find_blobs
 from zfcal.tracking.learning import Standing, pieces
 from zfcal.tracking.seen import SILHOUETTE, TrackerOptions
 from zfcal.tracking.usual import Body

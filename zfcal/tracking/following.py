@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from zfcal.tracking._kernels import nearest_squared, step_costs
 from zfcal.tracking.assign import Match, assign
-from zfcal.tracking.detect import Blob
+from zfcal.tracking.blobs import Blob
 from zfcal.tracking.identity import Identities
 from zfcal.tracking.seen import Exchange
 from zfcal.tracking.trail import Detection, Trail

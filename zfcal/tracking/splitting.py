@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.tracking._kernels import clusters, nearest_squared
-from zfcal.tracking.detect import Blob
+from zfcal.tracking.blobs import Blob
 
 Floats = NDArray[np.float64]
 

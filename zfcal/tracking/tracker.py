@@ -28,7 +28,7 @@ from zfcal.tracking.background import (
     shows_nothing,
     whole,
 )
-from zfcal.tracking.detect import Blob
+from zfcal.tracking.blobs import Blob
 from zfcal.tracking.dividing import divide
 from zfcal.tracking.doubting import Doubts
 from zfcal.tracking.finding import Finder, soften

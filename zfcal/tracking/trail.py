@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from zfcal.tracking.detect import FULL, Blob, Shape
+from zfcal.tracking.blobs import FULL, Blob, Shape
 from zfcal.tracking.fitting import Build
 from zfcal.tracking.usual import Body as Look
 

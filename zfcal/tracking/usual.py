@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zfcal.tracking.detect import Blob, Shape, shape_of
+from zfcal.tracking.blobs import Blob, Shape, shape_of
 
 _REMEMBERED = 400
 _REFRESHED = 25
