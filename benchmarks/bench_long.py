@@ -31,7 +31,7 @@ from typing import Any
 from measuring import ROOT, keep, load, machine, table
 from regressions import BUILD, Ratio, conclude, parser, written
 
-from zfcal.artifacts.reading import sha256_of
+from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.tables import read_tracks
 
 LIMIT_S = 30

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.atomic import append_bytes, is_orphan, is_part, write_text_whole, write_whole
-from zfcal.artifacts.reading import sha256_of
+from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.errors import InputError, StorageError, ZfcalError
 
 

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from zfcal.artifacts import reading
 from zfcal.artifacts.freshness import hash_inputs, relative_to, stale_reason, version_change
 from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.reading import contents as reading
 from zfcal.artifacts.tables import STATS, TRACKS, write_tracks
 from zfcal.errors import InputError
 

@@ -5,7 +5,7 @@ import tracemalloc
 
 import pytest
 
-from zfcal.artifacts.limits import VARIABLE
+from zfcal.artifacts.reading.limits import VARIABLE
 from zfcal.errors import DamagedError, InputError
 from zfcal.readers import ImportOptions, import_foreign, text
 

@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 import pytest
 
-from zfcal.artifacts import reading
 from zfcal.artifacts.lineage import Lineage, read_lineage
-from zfcal.artifacts.reading import hash_of, read_bytes
+from zfcal.artifacts.reading import contents as reading
+from zfcal.artifacts.reading.contents import hash_of, read_bytes
 from zfcal.cameras.lens import Lens
 from zfcal.diagnose.findings import Note as Said
 from zfcal.errors import ChangedError, InputError, ZfcalError

@@ -24,8 +24,8 @@ from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
-from zfcal.artifacts.places import check_inside, is_regular
-from zfcal.artifacts.reading import hash_of, open_regular, unreadable
+from zfcal.artifacts.reading.contents import hash_of, open_regular, unreadable
+from zfcal.artifacts.reading.places import check_inside, is_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import POPULATION, SCORES, STATS, read_table, read_tracks
 from zfcal.artifacts.validation import check, read_json

@@ -24,10 +24,10 @@ from mcap_protobuf.schema import register_schema
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, to_json
 from zfcal.artifacts.mcap_files import Overview, read_messages
-from zfcal.artifacts.parsing import json_of
-from zfcal.artifacts.places import check_inside
 from zfcal.artifacts.pose_files import LIBRARY
-from zfcal.artifacts.reading import numbered_of, open_to_write
+from zfcal.artifacts.reading.contents import numbered_of, open_to_write
+from zfcal.artifacts.reading.parsing import json_of
+from zfcal.artifacts.reading.places import check_inside
 from zfcal.errors import DamagedError, InputError
 
 DRIVE = "zfcal.drive/1"

@@ -28,12 +28,12 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
 from zfcal.artifacts.atomic import storage_error
-from zfcal.artifacts.limits import CHUNK_BYTES, largest
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, package_version
 from zfcal.artifacts.mcap_files import BROKEN, Overview, read_messages, records_of
-from zfcal.artifacts.pixels import check_pixels
-from zfcal.artifacts.places import check_inside
-from zfcal.artifacts.reading import numbered_of, open_regular, unreadable
+from zfcal.artifacts.reading.contents import numbered_of, open_regular, unreadable
+from zfcal.artifacts.reading.limits import CHUNK_BYTES, largest
+from zfcal.artifacts.reading.pixels import check_pixels
+from zfcal.artifacts.reading.places import check_inside
 from zfcal.errors import DamagedError, InputError
 from zfcal.trial import second_of
 

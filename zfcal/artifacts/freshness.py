@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage, to_json
-from zfcal.artifacts.reading import hash_of
+from zfcal.artifacts.reading.contents import hash_of
 from zfcal.errors import DamagedError, InputError
 
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.pixels import check_pixels
-from zfcal.artifacts.reading import read_bytes
+from zfcal.artifacts.reading.contents import read_bytes
+from zfcal.artifacts.reading.pixels import check_pixels
 from zfcal.errors import DamagedError
 
 

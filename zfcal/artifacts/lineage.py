@@ -17,8 +17,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias, Union
 
-from zfcal.artifacts.parsing import json_of, toml_of
-from zfcal.artifacts.reading import open_regular, read_limited, unreadable
+from zfcal.artifacts.reading.contents import open_regular, read_limited, unreadable
+from zfcal.artifacts.reading.parsing import json_of, toml_of
 from zfcal.errors import DamagedError, InputError
 
 JSON: TypeAlias = Union["Mapping[str, JSON]", "Sequence[JSON]", str, int, float, bool, None]

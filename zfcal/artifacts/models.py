@@ -12,7 +12,7 @@ import tomlkit
 from zfcal.arena import Arena
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage
-from zfcal.artifacts.reading import numbered_of
+from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.validation import check, descriptions_of, nearest, read_toml
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters, ZoneParameters

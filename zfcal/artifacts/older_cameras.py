@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.artifacts.reading import read_bytes
+from zfcal.artifacts.reading.contents import read_bytes
 from zfcal.errors import DamagedError, InputError
 
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}

@@ -22,7 +22,7 @@ from mcap_protobuf.schema import register_schema
 
 from zfcal.arena import Arena
 from zfcal.artifacts.lineage import to_json
-from zfcal.artifacts.parsing import json_of
+from zfcal.artifacts.reading.parsing import json_of
 from zfcal.errors import DamagedError
 from zfcal.tracks import KINDS, ROBOT, AgentPose, FramePoses
 from zfcal.trial import second_of

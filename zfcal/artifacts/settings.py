@@ -11,7 +11,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from zfcal.artifacts.atomic import write_text_whole
-from zfcal.artifacts.reading import note_values, values_alone
+from zfcal.artifacts.reading.contents import note_values, values_alone
 from zfcal.artifacts.validation import check, descriptions_of, read_toml, written_by_people
 from zfcal.errors import InputError
 from zfcal.trial import CONFIG_NAME, Trial

@@ -15,9 +15,9 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata
 
-from zfcal.artifacts.limits import CHUNK_BYTES, check_size, largest
 from zfcal.artifacts.mcap_files import BROKEN, unpacked
-from zfcal.artifacts.reading import open_regular, unreadable
+from zfcal.artifacts.reading.contents import open_regular, unreadable
+from zfcal.artifacts.reading.limits import CHUNK_BYTES, check_size, largest
 from zfcal.errors import DamagedError
 
 _MAGIC = b"\x89MCAP0\r\n"

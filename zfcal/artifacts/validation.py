@@ -21,8 +21,8 @@ from jsonschema.exceptions import ValidationError, best_match
 from jsonschema.validators import extend
 from referencing import Registry, Resource
 
-from zfcal.artifacts.parsing import json_of, toml_of
-from zfcal.artifacts.reading import read_bytes
+from zfcal.artifacts.reading.contents import read_bytes
+from zfcal.artifacts.reading.parsing import json_of, toml_of
 from zfcal.errors import DamagedError, InputError, SchemaError
 
 _TYPE_NAMES = {

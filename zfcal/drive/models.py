@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.models import read_model_for
-from zfcal.artifacts.reading import Looks, looks_of, numbered_of, one_content, read_bytes
+from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of, one_content, read_bytes
 from zfcal.drive.pilot import InForce
 from zfcal.errors import InputError, ZfcalError
 from zfcal.model.packing import pack

@@ -22,7 +22,7 @@ import pyarrow.csv as pa_csv
 from numpy.typing import NDArray
 
 from zfcal.artifacts.arrays import array_of, numbers_of
-from zfcal.artifacts.limits import TABLE_BYTES, largest, too_large
+from zfcal.artifacts.reading.limits import TABLE_BYTES, largest, too_large
 from zfcal.errors import InputError
 from zfcal.readers.raw import Floats, Ints
 

@@ -17,7 +17,7 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
-from zfcal.artifacts.reading import numbered_of, open_regular
+from zfcal.artifacts.reading.contents import numbered_of, open_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
 from zfcal.behaviour.located import Located, locate

@@ -14,7 +14,7 @@ from pathlib import Path
 from zfcal.artifacts.atomic import storage_error, write_text_whole, write_whole
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
-from zfcal.artifacts.reading import sha256_of
+from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.document import SCHEMA, integration_document

@@ -11,7 +11,7 @@ import numpy as np
 from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
-from zfcal.artifacts.reading import hash_of, hold_steady
+from zfcal.artifacts.reading.contents import hash_of, hold_steady
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Made, Note, Progress, Tell

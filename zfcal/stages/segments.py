@@ -15,14 +15,14 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
-from zfcal.artifacts.limits import check_size
-from zfcal.artifacts.reading import (
+from zfcal.artifacts.reading.contents import (
     hash_of,
     numbered_of,
     one_content,
     open_regular,
     unreadable,
 )
+from zfcal.artifacts.reading.limits import check_size
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool

@@ -1,7 +1,7 @@
 """Work on files that others may change meanwhile: done again once, and then left alone.
 
 Nothing is published that was made from something else than what lies there, see
-`zfcal.artifacts.reading`.
+`zfcal.artifacts.reading.contents`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, TypeVar, final
 
-from zfcal.artifacts.reading import one_content
+from zfcal.artifacts.reading.contents import one_content
 from zfcal.errors import ChangedError
 from zfcal.stages.events import LeftOut, Note, Tell
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.places import is_regular
-from zfcal.artifacts.reading import numbered_of
+from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.reading.places import is_regular
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.opening import Task
 

@@ -21,7 +21,7 @@ from zfcal.artifacts.frame_files import FRAMES, FrameWriter, frame_segments
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.images import read_image
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
-from zfcal.artifacts.reading import hash_of
+from zfcal.artifacts.reading.contents import hash_of
 from zfcal.artifacts.settings import name_camera, read_trial
 from zfcal.artifacts.tables import read_tracks
 from zfcal.cameras.camera import Camera, Homography

@@ -18,7 +18,7 @@ from zfcal.artifacts.atomic import write_text_whole, write_whole
 from zfcal.artifacts.frame_files import frame_segments, read_frames
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.reading import hold_steady
+from zfcal.artifacts.reading.contents import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.cameras.frames import Image
 from zfcal.errors import DamagedError, InputError, StorageError

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole
 from zfcal.artifacts.lineage import package_version
-from zfcal.artifacts.reading import sha256_of
+from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.diagnose.document import Sheet
 from zfcal.report.contents import Section
 

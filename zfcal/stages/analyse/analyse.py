@@ -13,7 +13,7 @@ from pathlib import Path
 from zfcal.arena import VOID
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
-from zfcal.artifacts.reading import numbered_of
+from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import make_table, write_table
 from zfcal.behaviour.located import Located, join

@@ -15,8 +15,8 @@ from zfcal.artifacts.atomic import check_free, discard
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
-from zfcal.artifacts.places import is_regular
-from zfcal.artifacts.reading import numbered_of
+from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.reading.places import is_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup

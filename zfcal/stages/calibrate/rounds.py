@@ -13,7 +13,7 @@ from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import write_model
-from zfcal.artifacts.reading import read_limited
+from zfcal.artifacts.reading.contents import read_limited
 from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows

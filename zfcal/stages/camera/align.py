@@ -12,7 +12,7 @@ import numpy as np
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.frame_files import frame_segments
-from zfcal.artifacts.reading import hold_steady
+from zfcal.artifacts.reading.contents import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.cameras.alignment import Alignment, Spots, align_spots
 from zfcal.cameras.calibration import Calibration, summary

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.reading import hash_of
+from zfcal.artifacts.reading.contents import hash_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.diagnose.document import Findings, Sheet, read_document
 from zfcal.errors import InputError

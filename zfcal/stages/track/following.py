@@ -13,7 +13,7 @@ import cv2
 
 from zfcal.artifacts.frame_files import FRAMES
 from zfcal.artifacts.images import read_image
-from zfcal.artifacts.reading import Contents, one_content
+from zfcal.artifacts.reading.contents import Contents, one_content
 from zfcal.artifacts.validation import written_by_people
 from zfcal.cameras.frames import Frame
 from zfcal.cameras.live import ArrivalClock, LiveCamera

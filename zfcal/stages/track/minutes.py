@@ -13,7 +13,7 @@ from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
-from zfcal.artifacts.reading import check_contents, numbered_of, open_regular
+from zfcal.artifacts.reading.contents import check_contents, numbered_of, open_regular
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import LeftOut, Made, Note, Tell, UpToDate

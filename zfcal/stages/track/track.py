@@ -7,7 +7,7 @@ from pathlib import Path
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_messages import POSES
-from zfcal.artifacts.reading import Contents, one_content
+from zfcal.artifacts.reading.contents import Contents, one_content
 from zfcal.cameras.live import ArrivalClock
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Planned, Tell, UpToDate

@@ -7,9 +7,9 @@ import os
 
 import pytest
 
-from zfcal.artifacts import reading
 from zfcal.artifacts.atomic import write_bytes_whole
-from zfcal.artifacts.reading import (
+from zfcal.artifacts.reading import contents as reading
+from zfcal.artifacts.reading.contents import (
     check_contents,
     hash_of,
     hold_steady,

@@ -9,8 +9,8 @@ import pytest
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.lock import lock
-from zfcal.artifacts.places import numbered, way_back
-from zfcal.artifacts.reading import numbered_of, open_regular, open_to_write, read_bytes
+from zfcal.artifacts.reading.contents import numbered_of, open_regular, open_to_write, read_bytes
+from zfcal.artifacts.reading.places import numbered, way_back
 from zfcal.errors import InputError, StorageError
 
 

@@ -24,8 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, final
 
-from zfcal.artifacts.limits import check_size, most_bytes, too_large
-from zfcal.artifacts.places import KINDS, check_inside, numbered, way_back
+from zfcal.artifacts.reading.limits import check_size, most_bytes, too_large
+from zfcal.artifacts.reading.places import KINDS, check_inside, numbered, way_back
 from zfcal.errors import ChangedError, InputError
 
 Looks: TypeAlias = tuple[int, ...]

@@ -13,12 +13,13 @@ import zstandard
 from mcap.exceptions import McapError
 from mcap.records import Chunk
 
-from zfcal.artifacts import limits, tables
-from zfcal.artifacts.limits import VARIABLE
+from zfcal.artifacts import tables
 from zfcal.artifacts.mcap_files import records_of
-from zfcal.artifacts.parsing import json_of, toml_of
-from zfcal.artifacts.pixels import check_pixels
-from zfcal.artifacts.reading import read_bytes
+from zfcal.artifacts.reading import limits
+from zfcal.artifacts.reading.contents import read_bytes
+from zfcal.artifacts.reading.limits import VARIABLE
+from zfcal.artifacts.reading.parsing import json_of, toml_of
+from zfcal.artifacts.reading.pixels import check_pixels
 from zfcal.artifacts.tables import read_parquet
 from zfcal.artifacts.validation import read_toml
 from zfcal.errors import DamagedError, InputError

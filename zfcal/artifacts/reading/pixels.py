@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from zfcal.artifacts.limits import IMAGE_PIXELS
+from zfcal.artifacts.reading.limits import IMAGE_PIXELS
 from zfcal.errors import DamagedError
 
 _PNG_HEAD = 24
