@@ -155,7 +155,8 @@ class Driver:
         n_due = self._n_due(frames)
         for poses in frames:
             waited_s = max(0.0, frames[-1].time_s - poses.time_s)
-            self._take(poses, old_s=math.inf if age_s is None else age_s + waited_s)
+            waited_s = math.inf if age_s is None else age_s + waited_s
+            self._take(poses, old_s=self._old_s(poses.time_s, waited_s))
         self._n_histories += 1
         if n_due > 1 and self._n_histories < _MOST_HISTORIES:
             return
