@@ -225,7 +225,7 @@ class World:
         )
         self.driver = Driver(PLACES["opened"], self.manner, crew)
         self.looked_s = self.now_s
-        self.all_late_s = math.inf
+        self.all_late_s, self.fresh_s = math.inf, -math.inf
         self.driver_runs, self.hangs_until_s = True, 0.0
 
     def start_helper(self):
@@ -324,7 +324,9 @@ class World:
         self.all_late_s += 0.01 * (self.now_s - self.looked_s)
         if frames:
             self.all_late_s = min(self.all_late_s, self.now_s - self.newest_s)
-        self.fresh_s = self.written_s + (self.all_late_s if self.all_late_s < math.inf else 0.0)
+        if self.all_late_s < math.inf:
+            # What it took for fresh before it learnt how late frames were stays so.
+            self.fresh_s = max(self.fresh_s, self.written_s + self.all_late_s)
         frames = [each for each in frames if is_frame(each.time_s, each.frame, FPS)]
         since_s, self.looked_s = self.now_s - self.looked_s, self.now_s
         self.driver.listen()
@@ -570,7 +572,7 @@ class Stops(RuleBasedStateMachine):
         world = self.world
         if world.is_astray:
             # Whoever drives does not know: the next hold brings the receiver back.
-            world.sees = False
+            world.sees, world.behind_s = False, 0.0
             world.pass_s(1.0)
             assert not world.is_astray
         world.sees, world.wrong, world.behind_s = True, None, 0.0
