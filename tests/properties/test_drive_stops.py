@@ -225,7 +225,7 @@ class World:
         )
         self.driver = Driver(PLACES["opened"], self.manner, crew)
         self.looked_s = self.now_s
-        self.all_late_s, self.fresh_s = math.inf, -math.inf
+        self.all_late_s = math.inf
         self.driver_runs, self.hangs_until_s = True, 0.0
 
     def start_helper(self):
