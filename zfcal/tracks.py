@@ -7,7 +7,7 @@ The two shapes in which every other part sees a trial. Files are read in
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,3 +167,60 @@ class Samples:
             xy_m=self.xy_m[:, chosen],
             confidence=self.confidence[:, chosen],
         )
+
+
+def joined(parts: Iterable[Samples], *, first: int, stop: int) -> Samples:
+    """Return the samples of consecutive parts of a recording, such as its segments.
+
+    Parameters
+    ----------
+    parts
+        One at least, of one step; in order of time, none overlapping. What lies between two
+        of them is missing.
+    first, stop
+        The samples are ``range(first, stop)``; agents that are in none of them are left out.
+
+    Raises
+    ------
+    InputError
+        There is no part, they differ in their step, or an agent is of two kinds.
+    """
+    parts = list(parts)
+    if not parts or any(part.dt_s != parts[0].dt_s for part in parts):
+        steps = sorted({part.dt_s for part in parts})
+        raise InputError(f"Samples to join must be of one step dt_s, got {steps}.")
+    kept = [_between(part, first, stop) for part in parts]
+    agent, row, column = np.unique(
+        np.concatenate([part.agent for part in kept]), return_index=True, return_inverse=True
+    )
+    kinds = np.concatenate([part.kind for part in kept])
+    changed = np.flatnonzero(kinds != kinds[row][column])
+    if changed.size:
+        who = int(agent[column[changed[0]]])
+        raise InputError(f"Tracks: agent {who} is of two kinds; an id belongs to one agent.")
+    shape = (max(stop - first, 0), len(agent))
+    xy_m = np.full((*shape, 2), np.nan)
+    confidence = np.full(shape, np.nan, dtype=np.float32)
+    for part, columns in zip(kept, _pieces(column, [len(p.agent) for p in kept]), strict=True):
+        at = np.ix_(part.k - first, columns)
+        xy_m[at], confidence[at] = part.xy_m, part.confidence
+    return Samples(
+        dt_s=parts[0].dt_s,
+        k=np.arange(first, first + shape[0], dtype=np.int64),
+        agent=agent,
+        kind=kinds[row],
+        xy_m=xy_m,
+        confidence=confidence,
+    )
+
+
+def _between(part: Samples, first: int, stop: int) -> Samples:
+    """Return the samples from one to another, and the agents that are in them."""
+    rows = (part.k >= first) & (part.k < stop)
+    xy_m, confidence = part.xy_m[rows], part.confidence[rows]
+    cut = replace(part, k=part.k[rows], xy_m=xy_m, confidence=confidence)
+    return cut.take_agents(np.flatnonzero((~np.isnan(xy_m[..., 0])).any(axis=0)))
+
+
+def _pieces(values: NDArray[np.intp], sizes: list[int]) -> list[NDArray[np.intp]]:
+    return np.split(values, np.cumsum(sizes)[:-1])

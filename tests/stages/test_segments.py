@@ -15,13 +15,13 @@ STARTS = [0, 60, 120, 180]
 @pytest.fixture
 def reads(monkeypatch):
     """Return a list that hears which segments are read from the disk."""
-    heard, locate = [], module._locate
+    heard, read = [], module.read_segment
 
-    def watch(opened, path, start_s):
+    def watch(opened, start_s):
         heard.append(start_s)
-        return locate(opened, path, start_s)
+        return read(opened, start_s)
 
-    monkeypatch.setattr(module, "_locate", watch)
+    monkeypatch.setattr(module, "read_segment", watch)
     return heard
 
 

@@ -23,7 +23,7 @@ from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.calibrate.likelihood import estimate, track_files
+from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import (
     MODEL,
     RoundPlaces,
@@ -47,7 +47,7 @@ from zfcal.stages.events import (
     say_nothing,
 )
 from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.segments import readable
+from zfcal.stages.segments import readable, segment_files
 from zfcal.stages.settled import Items
 from zfcal.stages.skipping import skipped_path, without_skipped
 from zfcal.stages.taken import unless_taken
@@ -81,7 +81,7 @@ class _Run:
         files += [previous] if previous is not None else []
         if self.options.seed_likelihood:
             # One that is no file is no input: it is told where the estimate is made.
-            files += readable(track_files(self.root, window_span(places.end_s)), say_nothing)
+            files += readable(segment_files(self.root, window_span(places.end_s)), say_nothing)
         options = calibrate_options(self.opened, self.options, generations=generations)
         inputs = hash_inputs(self.root, files)
         return Lineage(
