@@ -19,6 +19,10 @@ ROBOT = 1
 KINDS = ("fish", "robot")
 """Names of the kinds, in the order of their codes."""
 
+GUESS = 0.5
+"""A position of a lower confidence is a guess. It counts as a place wherever places count, and is
+seen by the others; no step of a likelihood begins or ends in it, and no robot is driven by it."""
+
 Floats = NDArray[np.float64]
 
 
@@ -40,7 +44,7 @@ class Tracks:
     heading_rad : ndarray of float32, shape (row,)
         Counter-clockwise from x; NaN where unknown.
     confidence : ndarray of float32, shape (row,)
-        In [0, 1]; below 0.5 a position is a guess.
+        In [0, 1]; below `GUESS` a position is a guess.
     """
 
     time_s: Floats
@@ -152,6 +156,11 @@ class Samples:
     kind: NDArray[np.int8]
     xy_m: Floats
     confidence: NDArray[np.float32]
+
+    @property
+    def guessed(self) -> NDArray[np.bool_]:
+        """Whether a position is a guess, shape (sample, agent); False where there is none."""
+        return np.asarray(self.confidence < GUESS)
 
     def of_kind(self, kind: int) -> Samples:
         """Return the samples of one kind of agent only."""

@@ -165,12 +165,33 @@ def test_many_short_tracks_need_few_columns_and_lose_no_step(two_rooms, walk):
     assert len(own) == len(scene.turns)
 
 
-def test_a_guessed_position_counts_as_missing(two_rooms):
-    """Confidence 0.49 is a guess; 0.5 is not."""
+def test_no_step_begins_or_ends_in_a_guess(two_rooms):
+    """Confidence 0.49 is one; 0.5 is not. The likelihood of the base has the same steps."""
     path = line((0.2, 0.75), 8)
     low, enough = [1, 1, 1, 0.49, 1, 1, 1, 1], [1, 1, 1, 0.5, 1, 1, 1, 1]
     assert make_scene(samples_of(path, confidence=[low]), two_rooms).turns.at.tolist() == [1, 5, 6]
     assert len(make_scene(samples_of(path, confidence=[enough]), two_rooms).turns) == 6
+    for confidence, at in ((low, [1, 5, 6]), (enough, [1, 2, 3, 4, 5, 6])):
+        samples = samples_of(path, confidence=[confidence])
+        assert make_scene(samples, two_rooms).moves.at.tolist() == at
+        assert steps_of(samples, two_rooms, fov_rad=2.0).k.tolist() == at
+
+
+def test_a_guess_is_seen_by_the_others(two_rooms):
+    """The second fish is a guess at sample 3: the first sees it then as at other times."""
+    paths = line((0.2, 0.75), 8), line((0.25, 0.75), 8)
+    guess = [[1] * 8, [1, 1, 1, 0.2, 1, 1, 1, 1]]
+    samples = samples_of(*paths, confidence=guess)
+
+    scene, steps = make_scene(samples, two_rooms), steps_of(samples, two_rooms, fov_rad=2.0)
+
+    assert (scene.states[:, ZONE, 1] > 0).all()
+    assert scene.tracks[:, 1].tolist() == [2] * 8
+    assert scene.turns.at[scene.turns.who == 1].tolist() == [1, 5, 6]
+    first = steps.take(steps.agent == 1)
+    assert first.k.tolist() == [1, 2, 3, 4, 5, 6]
+    assert (first.angle_sr[:, 1] > 0).all()
+    assert scene.n_fish == 2
 
 
 def test_a_position_outside_is_not_there_and_one_at_the_wall_is(two_rooms):

@@ -82,9 +82,9 @@ def steps_of(samples: Samples, arena: Arena, *, fov_rad: float) -> Steps:
     """Return the usable steps of measured tracks.
 
     A step needs its agent under one id at three samples in a row, inside the
-    tank, with two displacements of at least 2 mm (a shorter one has no
-    heading). A neighbour's heading is that of its last displacement of that
-    length; one that never moved is taken to swim straight away.
+    tank and none of them a guess, with two displacements of at least 2 mm (a shorter one has no
+    heading). What is guessed is seen by the others all the same. A neighbour's heading is that of
+    its last displacement of that length; one that never moved is taken to swim straight away.
 
     Parameters
     ----------
@@ -106,6 +106,8 @@ def steps_of(samples: Samples, arena: Arena, *, fov_rad: float) -> Steps:
     heading = _headings(moved, length)
     usable = (length[:-1] >= HEADING_MIN_STEP_M) & (length[1:] >= HEADING_MIN_STEP_M)
     usable &= (zone[1:-1] > 0) & (zone[2:] > 0)
+    sure = ~samples.guessed
+    usable &= sure[:-2] & sure[1:-1] & sure[2:]
     at, agent = np.nonzero(usable)
     at += 1
     speed = length[at, agent] / samples.dt_s

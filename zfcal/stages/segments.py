@@ -15,6 +15,7 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.reading.contents import (
     hash_of,
     numbered_of,
@@ -30,7 +31,7 @@ from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.stages.events import LeftOut, Tell
 from zfcal.stages.opening import OpenTrial, open_trial
-from zfcal.tracks import Samples, Tracks
+from zfcal.tracks import GUESS, Samples, Tracks
 from zfcal.units import SEGMENT_S
 
 STEP_S = int(SEGMENT_S)
@@ -95,6 +96,21 @@ def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
         else:
             tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
     return found
+
+
+def guess_options(paths: Iterable[Path]) -> dict[str, JSON]:
+    """Return how guesses count, as a lineage states it; nothing where there are none.
+
+    Models and findings from the time when nobody saw a guess do not state it.
+    """
+
+    def has_guesses(path: Path) -> bool:
+        try:
+            return bool((read_tracks(path).confidence < GUESS).any())
+        except (DamagedError, InputError):
+            return False
+
+    return {"guesses": "seen"} if any(map(has_guesses, paths)) else {}
 
 
 def _problem_of(path: Path) -> ZfcalError | None:

@@ -98,6 +98,7 @@ def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full)
     inputs = read_lineage(model).inputs
     assert {"tracks/000060.parquet", "tracks/000120.parquet"} <= set(inputs)
     assert "tracks/000000.parquet" not in inputs
+    assert "guesses" not in read_lineage(model).options
 
 
 @pytest.mark.slow

@@ -19,9 +19,6 @@ from zfcal.stages.segments import segment_files
 from zfcal.stages.stretch import read_stretch
 from zfcal.tracks import FISH, Samples
 
-CERTAIN = 0.5
-"""Positions of a lower confidence are guesses of the tracker and make no steps."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
@@ -120,8 +117,5 @@ def estimate(
 
 
 def _steps(samples: Samples, opened: OpenTrial, template: Parameters) -> Steps:
-    """Return the steps of fish between positions that are no guesses."""
-    sure = ~(samples.confidence < CERTAIN)
-    kept = replace(samples, xy_m=np.where(sure[..., None], samples.xy_m, np.nan))
-    steps = steps_of(kept, opened.arena, fov_rad=template.fov_rad)
+    steps = steps_of(samples, opened.arena, fov_rad=template.fov_rad)
     return steps.take(np.isin(steps.agent, samples.agent[samples.kind == FISH]))
