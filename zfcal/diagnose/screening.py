@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.chances import normal_of
 from zfcal.diagnose.fields import fields_of, is_within_fields
 from zfcal.diagnose.freezes import rest_score, rested_steps
 from zfcal.diagnose.scores import (
@@ -32,7 +33,6 @@ from zfcal.diagnose.scores import (
     basis_of,
     by_track,
     centred,
-    normal_deviate,
     summed,
     tables_of,
     tame,
@@ -285,7 +285,7 @@ class Screen:
         spread2 = max(0.0, float(each.var(ddof=1) - (1 / information).mean()))
         return Score(
             candidate=candidate,
-            z=normal_deviate(q, len(sums) - 1),
+            z=normal_of(q, len(sums) - 1),
             strength=float(np.sqrt(spread2)),
             information=float(information.sum()),
             steps=steps,
