@@ -29,7 +29,7 @@ from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.kernels import product_sums
-from zfcal.diagnose.null import UNLIKE
+from zfcal.diagnose.null import UNLIKE, moments_of
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
@@ -225,14 +225,12 @@ def judge(
     made: dict[str, float] = {}
     tails: dict[str, float] = {}
     for name, z in measured.items():
-        drawn = np.array([null[name] for null in nulls if name in null])
-        centre = float(drawn.mean()) if drawn.size else 0.0
-        squares = float(((drawn - centre) ** 2).sum())
-        df = max(drawn.size - 1, 0) + prior
-        spread = math.sqrt((squares + prior) / df * (1 + 1 / max(drawn.size, 1)))
-        spread = math.hypot(spread, UNLIKE * centre)
+        drawn = np.array([[null[name]] for null in nulls if name in null]).reshape(-1, 1)
+        moments = moments_of(drawn, prior)
+        centre = float(moments.centre[0])
+        spread = math.hypot(float(moments.spread_of_one_more(len(drawn))[0]), UNLIKE * centre)
         made[name] = (z - centre) / spread if n else z
-        tails[name] = float(stdtr(df, -made[name])) if n else float(ndtr(-z))
+        tails[name] = float(stdtr(moments.df, -made[name])) if n else float(ndtr(-z))
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])
