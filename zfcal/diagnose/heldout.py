@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import rel_entr
 
-from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.candidates import candidate_of
 from zfcal.diagnose.fields import is_within_fields
 from zfcal.diagnose.freezes import rested_steps
 from zfcal.diagnose.naming import refit
@@ -67,14 +67,6 @@ def scene_of(scene: Scene, block: Ints, chosen: NDArray[np.bool_]) -> Scene:
         return np.asarray(chosen[block[at]] & (before == block[at]) & (after == block[at]))
 
     return thin(scene, within(scene.turns.at), within(scene.moves.at))
-
-
-def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
-    """Return an effect at the shape that its parameters have."""
-    effect = find_effect(name)
-    known = {p.name: values.get(p.name, p.default) for p in effect.parameters}
-    shape = {key: value for key, value in known.items() if key != effect.strength}
-    return Candidate(effect=effect, shape=shape)
 
 
 def fit_base(scene: Scene, model: Parameters) -> Screen:
