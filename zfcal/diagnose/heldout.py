@@ -27,7 +27,6 @@ from zfcal.diagnose.speeds import chain_of, log_density
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import Fitted
-from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, thin
 from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters, ZoneParameters
@@ -238,7 +237,7 @@ def speed_gains(
         parts.append(_factor_gains(model, base, field, random))
     if any(effect.stops for effect in effects):
         parts.append(_stop_gains(model, trained))
-    before = _factor(base)
+    before = base.model_factor
     return Gains(
         base=Steps(
             at=moves.at, values=log_density(moves.speed_m_s, before, moves.zone, field=field)
@@ -259,7 +258,7 @@ def _factor_gains(
 ) -> tuple[Floats, Floats]:
     """Return gains of factors on speed, and what draws of the model itself would gain."""
     moves = base.scene.moves
-    ours, theirs = _factor(model), _factor(base)
+    ours, theirs = model.model_factor, base.model_factor
 
     def gain(speed: Floats) -> Floats:
         own = log_density(speed, ours, moves.zone, field=field)
@@ -273,11 +272,6 @@ def _factor_gains(
             drawn[rows] = random.permutation(model.own_speeds[rows])
         expected += gain(drawn * ours) / _DRAWS
     return gain(moves.speed_m_s), expected
-
-
-def _factor(screen: Screen) -> Floats:
-    """Return the factor of a model's effects on each speed; a fish at rest has one as well."""
-    return screen.speed_factor(pack([screen.fitted.parameters], screen.scene.arena))
 
 
 def _stop_gains(model: Screen, trained: Screen) -> tuple[Floats, Floats]:

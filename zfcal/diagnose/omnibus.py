@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
-from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.kernels import product_sums
@@ -132,7 +131,7 @@ def _scored(standing: Standing, rng: np.random.Generator) -> Iterator[_Scores]:
     sorted_by = contexts(scene, moves, about)
     # Speeds are ranked within their zones: that says nothing.
     del sorted_by["zone"]
-    ranks = speed_ranks(moves, speed_factor(scene, fitted), rng)
+    ranks = speed_ranks(moves, standing.speed_factor, rng)
     yield _Scores(
         name="speed", steps=moves, values=scores_of(ranks), near=about.near, contexts=sorted_by
     )
