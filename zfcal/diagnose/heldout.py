@@ -27,8 +27,8 @@ from zfcal.diagnose.speeds import chain_of, log_density
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import Fitted
+from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.scene import Scene, thin
-from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters, ZoneParameters
 
 Floats = NDArray[np.float64]

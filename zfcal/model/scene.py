@@ -1,8 +1,7 @@
 """Measured tracks as the states that agents decided in, with all that effects may ask.
 
-Where `steps` holds what the base model's likelihood asks, a scene holds the whole
-state of everybody at each sample, as the kernels of a simulation have it, so that an
-effect's own compiled functions give its likelihood.
+A scene holds the whole state of everybody at each sample, as the kernels of a simulation have
+it, so that an effect's own compiled functions give its likelihood.
 """
 
 from __future__ import annotations
@@ -16,10 +15,9 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.errors import InputError
-from zfcal.model.kernels.likelihood import PER_CELL
+from zfcal.model.kernels.landing import ANGLES, PER_CELL, landing_shares
 from zfcal.model.kernels.scene import fill_states
 from zfcal.model.kernels.world import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
-from zfcal.model.steps import ANGLES, landing_shares
 from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
 from zfcal.units import HEADING_MIN_STEP_M
@@ -66,7 +64,8 @@ class Turns(Moves):
     heading, taken, along_wall : ndarray, shape (step, 2)
         Unit vectors: before, after, and along the wall.
     share : ndarray of uint8, shape (step, ANGLES, zone)
-        Landing zones of each cell of headings; see `zfcal.model.steps.Steps`.
+        For each cell of headings, how many of its 4 places land in each zone at the step's
+        speed.
     """
 
     landing: Ints
@@ -145,7 +144,7 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
     """
     if not (samples.kind == FISH).any() or len(samples.k) < _MIN_SAMPLES:
         raise InputError(
-            f"A diagnosis needs fish at three samples in a row, got {len(samples.k)} samples of "
+            f"A likelihood needs fish at three samples in a row, got {len(samples.k)} samples of "
             f"{int((samples.kind == FISH).sum())} fish and {int((samples.kind != FISH).sum())} "
             f"robots."
         )

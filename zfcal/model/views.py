@@ -24,12 +24,12 @@ from zfcal.model.kernels.asking import (
     attend,
 )
 from zfcal.model.kernels.extended import harmonic_tilt
+from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import head_late, perceive
 from zfcal.model.kernels.world import Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
-from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters
 
 Floats = NDArray[np.float64]

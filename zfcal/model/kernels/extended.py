@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from zfcal.model.kernels.bells import exponential, one_over_integral
 from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.likelihood import PER_CELL
+from zfcal.model.kernels.landing import PER_CELL
 
 Floats = NDArray[np.float64]
 

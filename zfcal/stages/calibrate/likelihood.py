@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from zfcal.artifacts.lineage import JSON
 from zfcal.errors import InputError
 from zfcal.model.likelihood import Fit, fit
-from zfcal.model.steps import Steps, steps_of
+from zfcal.model.scene import make_scene
 from zfcal.parameters import Parameters, to_genes
 from zfcal.stages.events import Event, LeftOut, Note, Tell
 from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import segment_files
 from zfcal.stages.stretch import read_stretch
-from zfcal.tracks import FISH, Samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,13 +108,8 @@ def estimate(
         stretch = read_stretch(opened, span_s, say)
         if stretch.n_left_out:
             return None
-        found = fit(_steps(stretch.samples, opened, template), opened.arena, template)
+        found = fit(make_scene(stretch.samples, opened.arena), template)
     except InputError as error:
         tell(Note(text=f"{without}: {error}"))
         return None
     return Estimate(found=found) if math.isfinite(found.nats_per_step) else None
-
-
-def _steps(samples: Samples, opened: OpenTrial, template: Parameters) -> Steps:
-    steps = steps_of(samples, opened.arena, fov_rad=template.fov_rad)
-    return steps.take(np.isin(steps.agent, samples.agent[samples.kind == FISH]))
