@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 FISH = 0
@@ -22,8 +23,6 @@ KINDS = ("fish", "robot")
 GUESS = 0.5
 """A position of a lower confidence is a guess. It counts as a place wherever places count, and is
 seen by the others; no step of a likelihood begins or ends in it, and no robot is driven by it."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.kernels import (
     BEARING,
     DISTANCE,
@@ -40,7 +41,6 @@ from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene
 from zfcal.units import HEADING_MIN_STEP_M
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 UNITS = {

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, gammaln, ndtri, ndtri_exp
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.kernels import sums_in_bins
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEAST_IN_BIN = 20
 _LEAST_TAIL = 1e-290

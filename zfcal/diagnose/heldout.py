@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import rel_entr
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.candidates import candidate_of
 from zfcal.diagnose.fields import is_within_fields
 from zfcal.diagnose.freezes import rested_steps
@@ -30,9 +31,6 @@ from zfcal.model.fitted import Fitted
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.scene import Scene, thin
 from zfcal.parameters import Parameters, ZoneParameters
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 Effects = Mapping[str, Mapping[str, float]]
 """Effects by name, each with its parameters."""

@@ -17,14 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
 from zfcal.diagnose.null import moments_of
 from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST = 12
 MOST_OF_ONE = 3

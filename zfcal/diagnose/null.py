@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.diagnose.screening import Screen
 from zfcal.errors import InputError
 from zfcal.model.extended import maximise
@@ -27,7 +28,6 @@ from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import Parameters
 from zfcal.tracks import ROBOT, Samples
 
-Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _ROUNDS = 2

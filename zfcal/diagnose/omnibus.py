@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.kernels import product_sums
@@ -34,9 +35,6 @@ from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
 from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LAGS = 5
 _BINS = 20

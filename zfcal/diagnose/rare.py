@@ -19,9 +19,6 @@ from zfcal.diagnose.kernels import rare_headings
 from zfcal.diagnose.ranks import speed_ranks
 from zfcal.diagnose.standing import Standing
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _FLOOR = 0.03
 _CONTEXTS = (
     "zone",

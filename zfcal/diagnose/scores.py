@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.chances import normal_of_log
 from zfcal.model.fitted import Fitted
-
-Floats = NDArray[np.float64]
 
 _FLOOR = 0.01
 """Share of a uniform law in a heading's density, beside the lapse that was fitted."""

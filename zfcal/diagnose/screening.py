@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.chances import normal_of
 from zfcal.diagnose.fields import fields_of, is_within_fields
@@ -63,9 +64,6 @@ from zfcal.model.views import (
     spin_of,
 )
 from zfcal.units import HEADING_MIN_STEP_M
-
-Floats = NDArray[np.float64]
-
 
 _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""

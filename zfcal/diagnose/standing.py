@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats
 from zfcal.diagnose.surroundings import Surroundings, probabilities, surroundings
 from zfcal.model.fitted import Fitted
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.model.views import speed_factor
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.model.effects import find_effect
 from zfcal.model.fitted import (
     SCALES,
@@ -33,8 +34,6 @@ from zfcal.model.fitted import (
 from zfcal.model.scene import Scene
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters, ZoneParameters
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

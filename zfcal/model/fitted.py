@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e, i1e
 
+from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.kernels.extended import (
     BASE,
@@ -41,8 +42,6 @@ from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.scene import Scene
 from zfcal.model.views import View
 from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, Parameters
-
-Floats = NDArray[np.float64]
 
 Rows = NDArray[np.intp]
 

@@ -11,8 +11,8 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.extended import GENES, maximise, without_effects
 from zfcal.model.fitted import MIN_STEPS, SCALES, ZoneTurns, zone_scores, zone_turns
@@ -20,8 +20,6 @@ from zfcal.model.packing import check_model
 from zfcal.model.scene import Scene
 from zfcal.model.views import View
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 _NO_INFORMATION = 1e-9
 _DIFFERENCE = 1e-4

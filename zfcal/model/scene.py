@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.model.kernels.landing import ANGLES, PER_CELL, landing_shares
 from zfcal.model.kernels.scene import fill_states
@@ -21,9 +22,6 @@ from zfcal.model.kernels.world import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
 from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
 from zfcal.units import HEADING_MIN_STEP_M
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _MIN_SAMPLES = 3
 

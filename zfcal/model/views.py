@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.kernels.asking import (
@@ -31,8 +31,6 @@ from zfcal.model.kernels.world import Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

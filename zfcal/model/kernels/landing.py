@@ -7,10 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, clearance, zone_of
-
-Floats = NDArray[np.float64]
 
 ANGLES = 64
 """Cells of the integral over headings.
