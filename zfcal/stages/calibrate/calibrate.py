@@ -23,7 +23,7 @@ from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.calibrate.likelihood import estimate, track_files
+from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import (
     MODEL,
     RoundPlaces,
@@ -47,7 +47,7 @@ from zfcal.stages.events import (
     say_nothing,
 )
 from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.segments import readable
+from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.settled import Items
 from zfcal.stages.skipping import skipped_path, without_skipped
 from zfcal.stages.taken import unless_taken
@@ -79,10 +79,12 @@ class _Run:
         trial = self.opened.trial
         files = [places.stats, self.root / trial.model, *self.opened.arena_files]
         files += [previous] if previous is not None else []
+        options = calibrate_options(self.opened, self.options, generations=generations)
         if self.options.seed_likelihood:
             # One that is no file is no input: it is told where the estimate is made.
-            files += readable(track_files(self.root, window_span(places.end_s)), say_nothing)
-        options = calibrate_options(self.opened, self.options, generations=generations)
+            tracks = readable(segment_files(self.root, window_span(places.end_s)), say_nothing)
+            options |= guess_options(tracks)
+            files += tracks
         inputs = hash_inputs(self.root, files)
         return Lineage(
             schema=MODEL, command="calibrate", options=options, seed=self.seed, inputs=inputs

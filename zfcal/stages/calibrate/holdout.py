@@ -41,7 +41,7 @@ from zfcal.stages.calibrate.rounds import (
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.stages.events import Made, Result, Tell
 from zfcal.stages.opening import OpenTrial, Task, at_work, reason_to_make
-from zfcal.stages.segments import STEP_S, Segments, segment_path, segment_starts
+from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
 from zfcal.stages.settled import settled
 from zfcal.tracks import FISH
 
@@ -282,8 +282,9 @@ def _lineage(
 ) -> Lineage:
     trial = opened.trial
     files = [segment_path(trial.root, start) for start in starts]
-    files += [trial.root / trial.model, *opened.arena_files]
     said = calibrate_options(opened, options, generations=options.generations_asked)
+    said |= guess_options(files) if options.seed_likelihood else {}
+    files += [trial.root / trial.model, *opened.arena_files]
     stretches: dict[str, JSON] = {
         "fps": trial.fps,
         "window": _text(span.train_s),

@@ -25,6 +25,7 @@ from zfcal.parameters import Parameters
 from zfcal.stages.diagnose.findings import FOLDER, Book, Draw
 from zfcal.stages.events import Made, Planned, Progress, Result, Tell, UpToDate
 from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
+from zfcal.stages.segments import guess_options
 from zfcal.stages.settled import settled
 from zfcal.stages.stretch import Stretch, read_stretch
 
@@ -204,6 +205,7 @@ def lineage_of(case: Case, stretch: Stretch) -> Lineage:
         "quick": options.quick,
         "noise_mm": None if options.noise_m is None else 1e3 * options.noise_m,
         "window": None if window is None else f"{window[0]}:{window[1]}",
+        **guess_options(stretch.files),
     }
     files = [*stretch.files, case.model, *case.opened.arena_files]
     return Lineage(
