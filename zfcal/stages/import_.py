@@ -24,7 +24,7 @@ from zfcal.stages.recording import (
     write_segments,
 )
 from zfcal.stages.segments import segment_path
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
 _LIMITS = {"n_fish", "n_robots"}

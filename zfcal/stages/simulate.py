@@ -29,7 +29,7 @@ from zfcal.stages.recording import (
     write_segments,
 )
 from zfcal.stages.segments import segment_path
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 Floats = NDArray[np.float64]

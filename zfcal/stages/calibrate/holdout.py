@@ -42,7 +42,7 @@ from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, 
 from zfcal.stages.events import Made, Result, Tell
 from zfcal.stages.opening import OpenTrial, Task, at_work, reason_to_make
 from zfcal.stages.segments import STEP_S, Segments, segment_path, segment_starts
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.tracks import FISH
 
 Floats = NDArray[np.float64]

@@ -27,7 +27,7 @@ from zfcal.stages.camera.making import CameraTask, Place, Recipe, make_camera
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, check_view
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Tell
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.tracking.robot import LedOptions, RobotFinder
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker, follow

@@ -26,7 +26,7 @@ from zfcal.cameras.video import encoded
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.making import CameraTask, Found, Place, Recipe, make_camera
 from zfcal.stages.events import LeftOut, Made, Note, Progress, Tell
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 
 PX_PER_M = 10_000.0
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"}

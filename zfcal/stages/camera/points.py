@@ -16,7 +16,7 @@ from zfcal.stages.camera.cameras import read_lens
 from zfcal.stages.camera.corners import size_of_images
 from zfcal.stages.camera.making import CameraTask, Place, Recipe, make_camera
 from zfcal.stages.events import Tell
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ from zfcal.parameters import Parameters
 from zfcal.stages.diagnose.findings import FOLDER, Book, Draw
 from zfcal.stages.events import Made, Planned, Progress, Result, Tell, UpToDate
 from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.stages.stretch import Stretch, read_stretch
 
 

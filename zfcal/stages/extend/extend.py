@@ -29,7 +29,7 @@ from zfcal.stages.diagnose.findings import FILE, FOLDER, Book, Draw
 from zfcal.stages.events import Made, Note, Result, Tell, say_nothing
 from zfcal.stages.extend.extension import Extension, extension_of
 from zfcal.stages.opening import Task, at_work, open_trial, reason_to_make
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.stages.stretch import read_stretch
 
 Effects = Mapping[str, Mapping[str, float]]
