@@ -13,13 +13,14 @@ from zfcal.stages.events import Made, UpToDate
 from zfcal.stages.opening import Task
 from zfcal.stages.recording import (
     Recording,
+    Segmented,
     check_same_source,
     cut,
     hash_sources,
     starts_between,
     starts_of_recording,
-    write_segments,
 )
+from zfcal.stages.stage import OneThing, run
 from zfcal.tracks import Tracks, concatenate
 
 LINEAGE = Lineage(schema="zfcal.tracks/1", command="import", inputs={"a.csv": "0" * 64})
@@ -48,9 +49,34 @@ def trial(make_trial):
     return read_trial(root)
 
 
+class Brought(Segmented):
+    """A recording that is there already."""
+
+    recording: Recording
+
+    def record(self):
+        """Return it."""
+        return self.recording
+
+
+def write_segments(trial, recorded, tell, *, task=None):
+    """Write the segments of a recording that are missing or stale."""
+    tracks, end_s, lineage = recorded
+
+    class Bring(OneThing):
+        name = "import"
+
+        def item(self, run):
+            found = Brought(run, trial, lineage, [])
+            found.recording = Recording(tracks=tracks, end_s=end_s)
+            return found
+
+    run(Bring(), trial.root, tell, task=task)
+
+
 def recording_of(tracks, end_s, lineage=LINEAGE):
-    """Return tracks as a recording."""
-    return Recording(tracks=tracks, end_s=end_s, lineage=lineage)
+    """Return tracks, to when they go, and where they come from."""
+    return tracks, end_s, lineage
 
 
 def test_rows_fall_into_the_minute_in_which_they_are():

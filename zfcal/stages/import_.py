@@ -6,25 +6,18 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import final
 
 import numpy as np
 
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.readers import ImportOptions, guess_format, import_foreign
-from zfcal.stages.events import Note, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
-from zfcal.stages.recording import (
-    TRACKS,
-    Recording,
-    check_same_source,
-    hash_sources,
-    stale_segments,
-    starts_of_recording,
-    write_segments,
-)
-from zfcal.stages.segments import segment_path
-from zfcal.stages.stage import settled
+from zfcal.stages.events import Note, Tell
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.recording import TRACKS, Recording, Segmented, hash_sources, starts_of_recording
+from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
 _LIMITS = {"n_fish", "n_robots"}
@@ -79,35 +72,64 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
     InputError
         The trial does not exist, or the file is wrong or does not fit it.
     """
-    task = task or Task()
-    opened = open_trial(root)
+    read_trial(root)
     name = source.format or _guessed(source.path, tell)
-    options = _options(opened, source.options)
-    with at_work(root, "import", task):
-        settled(lambda: _import(opened, source, (name, options), tell, task=task), tell)
+    run(Import(source=source, form=name), root, tell, task=task)
 
 
-def _import(
-    opened: OpenTrial, source: Source, form: tuple[str, ImportOptions], tell: Tell, *, task: Task
-) -> None:
-    root, (name, options) = opened.trial.root, form
-    lineage = _lineage(opened, source, name, options)
-    check_same_source(opened.trial, lineage, task)
-    starts = starts_of_recording(root)
-    if starts and not stale_segments(opened.trial, lineage, starts, task):
-        for start in starts:
-            tell(UpToDate(path=segment_path(root, start)))
-        return
-    tracks = _read(source, name, options, tell)
-    tell_outside(opened, tracks, tell)
-    tell_missing(opened, tracks, tell)
-    recording = Recording(
-        tracks=tracks,
-        end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
-        lineage=lineage,
-        extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
-    )
-    write_segments(opened.trial, recording, tell, task=task)
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Import(OneThing):
+    """The tracks of another program.
+
+    Parameters
+    ----------
+    source
+        What to import.
+    form
+        Its format.
+    """
+
+    name = "import"
+
+    source: Source
+    form: str
+
+    def item(self, run: Run) -> Item:
+        """Return the segments of the recording."""
+        opened = open_trial(run.root)
+        options = _options(opened, self.source.options)
+        lineage = _lineage(opened, self.source, self.form, options)
+        return _Imported(run, opened, lineage, (self.source, self.form, options))
+
+
+@final
+class _Imported(Segmented):
+    """The segments of a recording of another program."""
+
+    def __init__(
+        self,
+        run: Run,
+        opened: OpenTrial,
+        lineage: Lineage,
+        said: tuple[Source, str, ImportOptions],
+    ) -> None:
+        super().__init__(run, opened.trial, lineage, starts_of_recording(run.root))
+        self._tell = run.tell
+        self._opened = opened
+        self._said = said
+
+    def record(self) -> Recording:
+        """Read the other program's tracks, and say what looks wrong about them."""
+        (source, name, options), opened, tell = self._said, self._opened, self._tell
+        tracks = _read(source, name, options, tell)
+        tell_outside(opened, tracks, tell)
+        tell_missing(opened, tracks, tell)
+        return Recording(
+            tracks=tracks,
+            end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
+            extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
+        )
 
 
 def _guessed(path: Path, tell: Tell) -> str:

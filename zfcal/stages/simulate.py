@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +17,12 @@ from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
-from zfcal.stages.events import Planned, Tell, UpToDate
+from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
-from zfcal.stages.recording import (
-    TRACKS,
-    Recording,
-    check_same_source,
-    hash_sources,
-    stale_segments,
-    starts_between,
-    write_segments,
-)
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.recording import TRACKS, Recording, Segmented, hash_sources, starts_between
 from zfcal.stages.segments import segment_path
-from zfcal.stages.stage import settled
+from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 Floats = NDArray[np.float64]
@@ -100,28 +93,49 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
                 tell(Planned(path=segment_path(root, start), reason="missing"))
             return
         root = made.root
-    read_trial(root)
-    with at_work(root, "simulate", task):
-        settled(lambda: _simulate(root, options, tell, task=task, new=new), tell)
+    run(Simulate(options=options, is_new=new), root, tell, task=task)
 
 
-def _simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task, new: bool) -> None:
-    opened = open_trial(root)
-    if not new:
-        _check_existing(opened, options)
-    lineage = _lineage(opened, options)
-    check_same_source(opened.trial, lineage, task)
-    starts = starts_between(0.0, options.duration_s)
-    if stale_segments(opened.trial, lineage, starts, task):
-        recording = Recording(
-            tracks=swim(opened, options),
-            end_s=options.duration_s,
-            lineage=lineage,
-        )
-        write_segments(opened.trial, recording, tell, task=task)
-        return
-    for start in starts:
-        tell(UpToDate(path=segment_path(root, start)))
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulate(OneThing):
+    """The tracks of a simulation.
+
+    Parameters
+    ----------
+    options
+        What to simulate.
+    is_new
+        Whether the trial was made for it just now.
+    """
+
+    name = "simulate"
+
+    options: SimulateOptions
+    is_new: bool = False
+
+    def item(self, run: Run) -> Item:
+        """Return the segments of the simulation."""
+        opened = open_trial(run.root)
+        if not self.is_new:
+            _check_existing(opened, self.options)
+        return _Swum(run, opened, self.options)
+
+
+@final
+class _Swum(Segmented):
+    """The segments of a simulation."""
+
+    def __init__(self, run: Run, opened: OpenTrial, options: SimulateOptions) -> None:
+        starts = starts_between(0.0, options.duration_s)
+        super().__init__(run, opened.trial, _lineage(opened, options), starts)
+        self._opened = opened
+        self._options = options
+
+    def record(self) -> Recording:
+        """Simulate."""
+        tracks = swim(self._opened, self._options)
+        return Recording(tracks=tracks, end_s=self._options.duration_s)
 
 
 def new_trial(root: Path, options: SimulateOptions) -> NewTrial:
