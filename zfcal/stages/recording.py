@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +15,10 @@ from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading.contents import hash_of, hold_steady
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.events import Event, Note, Progress
+from zfcal.stages.events import Note, Progress
 from zfcal.stages.opening import Task
 from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
-from zfcal.stages.stage import Draft, Item, Output, Run
+from zfcal.stages.stage import Draft, Item, Output, Run, Write
 from zfcal.stages.taken import unless_taken
 from zfcal.tracks import Tracks
 from zfcal.trial import Trial
@@ -192,11 +191,8 @@ class Segmented(Item):
         for number, (start, tracks) in enumerate(parts, start=1):
             end_s = min(recording.end_s, float(start + STEP_S))
             extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
-            path = segment_path(self._root, start)
-            yield Draft(
-                output=Output(path=path, lineage=self._lineage),
-                write=partial(_write_segment, tracks, extra),
-            )
+            output = Output(path=segment_path(self._root, start), lineage=self._lineage)
+            yield Draft(output=output, write=_writer(tracks, extra))
             self._run.tell(Progress(stage="segments", done=number, total=len(parts)))
         self._remove_others({start for start, _ in parts})
 
@@ -215,11 +211,8 @@ class Segmented(Item):
                 )
 
 
-def _write_segment(
-    tracks: Tracks, extra: Mapping[str, JSON], path: Path, lineage: Lineage
-) -> list[Event]:
-    write_tracks(path, tracks, lineage, extra=extra)
-    return []
+def _writer(tracks: Tracks, extra: Mapping[str, JSON]) -> Write:
+    return lambda path, lineage: write_tracks(path, tracks, lineage, extra=extra)
 
 
 def cut(tracks: Tracks, end_s: float) -> Iterator[tuple[int, Tracks]]:

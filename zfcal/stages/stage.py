@@ -41,8 +41,8 @@ K = TypeVar("K")
 S = TypeVar("S")
 T = TypeVar("T")
 
-Write: TypeAlias = Callable[[Path, Lineage], Iterable[Event]]
-"""Writes a file whole, with its lineage, and returns what is told after it has appeared."""
+Write: TypeAlias = Callable[[Path, Lineage], Iterable[Event] | None]
+"""Writes a file whole, with its lineage; returns what is to be told after it has appeared."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -388,7 +388,7 @@ class _Making:
             said = draft.write(output.path, output.lineage)
             is_there = True
             run.tell(Made(path=output.path, reason=reason))
-            for event in said:
+            for event in said or ():
                 run.tell(event)
         return is_there
 
@@ -402,14 +402,14 @@ class _Making:
             return []
         for output in outputs:
             check_free(output.path)
-        made: list[tuple[Path, Iterable[Event]]] = []
+        made: list[tuple[Path, Iterable[Event] | None]] = []
         for draft in item.compute():
             path = draft.output.path
             made.append((path, draft.write(path, draft.output.lineage)))
         for path, _ in made:
             run.tell(Made(path=path, reason=reason))
         for _, said in made:
-            for event in said:
+            for event in said or ():
                 run.tell(event)
         return [path for path, _ in made]
 

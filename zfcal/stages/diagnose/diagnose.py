@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
-from zfcal.artifacts.atomic import check_free
-from zfcal.artifacts.freshness import hash_inputs, relative_to, stale_reason
+from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import newest_model, read_model_for
 from zfcal.diagnose.document import SCHEMA, findings_document
@@ -22,10 +23,10 @@ from zfcal.diagnose.question import Question
 from zfcal.diagnose.question import Tell as Heard
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters
-from zfcal.stages.diagnose.findings import FOLDER, Book, Draw
-from zfcal.stages.events import Made, Planned, Progress, Result, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.stage import settled
+from zfcal.stages.diagnose.findings import FOLDER, Book, Draw, write_findings
+from zfcal.stages.events import Progress, Result, Tell
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.stretch import Stretch, read_stretch
 
 
@@ -162,35 +163,63 @@ def diagnose(
         The trial, the model or the tracks are wrong, the disk is full, or another
         diagnose is at work on the trial. Damaged segments are left out and told instead.
     """
-    task = task or Task()
-    with at_work(root, "diagnose", task):
-        return settled(lambda: _diagnose(root, options, tell, task=task, draw=draw), tell)
+    there = run(Diagnose(options=options, draw=draw), root, tell, task=task)
+    return there[0] if there else None
 
 
-def _diagnose(
-    root: Path, options: DiagnoseOptions, tell: Tell, *, task: Task, draw: Draw | None
-) -> Path | None:
-    case = open_case(root, options)
-    stretch = read_stretch(case.opened, options.window_s, tell)
-    book = Book(opened=case.opened, folder=case.folder, draw=draw)
-    expected = lineage_of(case, stretch)
-    reason = stale_reason([book.path], expected) or ("forced" if task.force else None)
-    if reason is not None and task.dry_run:
-        tell(Planned(path=book.path, reason=reason))
-        return None
-    if reason is None:
-        tell_version([book.path], expected, tell)
-        tell(UpToDate(path=book.path))
-    else:
-        check_free(book.path)
-        if draw is not None and options.workers > 1:
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnose(OneThing):
+    """The findings about a model.
+
+    Parameters
+    ----------
+    options
+        What to ask, and how.
+    draw
+        Draws a page beside the findings; None for the findings alone.
+    """
+
+    name = "diagnose"
+
+    options: DiagnoseOptions
+    draw: Draw | None = None
+
+    def item(self, run: Run) -> Item:
+        """Return the findings; the tracks are read, since the damaged ones are no inputs."""
+        case = open_case(run.root, self.options)
+        stretch = read_stretch(case.opened, self.options.window_s, run.tell)
+        return _Findings(run, case, stretch, self.draw)
+
+
+@final
+class _Findings(Item):
+    """``findings.json``, and the page that shows it."""
+
+    def __init__(self, run: Run, case: Case, stretch: Stretch, draw: Draw | None) -> None:
+        self._run = run
+        self._case = case
+        self._stretch = stretch
+        self._book = Book(opened=case.opened, folder=case.folder, draw=draw)
+        self._output = Output(path=self._book.path, lineage=lineage_of(case, stretch))
+
+    def outputs(self) -> tuple[Output]:
+        """Return the findings."""
+        return (self._output,)
+
+    def compute(self) -> Iterator[Draft]:
+        """Diagnose."""
+        draw = self._book.draw
+        if draw is not None and self._case.options.workers > 1:
             draw.prepare()
-        diagnosis = _answer(case, stretch, tell)
-        book.write(_document(case, stretch, diagnosis), expected)
-        tell(Made(path=book.path, reason=reason))
-    book.show(tell, task)
-    tell(Result(value=book.read()[0]))
-    return book.path
+        diagnosis = _answer(self._case, self._stretch, self._run.tell)
+        document = _document(self._case, self._stretch, diagnosis)
+        yield Draft(output=self._output, write=partial(write_findings, document))
+
+    def finish(self) -> None:
+        """Draw the page where it does not show these findings, and tell them."""
+        self._book.show(self._run.tell, self._run.task)
+        self._run.tell(Result(value=self._book.read()[0]))
 
 
 def lineage_of(case: Case, stretch: Stretch) -> Lineage:
