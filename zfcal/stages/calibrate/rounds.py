@@ -25,6 +25,8 @@ from zfcal.calibrate.search import Progress
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.parameters import gene_names
+from zfcal.stages.events import Event, Result
+from zfcal.stages.stage import Write
 
 MODEL = "zfcal.model/1"
 POPULATION = "zfcal.population/1"
@@ -130,34 +132,40 @@ def read_previous(path: Path) -> Previous:
     )
 
 
-def write_round(
-    places: RoundPlaces,
-    result: RoundResult,
-    lineages: dict[str, Lineage],
-    table: dict[str, JSON],
-) -> None:
-    """Write what a round has found, the model last.
+def round_writers(
+    places: RoundPlaces, result: RoundResult, table: dict[str, JSON], told: Result
+) -> dict[str, Write]:
+    """Return what writes the files of a round, by their schemas.
 
     Parameters
     ----------
     places
-        Where it goes.
+        Of the round.
     result
         What was found.
-    lineages
-        The lineage of each file, by its schema.
     table
         The model's table ``[result]``, from `result_table`.
+    told
+        What is told of it, after the model.
     """
-    _write_population(places.population, result, lineages[POPULATION])
-    rows = scores_to_rows(
-        result.scores,
-        window_end_s=places.end_s,
-        compared="model-vs-control",
-        ceiling=result.ceiling,
-    )
-    write_table(places.scores, make_table(SCORES, rows), lineages[SCORES])
-    write_model(places.model, result.champion, lineages[MODEL], table, parents=False)
+
+    def population(path: Path, lineage: Lineage) -> None:
+        _write_population(path, result, lineage)
+
+    def scores(path: Path, lineage: Lineage) -> None:
+        rows = scores_to_rows(
+            result.scores,
+            window_end_s=places.end_s,
+            compared="model-vs-control",
+            ceiling=result.ceiling,
+        )
+        write_table(path, make_table(SCORES, rows), lineage)
+
+    def model(path: Path, lineage: Lineage) -> list[Event]:
+        write_model(path, result.champion, lineage, table, parents=False)
+        return [told]
+
+    return {POPULATION: population, SCORES: scores, MODEL: model}
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
