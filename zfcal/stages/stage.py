@@ -12,7 +12,7 @@ the same everywhere:
   all inputs are looked at again. If one has changed nothing is published, and the thing is made
   once more. If one changes again, a thing among many is left to the next run; of one thing alone
   that is an error.
-* A folder in the place of a file keeps that file away, and no other.
+* A damaged input, or a folder in the place of a file, keeps that thing away and no other.
 * What happened is told.
 
 What a trial is and what bears on a run is in `opening`, what is told in `events`.
@@ -32,7 +32,7 @@ from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import one_content
 from zfcal.artifacts.settings import read_trial
-from zfcal.errors import ChangedError
+from zfcal.errors import ChangedError, DamagedError
 from zfcal.stages.events import Event, LeftOut, Made, Note, Planned, Progress, Tell, UpToDate
 from zfcal.stages.opening import Task, at_work, tell_version
 from zfcal.stages.taken import unless_taken
@@ -319,8 +319,16 @@ class _Things(Generic[S, K]):
             return None
 
     def _attempt(self, key: K) -> list[Path]:
-        with one_content(self._seen):
-            return _Making(self._run).make(self._stage.item(self.shared, key))
+        try:
+            with one_content(self._seen):
+                return _Making(self._run).make(self._stage.item(self.shared, key))
+        except DamagedError as error:
+            if self._stage.is_chain:
+                raise
+            path = self._stage.place(self.shared, key)
+            problem = f"{path}: not made, {error}"
+            self._run.tell(LeftOut(path=path, problem=problem, hint=error.hint))
+            return []
 
     def _opened(self) -> S:
         with one_content() as self._seen:
