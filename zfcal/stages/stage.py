@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import ClassVar, Generic, TypeAlias, TypeVar, final
@@ -42,7 +42,10 @@ S = TypeVar("S")
 T = TypeVar("T")
 
 Write: TypeAlias = Callable[[Path, Lineage], Iterable[Event] | None]
-"""Writes a file whole, with its lineage; returns what is to be told after it has appeared."""
+"""Writes a file whole, with its lineage; returns what is to be told after it has appeared.
+
+A file beside it, such as a picture, is a `Made` without a reason: it has that of the file.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -396,8 +399,7 @@ class _Making:
             said = draft.write(output.path, output.lineage)
             is_there = True
             run.tell(Made(path=output.path, reason=reason))
-            for event in said or ():
-                run.tell(event)
+            self._tell_after(said, reason)
         return is_there
 
     def _together(self, item: Item, outputs: Sequence[Output], reason: str) -> list[Path]:
@@ -417,9 +419,15 @@ class _Making:
         for path, _ in made:
             run.tell(Made(path=path, reason=reason))
         for _, said in made:
-            for event in said or ():
-                run.tell(event)
+            self._tell_after(said, reason)
         return [path for path, _ in made]
+
+    def _tell_after(self, said: Iterable[Event] | None, reason: str) -> None:
+        for event in said or ():
+            if isinstance(event, Made) and not event.reason:
+                self._run.tell(replace(event, reason=reason))
+            else:
+                self._run.tell(event)
 
     def _plan(self, outputs: Sequence[Output], reason: str) -> None:
         for output in outputs:
