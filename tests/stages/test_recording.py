@@ -13,10 +13,10 @@ from zfcal.stages.events import Made, UpToDate
 from zfcal.stages.opening import Task
 from zfcal.stages.recording import (
     Recording,
-    Segmented,
     check_same_source,
     cut,
     hash_sources,
+    segmented,
     starts_between,
     starts_of_recording,
 )
@@ -49,29 +49,14 @@ def trial(make_trial):
     return read_trial(root)
 
 
-class Brought(Segmented):
-    """A recording that is there already."""
-
-    recording: Recording
-
-    def record(self):
-        """Return it."""
-        return self.recording
-
-
 def write_segments(trial, recorded, tell, *, task=None):
     """Write the segments of a recording that are missing or stale."""
     tracks, end_s, lineage = recorded
 
-    class Bring(OneThing):
-        name = "import"
+    def item(run):
+        return segmented(run, trial, lineage, [], lambda: Recording(tracks=tracks, end_s=end_s))
 
-        def item(self, run):
-            found = Brought(run, trial, lineage, [])
-            found.recording = Recording(tracks=tracks, end_s=end_s)
-            return found
-
-    run(Bring(), trial.root, tell, task=task)
+    run(OneThing(name="import", item=item), trial.root, tell, task=task)
 
 
 def recording_of(tracks, end_s, lineage=LINEAGE):

@@ -195,55 +195,38 @@ def test_a_folder_in_the_place_of_a_file_keeps_that_file_away_and_no_other(thin,
     assert (names(told, LeftOut), names(told, Made)) == (THREE[1:2], [THREE[0], THREE[2]])
 
 
-class Copy(Item):
-    """Copies a file into two, both of which stand on it."""
+def copies(run, source, *, apart=False, finish=lambda: None):
+    """Return two copies of a file as one thing."""
+    lineage = run.lineage("zfcal.tracks/1", [source])
+    pair = [Output(path=run.root / name / source.name, lineage=lineage) for name in ("a", "b")]
 
-    def __init__(self, run, source, *, apart=False, finished=None):
-        self.apart = apart
-        self.source, self.finished = source, finished if finished is not None else []
-        lineage = run.lineage("zfcal.tracks/1", [source])
-        self.pair = [
-            Output(path=run.root / name / source.name, lineage=lineage) for name in ("a", "b")
-        ]
-
-    def outputs(self):
-        """Return both."""
-        return self.pair
-
-    def compute(self):
-        """Yield both."""
-        tracks = read_tracks(self.source)
-        for output in self.pair:
+    def compute():
+        tracks = read_tracks(source)
+        for output in pair:
             yield Draft(output=output, write=lambda path, own: write_tracks(path, tracks, own))
 
-    def finish(self):
-        """Note it."""
-        self.finished.append(self.source.name)
+    return Item(outputs=pair, compute=compute, finish=finish, apart=apart)
 
 
-class CopyOne(OneThing):
-    """Copies the first segment."""
+def copy_one(work=lambda: None, **how):
+    """Return a stage that copies the first segment, and works on its way there."""
 
-    name = "copy"
-
-    def __init__(self, work=lambda: None, **how):
-        self.work, self.how = work, how
-
-    def item(self, run):
-        """Return the copies; none where the work finds nothing to do."""
+    def item(run):
         source = run.root / "tracks" / "000000.parquet"
         read_bytes(source)
-        self.work()
-        return Copy(run, source, **self.how)
+        work()
+        return copies(run, source, **how)
+
+    return OneThing(name="copy", item=item)
 
 
 def test_files_that_belong_together_are_made_together(root, heard):
     """Also the one that is up to date; of files apart only the one that is missing."""
-    run(CopyOne(), root, heard.append)
+    run(copy_one(), root, heard.append)
     for apart, made in ((False, ["a", "b"]), (True, ["b"])):
         (root / "b" / "000000.parquet").unlink()
         heard.clear()
-        run(CopyOne(apart=apart), root, heard.append)
+        run(copy_one(apart=apart), root, heard.append)
         assert [each.path.parent.name for each in heard if isinstance(each, Made)] == made
 
 
@@ -251,7 +234,7 @@ def test_files_that_belong_together_are_made_together(root, heard):
 def test_a_dry_run_plans_each_file_of_a_thing(root, heard, apart):
     """Where each is judged by itself as well."""
     before = files(root)
-    assert run(CopyOne(apart=apart), root, heard.append, task=DRY) == []
+    assert run(copy_one(apart=apart), root, heard.append, task=DRY) == []
     assert [each.path.parent.name for each in heard if isinstance(each, Planned)] == ["a", "b"]
     assert files(root) == before
 
@@ -259,10 +242,10 @@ def test_a_dry_run_plans_each_file_of_a_thing(root, heard, apart):
 def test_what_finishes_a_thing_is_done_where_its_files_are_there(root, heard):
     """Made now or before, and not where a dry run would make them."""
     finished = []
-    run(CopyOne(finished=finished), root, heard.append, task=DRY)
+    run(copy_one(finish=lambda: finished.append(1)), root, heard.append, task=DRY)
     assert finished == []
     for _ in range(2):
-        there = run(CopyOne(finished=finished), root, heard.append)
+        there = run(copy_one(finish=lambda: finished.append(1)), root, heard.append)
         assert [path.parent.name for path in there] == ["a", "b"]
     assert len(finished) == 2
 
@@ -278,10 +261,10 @@ def test_one_thing_whose_input_changes_again_and_again_is_an_error(root, other, 
         source.write_bytes(contents[(len(attempts) - 1) % 2])
 
     with pytest.raises(ChangedError):
-        run(CopyOne(work), root, heard.append)
+        run(copy_one(work), root, heard.append)
     assert len(attempts) == 2
     assert not (root / "a").exists()
-    run(CopyOne(lambda: None if len(attempts) > 2 else work()), root, heard.append)
+    run(copy_one(lambda: None if len(attempts) > 2 else work()), root, heard.append)
     assert (root / "a" / "000000.parquet").exists()
 
 
@@ -289,7 +272,7 @@ def test_a_folder_in_the_place_of_the_only_thing_is_an_error(root, heard):
     """And no work is done for the file beside it."""
     (root / "b" / "000000.parquet").mkdir(parents=True)
     with pytest.raises(TakenError):
-        run(CopyOne(), root, heard.append)
+        run(copy_one(), root, heard.append)
     assert not (root / "a").exists()
 
 
@@ -318,7 +301,7 @@ class Shared(Stage):
         """Return the copies of a segment."""
         self.between(key)
         hash_of(shared.root / "settings")
-        return Copy(shared, shared.root / "tracks" / f"{key:06d}.parquet")
+        return copies(shared, shared.root / "tracks" / f"{key:06d}.parquet")
 
 
 def test_what_things_share_is_read_again_where_it_has_changed(root, heard):

@@ -6,7 +6,6 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from zfcal.errors import InputError
 from zfcal.readers import ImportOptions, guess_format, import_foreign
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.opening import OpenTrial, Task, open_trial
-from zfcal.stages.recording import TRACKS, Recording, Segmented, hash_sources, starts_of_recording
+from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_of_recording
 from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
@@ -74,62 +73,26 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
     """
     read_trial(root)
     name = source.format or _guessed(source.path, tell)
-    run(Import(source=source, form=name), root, tell, task=task)
+    stage = OneThing(name="import", item=lambda run: _recording(run, source, name))
+    run(stage, root, tell, task=task)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Import(OneThing):
-    """The tracks of another program.
+def _recording(run: Run, source: Source, name: str) -> Item:
+    opened = open_trial(run.root)
+    options = _options(opened, source.options)
 
-    Parameters
-    ----------
-    source
-        What to import.
-    form
-        Its format.
-    """
-
-    name = "import"
-
-    source: Source
-    form: str
-
-    def item(self, run: Run) -> Item:
-        """Return the segments of the recording."""
-        opened = open_trial(run.root)
-        options = _options(opened, self.source.options)
-        lineage = _lineage(opened, self.source, self.form, options)
-        return _Imported(run, opened, lineage, (self.source, self.form, options))
-
-
-@final
-class _Imported(Segmented):
-    """The segments of a recording of another program."""
-
-    def __init__(
-        self,
-        run: Run,
-        opened: OpenTrial,
-        lineage: Lineage,
-        said: tuple[Source, str, ImportOptions],
-    ) -> None:
-        super().__init__(run, opened.trial, lineage, starts_of_recording(run.root))
-        self._tell = run.tell
-        self._opened = opened
-        self._said = said
-
-    def record(self) -> Recording:
-        """Read the other program's tracks, and say what looks wrong about them."""
-        (source, name, options), opened, tell = self._said, self._opened, self._tell
-        tracks = _read(source, name, options, tell)
-        tell_outside(opened, tracks, tell)
-        tell_missing(opened, tracks, tell)
+    def record() -> Recording:
+        tracks = _read(source, name, options, run.tell)
+        tell_outside(opened, tracks, run.tell)
+        tell_missing(opened, tracks, run.tell)
         return Recording(
             tracks=tracks,
             end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
             extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
         )
+
+    lineage = _lineage(opened, source, name, options)
+    return segmented(run, opened.trial, lineage, starts_of_recording(run.root), record)
 
 
 def _guessed(path: Path, tell: Tell) -> str:

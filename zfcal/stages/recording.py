@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -142,73 +141,67 @@ def starts_between(first_s: float, end_s: float) -> list[int]:
     return list(range(first, max(int(np.ceil(end_s - _SLACK_S)), first + 1), STEP_S))
 
 
-class Segmented(Item):
-    """The segments of a recording, of which each is written only where it is missing or stale.
+def segmented(
+    run: Run, trial: Trial, lineage: Lineage, starts: list[int], record: Callable[[], Recording]
+) -> Item:
+    """Return the segments of a recording, of which those missing or stale are written.
 
     Parameters
     ----------
     run, trial
-        Of which trial.
+        On which trial.
     lineage
         Of every segment.
     starts
         The seconds at which the segments start; empty where only the recording tells.
+    record
+        Returns the whole recording.
+
+    Raises
+    ------
+    InputError
+        The trial holds tracks of another source, and the task is not forced.
     """
+    check_same_source(trial, lineage, run.task)
+    # To remove those that the recording does not reach any more is a reason as well.
+    others = set(segment_starts(run.root)) - set(starts)
+    outputs = [
+        Output(
+            path=segment_path(run.root, start),
+            lineage=lineage,
+            otherwise="others are there" if others else None,
+        )
+        for start in starts
+    ]
+    return Item(outputs=outputs, compute=lambda: _parts(run, lineage, record()), apart=True)
 
-    apart = True
 
-    def __init__(self, run: Run, trial: Trial, lineage: Lineage, starts: list[int]) -> None:
-        check_same_source(trial, lineage, run.task)
-        self._run = run
-        self._root = trial.root
-        self._lineage = lineage
-        self._starts = starts
+def _parts(run: Run, lineage: Lineage, recording: Recording) -> Iterator[Draft]:
+    """Yield the segments, in order, and remove those of an earlier, longer recording.
 
-    @abstractmethod
-    def record(self) -> Recording:
-        """Return the whole recording."""
+    A minute in which nobody was seen has a segment without rows; the last one may be a part.
+    """
+    parts = list(cut(recording.tracks, recording.end_s))
+    stretch: list[JSON] = [float(recording.tracks.time_s[0]), recording.end_s]
+    for number, (start, tracks) in enumerate(parts, start=1):
+        end_s = min(recording.end_s, float(start + STEP_S))
+        extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
+        output = Output(path=segment_path(run.root, start), lineage=lineage)
+        yield Draft(output=output, write=_writer(tracks, extra))
+        run.tell(Progress(stage="segments", done=number, total=len(parts)))
+    _remove_others(run, {start for start, _ in parts})
 
-    def outputs(self) -> list[Output]:
-        """Return the segments; to remove those that the recording has not is a reason as well."""
-        others = set(segment_starts(self._root)) - set(self._starts)
-        return [
-            Output(
-                path=segment_path(self._root, start),
-                lineage=self._lineage,
-                otherwise="others are there" if others else None,
-            )
-            for start in self._starts
-        ]
 
-    def compute(self) -> Iterator[Draft]:
-        """Yield the segments, in order, and remove those of an earlier, longer recording.
-
-        A minute in which nobody was seen has a segment without rows; the last one may be a part.
-        """
-        recording = self.record()
-        parts = list(cut(recording.tracks, recording.end_s))
-        stretch: list[JSON] = [float(recording.tracks.time_s[0]), recording.end_s]
-        for number, (start, tracks) in enumerate(parts, start=1):
-            end_s = min(recording.end_s, float(start + STEP_S))
-            extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
-            output = Output(path=segment_path(self._root, start), lineage=self._lineage)
-            yield Draft(output=output, write=_writer(tracks, extra))
-            self._run.tell(Progress(stage="segments", done=number, total=len(parts)))
-        self._remove_others({start for start, _ in parts})
-
-    def _remove_others(self, starts: set[int]) -> None:
-        run = self._run
-        for start in set(segment_starts(self._root)) - starts:
-            path = segment_path(self._root, start)
-            if run.task.dry_run:
-                says = f"would remove {path}: the recording does not reach there any more."
-                run.tell(Note(text=says))
-                continue
-            with unless_taken(path, run.tell):
-                remove(path)
-                run.tell(
-                    Note(text=f"{path}: removed, the recording does not reach there any more.")
-                )
+def _remove_others(run: Run, starts: set[int]) -> None:
+    why = "the recording does not reach there any more."
+    for start in set(segment_starts(run.root)) - starts:
+        path = segment_path(run.root, start)
+        if run.task.dry_run:
+            run.tell(Note(text=f"would remove {path}: {why}"))
+            continue
+        with unless_taken(path, run.tell):
+            remove(path)
+            run.tell(Note(text=f"{path}: removed, {why}"))
 
 
 def _writer(tracks: Tracks, extra: Mapping[str, JSON]) -> Write:

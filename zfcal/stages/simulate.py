@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.opening import OpenTrial, Task, open_trial
-from zfcal.stages.recording import TRACKS, Recording, Segmented, hash_sources, starts_between
+from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
 from zfcal.stages.segments import segment_path
 from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks
@@ -93,49 +92,20 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
                 tell(Planned(path=segment_path(root, start), reason="missing"))
             return
         root = made.root
-    run(Simulate(options=options, is_new=new), root, tell, task=task)
+    stage = OneThing(name="simulate", item=lambda run: _simulation(run, options, is_new=new))
+    run(stage, root, tell, task=task)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Simulate(OneThing):
-    """The tracks of a simulation.
+def _simulation(run: Run, options: SimulateOptions, *, is_new: bool) -> Item:
+    opened = open_trial(run.root)
+    if not is_new:
+        _check_existing(opened, options)
 
-    Parameters
-    ----------
-    options
-        What to simulate.
-    is_new
-        Whether the trial was made for it just now.
-    """
+    def record() -> Recording:
+        return Recording(tracks=swim(opened, options), end_s=options.duration_s)
 
-    name = "simulate"
-
-    options: SimulateOptions
-    is_new: bool = False
-
-    def item(self, run: Run) -> Item:
-        """Return the segments of the simulation."""
-        opened = open_trial(run.root)
-        if not self.is_new:
-            _check_existing(opened, self.options)
-        return _Swum(run, opened, self.options)
-
-
-@final
-class _Swum(Segmented):
-    """The segments of a simulation."""
-
-    def __init__(self, run: Run, opened: OpenTrial, options: SimulateOptions) -> None:
-        starts = starts_between(0.0, options.duration_s)
-        super().__init__(run, opened.trial, _lineage(opened, options), starts)
-        self._opened = opened
-        self._options = options
-
-    def record(self) -> Recording:
-        """Simulate."""
-        tracks = swim(self._opened, self._options)
-        return Recording(tracks=tracks, end_s=self._options.duration_s)
+    starts = starts_between(0.0, options.duration_s)
+    return segmented(run, opened.trial, _lineage(opened, options), starts, record)
 
 
 def new_trial(root: Path, options: SimulateOptions) -> NewTrial:

@@ -123,6 +123,11 @@ class Output:
     ignore: tuple[str, ...] = ()
     otherwise: str | None = None
 
+    def with_options(self, **options: JSON) -> Output:
+        """Return it with options in its lineage that came to be known on the way."""
+        lineage = replace(self.lineage, options={**self.lineage.options, **options})
+        return replace(self, lineage=lineage)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
@@ -140,34 +145,32 @@ class Draft:
     write: Write
 
 
-class Item(ABC):
+def nothing() -> None:
+    """Do nothing: for things that are finished when their files are there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Item:
     """One thing that a stage makes: files that stand on the same inputs.
 
-    It lives for one attempt, and may keep what it has read for that long.
+    Parameters
+    ----------
+    outputs
+        The files, in the order in which they appear; empty where only `compute` knows them.
+    compute
+        Yields the files; each is written before the next one is asked for. Of files that are
+        made together it is called only if they are made. Where each is made by itself a dry run
+        calls it too: so it says what is damaged. What takes long then belongs into `Draft.write`.
+    finish
+        Does what is to be done where the files are there, made now or before.
+    apart
+        Whether each file is up to date or made by itself; otherwise all of them or none.
     """
 
-    apart: ClassVar[bool] = False
-    """Whether each file is up to date or made by itself; otherwise all of them or none."""
-
-    @abstractmethod
-    def outputs(self) -> Sequence[Output]:
-        """Return the files, in the order in which they appear.
-
-        None of them where only `compute` knows which there are.
-        """
-
-    @abstractmethod
-    def compute(self) -> Iterable[Draft]:
-        """Yield the files; each is written before the next one is asked for.
-
-        Asked of files that are made together only if they are made. Where each is made by
-        itself a dry run asks as well: so it says what is damaged. Then the work belongs into
-        `Draft.write`.
-        """
-
-    def finish(self) -> None:
-        """Do what is to be done where the files are there, made now or before."""
-        return
+    outputs: Sequence[Output]
+    compute: Callable[[], Iterable[Draft]]
+    finish: Callable[[], None] = nothing
+    apart: bool = False
 
 
 class Stage(ABC, Generic[S, K]):
@@ -199,15 +202,20 @@ class Stage(ABC, Generic[S, K]):
         """Return a thing; None where it cannot be made, or is not asked for. That was told."""
 
 
-class OneThing(ABC):
-    """Makes one thing; what goes wrong ends the command."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OneThing:
+    """Makes one thing; what goes wrong ends the command.
 
-    name: ClassVar[str]
-    """The command: of the lock and in lineage."""
+    Parameters
+    ----------
+    name
+        The command: of the lock and in lineage.
+    item
+        Returns the thing; None where there is nothing to make, which was told.
+    """
 
-    @abstractmethod
-    def item(self, run: Run) -> Item | None:
-        """Return the thing; None where there is nothing to make. That was told."""
+    name: str
+    item: Callable[[Run], Item | None]
 
 
 def run(
@@ -350,7 +358,7 @@ class _Making:
         """Make what is missing or stale of a thing, and return what is there of it."""
         if item is None:
             return []
-        outputs = item.outputs()
+        outputs = item.outputs
         reason = self._reason(outputs)
         if outputs and reason is None:
             self._tell_fresh(item, outputs)

@@ -181,7 +181,7 @@ class Analyse(Stage[_Shared, int]):
 
     def item(self, shared: _Shared, key: int) -> Item:
         """Return a window."""
-        return _Window(shared, key)
+        return _window(shared, key)
 
 
 def _readable_segments(opened: OpenTrial, tell: Tell) -> tuple[int, ...]:
@@ -210,47 +210,27 @@ def _tell_oddities(shared: _Shared, ends: list[int]) -> None:
         run.tell(Note(text=text, warning=True))
 
 
-@final
-class _Window(Item):
-    """A window, its statistics and its scores."""
+def _window(shared: _Shared, end_s: int) -> Item:
+    hashes = segment_hashes(shared.root, _pooled_starts(shared, end_s))
+    own = {start: hashes[start] for start in starts_of(end_s)}
+    path_of = shared.opened.trial.path
+    stats = Output(path=path_of("stats", end_s, ".parquet"), lineage=shared.stats_lineage(own))
+    scores = Output(
+        path=path_of("scores", end_s, ".parquet"), lineage=shared.scores_lineage(hashes)
+    )
 
-    apart = True
-
-    def __init__(self, shared: _Shared, end_s: int) -> None:
-        self._shared = shared
-        self._end_s = end_s
-        self._hashes = segment_hashes(shared.root, _pooled_starts(shared, end_s))
-        own = {start: self._hashes[start] for start in starts_of(end_s)}
-        trial = shared.opened.trial
-        self._stats = Output(
-            path=trial.path("stats", end_s, ".parquet"), lineage=shared.stats_lineage(own)
-        )
-        self._scores = Output(
-            path=trial.path("scores", end_s, ".parquet"),
-            lineage=shared.scores_lineage(self._hashes),
-        )
-
-    def outputs(self) -> tuple[Output, ...]:
-        """Return statistics and scores."""
-        return self._stats, self._scores
-
-    def compute(self) -> Iterator[Draft]:
-        """Read the tracks, and count."""
-        shared, end_s, scores = self._shared, self._end_s, self._scores
-        own, hashes = starts_of(end_s), self._hashes
+    def compute() -> Iterator[Draft]:
         tell, segments = shared.run.tell, shared.segments
         pooled = segments.pool(shared.opened, hashes, tell) if shared.is_pooled else None
         found = _read(shared, list(own), pooled)
         gone = [Path(segment_name(start)).name for start in own if start not in found]
         if gone:
-            path = self._stats.path
-            problem = f"{path}: the window that ends at {end_s} s needs tracks/{', '.join(gone)}."
-            tell(LeftOut(path=path, problem=problem))
+            what = f"{stats.path}: the window that ends at {end_s} s"
+            tell(LeftOut(path=stats.path, problem=f"{what} needs tracks/{', '.join(gone)}."))
             return
-        if pooled is not None and pooled.problems:
-            # A damaged segment is no input: what is pooled without it holds until it is mended.
-            hashes = {s: digest for s, digest in hashes.items() if s not in pooled.problems}
-            scores = replace(scores, lineage=shared.scores_lineage(hashes))
+        # A damaged segment is no input: what is pooled without it holds until it is mended.
+        problems = {} if pooled is None else pooled.problems
+        sound = {start: digest for start, digest in hashes.items() if start not in problems}
         window = Window(
             end_s=end_s,
             points=join([found[start] for start in own]),
@@ -258,9 +238,13 @@ class _Window(Item):
             has_robot=shared.opened.trial.n_robots > 0,
             control=shared.control,
         )
-        yield Draft(output=self._stats, write=partial(_write_stats, shared, window))
-        write = partial(_write_scores, shared, window, pooled_from_s=next(iter(hashes)))
-        yield Draft(output=scores, write=write)
+        yield Draft(output=stats, write=partial(_write_stats, shared, window))
+        yield Draft(
+            output=replace(scores, lineage=shared.scores_lineage(sound)),
+            write=partial(_write_scores, shared, window, pooled_from_s=next(iter(sound))),
+        )
+
+    return Item(outputs=[stats, scores], compute=compute, apart=True)
 
 
 def _pooled_starts(shared: _Shared, end_s: int) -> list[int]:

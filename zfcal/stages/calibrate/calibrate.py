@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
@@ -21,22 +21,19 @@ from zfcal.artifacts.reading.places import is_regular
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
-from zfcal.calibrate.rounds import RoundResult
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.calibrate.likelihood import estimate, track_files
 from zfcal.stages.calibrate.rounds import (
     MODEL,
+    Found,
     RoundPlaces,
     checkpoint_key,
     read_control,
     read_previous,
-    result_table,
-    round_writers,
-    summary_of,
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
-from zfcal.stages.events import LeftOut, Note, Progress, Result, Tell, say_nothing
+from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
 from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.segments import readable
 from zfcal.stages.skipping import skipped_path, without_skipped
@@ -166,7 +163,7 @@ class Calibrate(Stage[_Shared, _Window]):
         if not shared.run.task.wants(places.end_s) and is_regular(places.population):
             return None
         control = _control_or_tell(shared, places)
-        return None if control is None else _Round(shared, key, control)
+        return None if control is None else _round(shared, key, control)
 
 
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
@@ -202,82 +199,78 @@ def _ends(run: Run) -> list[int]:
     return without_skipped(run.root, ends, run.task, run.tell)
 
 
-@final
-class _Round(Item):
-    """A search for the model of one window, which starts from the last one's population."""
-
-    def __init__(self, shared: _Shared, window: _Window, control: Statistics) -> None:
-        self._shared = shared
-        self._places = window.places
-        self._control = control
-        self._previous = window.previous
-        self._lineage = self._origin()
-
-    def outputs(self) -> list[Output]:
-        """Return population, scores and champion: the model is last."""
-        # A dry run that makes the round before makes this one too, whatever the hashes say now.
-        is_shaken = bool(self._shared.run.planned)
-        return [
-            Output(
-                path=path,
-                lineage=replace(self._lineage, schema=schema),
-                ignore=self._shared.options.not_asked,
-                otherwise="the round before it is made again" if is_shaken else None,
-            )
-            for path, schema in self._places.artifacts
-        ]
-
-    def compute(self) -> Iterator[Draft]:
-        """Search, go on from a checkpoint where there is one, and yield what was found."""
-        shared, places, tell = self._shared, self._places, self._shared.run.tell
-        options = shared.options
-        began_s = time.monotonic()
-        estimated = None
-        if options.seed_likelihood:
-            template = shared.group.template
-            estimated = estimate(shared.opened, template, window_span(places.end_s), tell)
-        round_task = RoundTask(
-            group=shared.group,
-            control=self._control,
-            guests=None if estimated is None else estimated.genes,
-            seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
-            previous=None if self._previous is None else read_previous(self._previous),
+def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
+    """Return a round: population, scores and champion; the model is last."""
+    places, previous = window.places, window.previous
+    lineage = _lineage(shared, places, previous)
+    # A dry run that makes the round before makes this one too, whatever the hashes say now.
+    otherwise = "the round before it is made again" if shared.run.planned else None
+    outputs = [
+        Output(
+            path=path,
+            lineage=replace(lineage, schema=schema),
+            ignore=shared.options.not_asked,
+            otherwise=otherwise,
         )
-        if options.budget_s is not None:
-            # The estimate is a part of the round.
-            left_s = options.budget_s - (time.monotonic() - began_s)
-            options = replace(options, budget_s=max(left_s, _INSTANT_S))
-        key = checkpoint_key(self._lineage)
-        result = run_search(round_task, options, places.checkpoint, tell, key=key)
-        baselines = baseline_scores(round_task, options, result)
-        table = result_table(result, baselines, None if estimated is None else estimated.table)
+        for path, schema in places.artifacts
+    ]
+
+    def compute() -> Iterator[Draft]:
+        found = _search(shared, places, control, previous, key=checkpoint_key(lineage))
         # First, so that no window is ever both passed over and calibrated.
         discard(skipped_path(shared.root, places.end_s))
-        said = {**self._lineage.options, "generations": result.generations}
-        made = replace(self._lineage, options=said)
-        writers = round_writers(places, result, table, self._told(result, baselines))
-        for path, schema in places.artifacts:
-            output = Output(path=path, lineage=replace(made, schema=schema))
-            yield Draft(output=output, write=writers[schema])
+        for output, write in zip(outputs, found.writers(places, shared.seed), strict=True):
+            yield Draft(
+                output=output.with_options(generations=found.result.generations), write=write
+            )
         discard(places.checkpoint)
 
-    def _told(self, result: RoundResult, baselines: dict[str, JSON]) -> Result:
-        places = self._places
-        value: dict[str, Any] = {"path": str(places.model), "window_end_s": places.end_s}
-        value |= {"seed": self._shared.seed, **summary_of(result, baselines)}
-        return Result(value=value)
+    return Item(outputs=outputs, compute=compute)
 
-    def _origin(self) -> Lineage:
-        shared, places = self._shared, self._places
-        files = [places.stats, shared.root / shared.opened.trial.model]
-        files += shared.opened.arena_files
-        files += [self._previous] if self._previous is not None else []
-        if shared.options.seed_likelihood:
-            # One that is no file is no input: it is told where the estimate is made.
-            files += readable(track_files(shared.root, window_span(places.end_s)), say_nothing)
-        asked = shared.options.generations_asked
-        options = calibrate_options(shared.opened, shared.options, generations=asked)
-        return shared.run.lineage(MODEL, files, options=options, seed=shared.seed)
+
+def _lineage(shared: _Shared, places: RoundPlaces, previous: Path | None) -> Lineage:
+    opened, options = shared.opened, shared.options
+    files = [places.stats, shared.root / opened.trial.model, *opened.arena_files]
+    files += [previous] if previous is not None else []
+    if options.seed_likelihood:
+        # One that is no file is no input: it is told where the estimate is made.
+        files += readable(track_files(shared.root, window_span(places.end_s)), say_nothing)
+    said = calibrate_options(opened, options, generations=options.generations_asked)
+    return shared.run.lineage(MODEL, files, options=said, seed=shared.seed)
+
+
+def _search(
+    shared: _Shared,
+    places: RoundPlaces,
+    control: Statistics,
+    previous: Path | None,
+    *,
+    key: str,
+) -> Found:
+    """Search for the model of a window, and go on from a checkpoint where there is one."""
+    options, tell = shared.options, shared.run.tell
+    began_s = time.monotonic()
+    estimated = None
+    if options.seed_likelihood:
+        template = shared.group.template
+        estimated = estimate(shared.opened, template, window_span(places.end_s), tell)
+    round_task = RoundTask(
+        group=shared.group,
+        control=control,
+        guests=None if estimated is None else estimated.genes,
+        seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
+        previous=None if previous is None else read_previous(previous),
+    )
+    if options.budget_s is not None:
+        # The estimate is a part of the round.
+        left_s = options.budget_s - (time.monotonic() - began_s)
+        options = replace(options, budget_s=max(left_s, _INSTANT_S))
+    result = run_search(round_task, options, places.checkpoint, tell, key=key)
+    return Found(
+        result=result,
+        baselines=baseline_scores(round_task, options, result),
+        likelihood=None if estimated is None else estimated.table,
+    )
 
 
 def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:

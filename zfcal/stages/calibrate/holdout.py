@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,96 +226,55 @@ def calibrate_span(
     task
         How to go about it.
     """
-    run(CalibrateSpan(span=span, options=options), root, tell, task=task)
+    stage = OneThing(name="calibrate", item=lambda run: _model(run, span, options))
+    run(stage, root, tell, task=task)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrateSpan(OneThing):
-    """A model of one pooled window.
+def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
+    """Return the model; the tracks are read first, so that damaged ones are named at once."""
+    segments = Segments()
+    opened = segments.open(run.root)
+    control, starts = pooled_fish(opened, segments, span.train_s)
+    if span.held_out_s:
+        starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
+    output = Output(
+        path=span.output,
+        lineage=_lineage(opened, options, span, starts),
+        ignore=options.not_asked,
+    )
+    seed = output.lineage.seed or 0
 
-    Parameters
-    ----------
-    span
-        What to learn from, what to judge on, and where the model goes.
-    options
-        How to calibrate.
-    """
-
-    name = "calibrate"
-
-    span: Span
-    options: CalibrateOptions
-
-    def item(self, run: Run) -> Item:
-        """Return the model; the tracks are read, so that damaged ones are named at once."""
-        segments, span = Segments(), self.span
-        opened = segments.open(run.root)
-        control, starts = pooled_fish(opened, segments, span.train_s)
-        if span.held_out_s:
-            starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
-        lineage = _lineage(opened, self.options, span, starts)
-        output = Output(path=span.output, lineage=lineage, ignore=self.options.not_asked)
-        return _SpanModel(run, self, output, (opened, segments, control))
-
-
-@final
-class _SpanModel(Item):
-    """The model of one pooled window."""
-
-    def __init__(
-        self,
-        run: Run,
-        stage: CalibrateSpan,
-        output: Output,
-        read: tuple[OpenTrial, Segments, Statistics],
-    ) -> None:
-        self._tell = run.tell
-        self._stage = stage
-        self._output = output
-        self._opened, self._segments, self._control = read
-
-    def outputs(self) -> tuple[Output]:
-        """Return the model."""
-        return (self._output,)
-
-    def compute(self) -> Iterator[Draft]:
-        """Search on the one stretch, and judge on the other."""
-        span, options, opened = self._stage.span, self._stage.options, self._opened
-        output, seed = self._output, self._output.lineage.seed or 0
-        settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
+    def compute() -> Iterator[Draft]:
         group = make_group(opened, options)
         estimated = None
         if options.seed_likelihood:
-            estimated = estimate(opened, group.template, span.train_s, self._tell)
+            estimated = estimate(opened, group.template, span.train_s, run.tell)
         round_task = RoundTask(
             group=group,
-            control=self._control,
+            control=control,
             guests=None if estimated is None else estimated.genes,
             seeds=SeedSource(trial_seed=seed, window_end_s=span.train_s[1]),
         )
+        window_s = float(span.train_s[1] - span.train_s[0])
+        settings = replace(options.settings, window_s=window_s)
+        asked = replace(options, settings=settings)
         checkpoint = output.path.with_name(f".{output.path.name}.checkpoint")
-        result = run_search(
-            round_task,
-            replace(options, settings=settings),
-            checkpoint,
-            self._tell,
-            key=checkpoint_key(output.lineage),
-        )
-        judged = _judge(opened, span, result.champion, seed, self._segments)
+        key = checkpoint_key(output.lineage)
+        result = run_search(round_task, asked, checkpoint, run.tell, key=key)
+        judged = _judge(opened, span, result.champion, seed, segments)
         baselines = baseline_scores(round_task, options, result)
         likelihood = None if estimated is None else estimated.table
         table = {**result_table(result, baselines, likelihood), **judged}
-        said = {**output.lineage.options, "generations": result.generations}
-        output = replace(output, lineage=replace(output.lineage, options=said))
         told = {"path": str(output.path), **summary_of(result, baselines), **judged}
 
         def write(path: Path, lineage: Lineage) -> list[Event]:
             write_model(path, result.champion, lineage, table)
             return [Result(value=told)]
 
-        yield Draft(output=output, write=write)
+        yield Draft(output=output.with_options(generations=result.generations), write=write)
         discard(checkpoint)
+
+    return Item(outputs=[output], compute=compute)
 
 
 def _lineage(

@@ -132,40 +132,47 @@ def read_previous(path: Path) -> Previous:
     )
 
 
-def round_writers(
-    places: RoundPlaces, result: RoundResult, table: dict[str, JSON], told: Result
-) -> dict[str, Write]:
-    """Return what writes the files of a round, by their schemas.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a round has found.
 
     Parameters
     ----------
-    places
-        Of the round.
     result
-        What was found.
-    table
-        The model's table ``[result]``, from `result_table`.
-    told
-        What is told of it, after the model.
+        Of the search.
+    baselines
+        S of what it had to beat.
+    likelihood
+        The window's maximum-likelihood estimate; None without one.
     """
 
-    def population(path: Path, lineage: Lineage) -> None:
-        _write_population(path, result, lineage)
+    result: RoundResult
+    baselines: dict[str, JSON]
+    likelihood: dict[str, JSON] | None
 
-    def scores(path: Path, lineage: Lineage) -> None:
-        rows = scores_to_rows(
-            result.scores,
-            window_end_s=places.end_s,
-            compared="model-vs-control",
-            ceiling=result.ceiling,
-        )
-        write_table(path, make_table(SCORES, rows), lineage)
+    def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, Write, Write]:
+        """Return what writes each of the files, in the order of ``places.artifacts``."""
+        result, baselines = self.result, self.baselines
 
-    def model(path: Path, lineage: Lineage) -> list[Event]:
-        write_model(path, result.champion, lineage, table, parents=False)
-        return [told]
+        def population(path: Path, lineage: Lineage) -> None:
+            _write_population(path, result, lineage)
 
-    return {POPULATION: population, SCORES: scores, MODEL: model}
+        def scores(path: Path, lineage: Lineage) -> None:
+            rows = scores_to_rows(
+                result.scores,
+                window_end_s=places.end_s,
+                compared="model-vs-control",
+                ceiling=result.ceiling,
+            )
+            write_table(path, make_table(SCORES, rows), lineage)
+
+        def model(path: Path, lineage: Lineage) -> list[Event]:
+            table = result_table(result, baselines, self.likelihood)
+            write_model(path, result.champion, lineage, table, parents=False)
+            value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
+            return [Result(value={**value, **summary_of(result, baselines)})]
+
+        return population, scores, model
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias, final
+from typing import Any, TypeAlias
 
 from zfcal.artifacts.cameras import SCHEMA
 from zfcal.artifacts.freshness import hash_inputs
@@ -163,7 +163,7 @@ def make_camera(
     task
         Whether to write, whether to do it again, and who draws the errors.
     """
-    stage = MakeCamera(prepare=prepare, draw=task.draw)
+    stage = OneThing(name="camera", item=lambda run: _camera_file(run, prepare(), task.draw))
     if place.root is None:
         # No trial, no lock: a file of a person's own.
         make_alone(stage, Run(root=place.base, command=stage.name, tell=tell, task=task))
@@ -171,71 +171,36 @@ def make_camera(
         run(stage, place.root, tell, task=task)
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MakeCamera(OneThing):
-    """A camera file.
+def _camera_file(run: Run, recipe: Recipe, draw: Draw | None) -> Item:
+    place = recipe.place
+    output = Output(path=place.path, lineage=recipe.lineage())
 
-    Parameters
-    ----------
-    prepare
-        Reads what is given, and returns how it is made.
-    draw
-        Draws the errors; None for no picture.
-    """
-
-    name = "camera"
-
-    prepare: Callable[[], Recipe]
-    draw: Draw | None = None
-
-    def item(self, run: Run) -> Item:
-        """Return the camera."""
-        return _CameraFile(run, self.prepare(), self.draw)
-
-
-@final
-class _CameraFile(Item):
-    """A camera file, and its name in ``trial.toml``."""
-
-    def __init__(self, run: Run, recipe: Recipe, draw: Draw | None) -> None:
-        self._run = run
-        self._recipe = recipe
-        self._draw = draw
-        self._output = Output(path=recipe.place.path, lineage=recipe.lineage())
-
-    def outputs(self) -> tuple[Output]:
-        """Return the file."""
-        return (self._output,)
-
-    def compute(self) -> Iterator[Draft]:
-        """Calibrate."""
-        place, found = self._recipe.place, self._recipe.work()
+    def compute() -> Iterator[Draft]:
+        found = recipe.work()
         _check_side(place, found)
 
         def write(_: Path, lineage: Lineage) -> Iterable[Event]:
             _write(place, found, lineage)
-            return self._told(found)
+            return _told(found, draw)
 
-        yield Draft(output=self._output, write=write)
+        yield Draft(output=output, write=write)
 
-    def _told(self, found: Found) -> Iterator[Event]:
-        if self._draw is not None:
-            yield Made(path=self._draw(found), reason="")
-        result = found.result() if isinstance(found, Calibration) else found.result
-        for note in result.get("notes", ()):
-            yield Note(text=note, warning=True)
-        yield Note(text=in_words(result))
-        yield Result(value=result)
+    def finish() -> None:
+        root = place.root
+        if root is not None and not run.task.dry_run and name_camera(root, place.name, place.path):
+            run.tell(Note(text=f"{root / CONFIG_NAME} names it as the {place.name} camera."))
 
-    def finish(self) -> None:
-        """Let the trial name it."""
-        place, run = self._recipe.place, self._run
-        if place.root is None or run.task.dry_run:
-            return
-        if name_camera(place.root, place.name, place.path):
-            text = f"{place.root / CONFIG_NAME} names it as the {place.name} camera."
-            run.tell(Note(text=text))
+    return Item(outputs=[output], compute=compute, finish=finish)
+
+
+def _told(found: Found, draw: Draw | None) -> Iterator[Event]:
+    if draw is not None:
+        yield Made(path=draw(found), reason="")
+    result = found.result() if isinstance(found, Calibration) else found.result
+    for note in result.get("notes", ()):
+        yield Note(text=note, warning=True)
+    yield Note(text=in_words(result))
+    yield Result(value=result)
 
 
 def _check_side(place: Place, found: Found) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage
@@ -163,63 +163,29 @@ def diagnose(
         The trial, the model or the tracks are wrong, the disk is full, or another
         diagnose is at work on the trial. Damaged segments are left out and told instead.
     """
-    there = run(Diagnose(options=options, draw=draw), root, tell, task=task)
+    stage = OneThing(name="diagnose", item=lambda run: _findings(run, options, draw))
+    there = run(stage, root, tell, task=task)
     return there[0] if there else None
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Diagnose(OneThing):
-    """The findings about a model.
+def _findings(run: Run, options: DiagnoseOptions, draw: Draw | None) -> Item:
+    """Return the findings; the tracks are read first, since the damaged ones are no inputs."""
+    case = open_case(run.root, options)
+    stretch = read_stretch(case.opened, options.window_s, run.tell)
+    book = Book(opened=case.opened, folder=case.folder, draw=draw)
+    output = Output(path=book.path, lineage=lineage_of(case, stretch))
 
-    Parameters
-    ----------
-    options
-        What to ask, and how.
-    draw
-        Draws a page beside the findings; None for the findings alone.
-    """
-
-    name = "diagnose"
-
-    options: DiagnoseOptions
-    draw: Draw | None = None
-
-    def item(self, run: Run) -> Item:
-        """Return the findings; the tracks are read, since the damaged ones are no inputs."""
-        case = open_case(run.root, self.options)
-        stretch = read_stretch(case.opened, self.options.window_s, run.tell)
-        return _Findings(run, case, stretch, self.draw)
-
-
-@final
-class _Findings(Item):
-    """``findings.json``, and the page that shows it."""
-
-    def __init__(self, run: Run, case: Case, stretch: Stretch, draw: Draw | None) -> None:
-        self._run = run
-        self._case = case
-        self._stretch = stretch
-        self._book = Book(opened=case.opened, folder=case.folder, draw=draw)
-        self._output = Output(path=self._book.path, lineage=lineage_of(case, stretch))
-
-    def outputs(self) -> tuple[Output]:
-        """Return the findings."""
-        return (self._output,)
-
-    def compute(self) -> Iterator[Draft]:
-        """Diagnose."""
-        draw = self._book.draw
-        if draw is not None and self._case.options.workers > 1:
+    def compute() -> Iterator[Draft]:
+        if draw is not None and options.workers > 1:
             draw.prepare()
-        diagnosis = _answer(self._case, self._stretch, self._run.tell)
-        document = _document(self._case, self._stretch, diagnosis)
-        yield Draft(output=self._output, write=partial(write_findings, document))
+        document = _document(case, stretch, _answer(case, stretch, run.tell))
+        yield Draft(output=output, write=partial(write_findings, document))
 
-    def finish(self) -> None:
-        """Draw the page where it does not show these findings, and tell them."""
-        self._book.show(self._run.tell, self._run.task)
-        self._run.tell(Result(value=self._book.read()[0]))
+    def finish() -> None:
+        book.show(run.tell, run.task)
+        run.tell(Result(value=book.read()[0]))
+
+    return Item(outputs=[output], compute=compute, finish=finish)
 
 
 def lineage_of(case: Case, stretch: Stretch) -> Lineage:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs, relative_to
@@ -96,90 +96,54 @@ def extend(
         The trial or the tracks are wrong, they are too little to say anything, an effect is
         unknown or in the model already, or another extend is at work on the trial.
     """
-    there = run(Extend(options=options, draw=draw), root, tell, task=task)
+    stage = OneThing(name="extend", item=lambda run: _extended(run, options, draw))
+    there = run(stage, root, tell, task=task)
     return there[0] if there and not (task and task.dry_run) else None
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extend(OneThing):
-    """A model with the effects that findings name.
+def _extended(run: Run, options: ExtendOptions, draw: Draw | None) -> Item | None:
+    """Return the extended model, after a diagnosis where there is none that holds."""
+    path = _findings_of(run.root, options.findings)
+    asked = _question_of(run.root, path)
+    case = open_case(run.root, asked)
+    # Before the diagnosis, which takes minutes.
+    _check_new(case, options.names)
+    if not _up_to_date(run.root, asked, run.tell, task=run.task, draw=draw):
+        return None
+    book = Book(opened=case.opened, folder=path.parent, draw=draw)
+    document, found = book.read()
+    effects = _chosen(case, options, document, run.tell)
+    if effects is None:
+        run.tell(Result(value=document))
+        return None
+    stretch = read_stretch(case.opened, asked.window_s, say_nothing)
+    ties = [tie for effect in found.effects for tie in effect.ties]
+    extension = extension_of(case, stretch, effects, (options.calibration, ties, run.tell))
+    output = Output(
+        path=options.output or _place(run.root, case.model),
+        lineage=_lineage(case, extension, list(stretch.files)),
+        ignore=options.calibration.not_asked,
+    )
 
-    Parameters
-    ----------
-    options
-        What to add, and how to calibrate.
-    draw
-        Draws the findings' page anew.
-    """
-
-    name = "extend"
-
-    options: ExtendOptions
-    draw: Draw | None = None
-
-    def item(self, run: Run) -> Item | None:
-        """Return the model, after a diagnosis where there is none that holds."""
-        options, draw = self.options, self.draw
-        path = _findings_of(run.root, options.findings)
-        asked = _question_of(run.root, path)
-        case = open_case(run.root, asked)
-        # Before the diagnosis, which takes minutes.
-        _check_new(case, options.names)
-        if not _up_to_date(run.root, asked, run.tell, task=run.task, draw=draw):
-            return None
-        book = Book(opened=case.opened, folder=path.parent, draw=draw)
-        document, found = book.read()
-        effects = _chosen(case, options, document, run.tell)
-        if effects is None:
-            run.tell(Result(value=document))
-            return None
-        stretch = read_stretch(case.opened, asked.window_s, say_nothing)
-        ties = [tie for effect in found.effects for tie in effect.ties]
-        extension = extension_of(case, stretch, effects, (options.calibration, ties, run.tell))
-        place = options.output or _place(run.root, case.model)
-        lineage = _lineage(case, extension, list(stretch.files))
-        output = Output(path=place, lineage=lineage, ignore=options.calibration.not_asked)
-        return _Extended(run, output, extension, (book, document))
-
-
-@final
-class _Extended(Item):
-    """The extended model, and its gap in the findings."""
-
-    def __init__(
-        self, run: Run, output: Output, extension: Extension, found: tuple[Book, dict[str, Any]]
-    ) -> None:
-        self._run = run
-        self._output = output
-        self._extension = extension
-        self._book, self._document = found
-
-    def outputs(self) -> tuple[Output]:
-        """Return the model."""
-        return (self._output,)
-
-    def compute(self) -> Iterator[Draft]:
-        """Fit, calibrate and judge the three models, and yield the one with the effects."""
-        output, extension = self._output, self._extension
-        checkpoints = output.path.with_name(f".{output.path.stem}")
-        made = extension.make(checkpoints, key=checkpoint_key(output.lineage))
-        options = {**output.lineage.options, "generations": made.result["generations"]}
-        output = replace(output, lineage=replace(output.lineage, options=options))
-        table = {**made.result, "gap": {each.measure: _entry(each) for each in made.gap}}
-        yield Draft(
-            output=output,
-            write=lambda path, lineage: write_model(path, made.model, lineage, table),
-        )
-        for path in extension.checkpoints(checkpoints):
-            discard(path)
-
-    def finish(self) -> None:
-        """Put the gap into the findings, and tell these."""
-        run, book = self._run, self._book
+    def finish() -> None:
         if not run.task.dry_run:
-            _tell_gap(book, self._document, self._output.path, run.tell, task=run.task)
+            _tell_gap(book, document, output.path, run.tell, task=run.task)
             run.tell(Result(value=book.read()[0]))
+
+    return Item(outputs=[output], compute=lambda: _made(output, extension), finish=finish)
+
+
+def _made(output: Output, extension: Extension) -> Iterator[Draft]:
+    """Fit, calibrate and judge the three models, and yield the one with the effects."""
+    checkpoints = output.path.with_name(f".{output.path.stem}")
+    made = extension.make(checkpoints, key=checkpoint_key(output.lineage))
+    table = {**made.result, "gap": {each.measure: _entry(each) for each in made.gap}}
+    yield Draft(
+        output=output.with_options(generations=made.result["generations"]),
+        write=lambda path, lineage: write_model(path, made.model, lineage, table),
+    )
+    for path in extension.checkpoints(checkpoints):
+        discard(path)
 
 
 def _findings_of(root: Path, named: Path | None) -> Path:
