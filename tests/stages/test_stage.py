@@ -3,6 +3,7 @@
 import hashlib
 import re
 import types
+from dataclasses import replace
 
 import pytest
 
@@ -10,7 +11,7 @@ from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.lock import lock
 from zfcal.artifacts.reading.contents import hash_of, read_bytes
 from zfcal.artifacts.tables import read_tracks, write_tracks
-from zfcal.errors import ChangedError, InputError, LockedError, TakenError
+from zfcal.errors import ChangedError, DamagedError, InputError, LockedError, TakenError
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, UpToDate
 from zfcal.stages.opening import Task
 from zfcal.stages.segments import segment_starts
@@ -329,3 +330,33 @@ def test_a_chain_ends_at_a_thing_that_is_left_out(root, heard):
         run(Shared(between, is_chain=is_chain), root, heard.append, task=FORCED)
         assert sorted(set(names(heard, Made))) == made
         assert names(heard, LeftOut) == THREE[1:2]
+
+
+def test_a_chain_ends_at_a_damaged_input(root, heard):
+    """As an error; what came before it is there."""
+    (root / "settings").write_text("x")
+    source = root / "tracks" / "000060.parquet"
+    source.write_bytes(source.read_bytes()[:100])
+    with pytest.raises(DamagedError):
+        run(Shared(lambda _: None, is_chain=True), root, heard.append)
+    assert set(names(heard, Made)) == set(THREE[:1])
+
+
+def test_files_of_another_version_stay_and_that_is_said_once(root, heard):
+    """A new version of the package is no reason to make anything again."""
+
+    def item(run):
+        made = copies(run, root / "tracks" / "000000.parquet", apart=True)
+        older = [
+            replace(each, lineage=replace(each.lineage, version="0.0.1")) for each in made.outputs
+        ]
+        return replace(made, outputs=older)
+
+    run(copy_one(apart=True), root, heard.append)
+    heard.clear()
+    run(OneThing(name="copy", item=item), root, heard.append)
+    assert names(heard, Made) == []
+    notes = [each.text for each in heard if isinstance(each, Note)]
+    assert [text.partition(";")[0] for text in notes] == [
+        f"{root / name}: made by {package_version()}, this is 0.0.1" for name in ("a", "b")
+    ]
