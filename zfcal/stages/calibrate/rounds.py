@@ -25,6 +25,8 @@ from zfcal.calibrate.search import Progress
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.parameters import gene_names
+from zfcal.stages.events import Event, Result
+from zfcal.stages.stage import Write
 
 MODEL = "zfcal.model/1"
 POPULATION = "zfcal.population/1"
@@ -130,34 +132,47 @@ def read_previous(path: Path) -> Previous:
     )
 
 
-def write_round(
-    places: RoundPlaces,
-    result: RoundResult,
-    lineages: dict[str, Lineage],
-    table: dict[str, JSON],
-) -> None:
-    """Write what a round has found, the model last.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a round has found.
 
     Parameters
     ----------
-    places
-        Where it goes.
     result
-        What was found.
-    lineages
-        The lineage of each file, by its schema.
-    table
-        The model's table ``[result]``, from `result_table`.
+        Of the search.
+    baselines
+        S of what it had to beat.
+    likelihood
+        The window's maximum-likelihood estimate; None without one.
     """
-    _write_population(places.population, result, lineages[POPULATION])
-    rows = scores_to_rows(
-        result.scores,
-        window_end_s=places.end_s,
-        compared="model-vs-control",
-        ceiling=result.ceiling,
-    )
-    write_table(places.scores, make_table(SCORES, rows), lineages[SCORES])
-    write_model(places.model, result.champion, lineages[MODEL], table, parents=False)
+
+    result: RoundResult
+    baselines: dict[str, JSON]
+    likelihood: dict[str, JSON] | None
+
+    def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, Write, Write]:
+        """Return what writes each of the files, in the order of ``places.artifacts``."""
+        result, baselines = self.result, self.baselines
+
+        def population(path: Path, lineage: Lineage) -> None:
+            _write_population(path, result, lineage)
+
+        def scores(path: Path, lineage: Lineage) -> None:
+            rows = scores_to_rows(
+                result.scores,
+                window_end_s=places.end_s,
+                compared="model-vs-control",
+                ceiling=result.ceiling,
+            )
+            write_table(path, make_table(SCORES, rows), lineage)
+
+        def model(path: Path, lineage: Lineage) -> list[Event]:
+            table = result_table(result, baselines, self.likelihood)
+            write_model(path, result.champion, lineage, table, parents=False)
+            value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
+            return [Result(value={**value, **summary_of(result, baselines)})]
+
+        return population, scores, model
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:

@@ -75,6 +75,11 @@ class CalibrateOptions:
         return DEFAULT_GENERATIONS if asked is None else asked
 
     @property
+    def not_asked(self) -> tuple[str, ...]:
+        """Options of a round's lineage that nobody asked for: a budget ends it where it ends."""
+        return ("generations",) if self.budget_s is not None else ()
+
+    @property
     def workers(self) -> int:
         """Threads to use."""
         return self.n_workers or len(os.sched_getaffinity(0))
