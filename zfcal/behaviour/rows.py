@@ -16,7 +16,7 @@ from zfcal.arena import N_BINS
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.scores import NAN, Scores, score_keys
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
 from zfcal.errors import InputError
 
 STATISTICS_COLUMNS = (
@@ -45,8 +45,6 @@ CASES = ("control", "social", "robot")
 COMPARED = ("social-vs-control", "robot-vs-fish", "model-vs-control")
 
 Table: TypeAlias = dict[str, list[Any]]
-
-_FEATURES = {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
 
 
 def join_tables(tables: Sequence[Table]) -> Table:
@@ -88,7 +86,7 @@ def statistics_to_rows(statistics: Statistics, *, window_end_s: int, case: str) 
     _check_name("case", case, CASES)
     rows: list[tuple[Any, ...]] = []
     names = statistics.zone_names
-    for feature, attribute in _FEATURES.items():
+    for feature, attribute in ATTRIBUTES.items():
         counts = getattr(statistics, attribute)
         shares = frequencies(counts)
         for at in np.ndindex(counts.shape):
@@ -158,7 +156,7 @@ def _statistics(cells: dict[tuple[Any, ...], Any], *, where: str) -> Statistics:
         values = np.array([cells[key] for key in wanted[feature]], dtype=np.int64)
         return values if feature == "O" else values.reshape(len(names), -1)
 
-    counted: dict[str, Any] = {name: counts(feature) for feature, name in _FEATURES.items()}
+    counted: dict[str, Any] = {name: counts(feature) for feature, name in ATTRIBUTES.items()}
     return Statistics(zone_names=names, **counted)
 
 

@@ -1,28 +1,33 @@
 """The counts that describe a group in a window: D, W, O, T and V.
 
 Names of features are the paper's. Counts, not frequencies, so that windows can
-be pooled; what is alike about two of them is in ``scores``.
+be pooled; what is counted is in ``features``, what is alike about two of them in ``scores``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
-from zfcal.behaviour.histograms import count_by_zone, count_cells
+from zfcal.behaviour.features.registry import named
+from zfcal.behaviour.features.statistic import Points, count, count_each
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.errors import InputError
 from zfcal.tracks import ROBOT
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+
+ATTRIBUTES: Mapping[str, str] = MappingProxyType(
+    {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
+)
+"""Under which names the statistics that the compiled simulation counts are held."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +79,11 @@ class Statistics:
                     f"Statistics of {n} zones need {name} as counts of shape {shape}, "
                     f"got {counts.dtype} of shape {counts.shape}, least {counts.min(initial=0)}."
                 )
+
+    def of(self, name: str) -> Ints:
+        """Return the counts of the statistic with a name."""
+        counts: Ints = getattr(self, ATTRIBUTES[name])
+        return counts
 
     def __add__(self, other: Statistics) -> Statistics:
         check_zones(self.zone_names, other.zone_names)
@@ -157,21 +167,11 @@ def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -
     -------
     Statistics
     """
-    arena, n_zones = located.arena, len(located.arena.zones)
     present = located.zone > 0
-    ends = role[present]
-    points = located.take(present)
-    own = points.take(ends)
-    transition, speed = _steps(own)
+    points = Points(located=located.take(present), role=role[present], within=pairs_within)
     return Statistics(
-        zone_names=arena.zone_names,
-        distance=_pairs(points, ends, within=pairs_within),
-        wall=count_by_zone(
-            own.zone, own.wall_distance_m, limits=arena.bins.wall_distance_m, n_zones=n_zones
-        ),
-        occupation=np.bincount(own.zone, minlength=n_zones + 1)[1:].astype(np.int64),
-        transition=transition,
-        speed=speed,
+        zone_names=located.arena.zone_names,
+        **{attribute: count(named(name), points) for name, attribute in ATTRIBUTES.items()},
         n_settled=int(located.settled[role].sum()),
         n_void=int((role & ~present).sum()),
     )
@@ -195,28 +195,15 @@ def measure_each(located: Located, column: NDArray[np.intp], n_columns: int) -> 
         For each agent the counts that `measure_role` finds for it alone, in the
         order of `from_counts`.
     """
-    arena = located.arena
-    n_zones, bins = len(arena.zones), arena.bins
     present = located.zone > 0
-    points, who = located.take(present), column[present]
-    # A zone of its own for every agent and zone: then all are counted at once.
-    own = who * n_zones + points.zone
-    n_own = n_columns * n_zones
-    start, end, speed_m_s = _moves(points)
-    to = points.zone[end].astype(np.intp) - 1
-    distance = np.zeros((n_own, N_BINS), dtype=np.int64)
-    everybody = np.ones(len(points), dtype=np.bool_)
-    for first, second, apart_m in _apart(points, everybody, within=True):
-        for one in (first, second):
-            distance += count_by_zone(own[one], apart_m, limits=bins.distance_m, n_zones=n_own)
-    wall = count_by_zone(own, points.wall_distance_m, limits=bins.wall_distance_m, n_zones=n_own)
-    occupation = np.bincount(own, minlength=n_own + 1)[1:]
-    transition = count_cells((own[start] - 1) * n_zones + to, (n_own, n_zones))
-    speed = count_by_zone(own[start], speed_m_s, limits=bins.speed_m_s, n_zones=n_own)
+    seen, who = located.take(present), column[present]
+    points = Points(located=seen, role=np.ones(len(seen), dtype=np.bool_), within=True)
     n_settled = np.bincount(column[located.settled], minlength=n_columns)
     n_void = np.bincount(column[~present], minlength=n_columns)
-    parts = (distance, wall, occupation, transition, speed, n_settled, n_void)
-    return np.concatenate([part.reshape(n_columns, -1) for part in parts], axis=1)
+    parts = [count_each(named(name), points, who, n_columns) for name in ATTRIBUTES]
+    return np.concatenate(
+        [part.reshape(n_columns, -1) for part in (*parts, n_settled, n_void)], axis=1
+    )
 
 
 def n_counts(n_zones: int) -> int:
@@ -237,57 +224,8 @@ def from_counts(counts: Ints, zone_names: tuple[str, ...]) -> Statistics:
     n = len(zone_names)
     shapes = ((n, N_BINS), (n, N_BINS), (n,), (n, n), (n, N_BINS))
     *parts, rest = np.split(counts, np.cumsum([math.prod(shape) for shape in shapes]))
-    names = [f.name for f in fields(Statistics)[1:6]]
     arrays = {
-        name: part.reshape(shape) for name, part, shape in zip(names, parts, shapes, strict=True)
+        name: part.reshape(shape)
+        for name, part, shape in zip(ATTRIBUTES.values(), parts, shapes, strict=True)
     }
     return Statistics(zone_names=zone_names, n_settled=int(rest[0]), n_void=int(rest[1]), **arrays)
-
-
-def _pairs(points: Located, role: Bools, *, within: bool) -> Ints:
-    """Count distances of pairs in one zone at one sample."""
-    limits, n_zones = points.arena.bins.distance_m, len(points.arena.zones)
-    counts = np.zeros((n_zones, N_BINS), dtype=np.int64)
-    for first, _, apart_m in _apart(points, role, within=within):
-        counts += count_by_zone(points.zone[first], apart_m, limits=limits, n_zones=n_zones)
-    return counts
-
-
-def _apart(
-    points: Located, role: Bools, *, within: bool
-) -> Iterator[tuple[Indices, Indices, Floats]]:
-    """Yield pairs of points in one zone at one sample, and their distances in metres."""
-    # The points of a sample follow each other: compare each with the next, the one after, ...
-    # This needs no table of agents, whatever the number of track ids.
-    for lag in range(1, len(points)):
-        together = points.k[lag:] == points.k[:-lag]
-        if not together.any():
-            break
-        wanted = role[lag:] & role[:-lag] if within else role[lag:] ^ role[:-lag]
-        first = np.flatnonzero(together & wanted & (points.zone[lag:] == points.zone[:-lag]))
-        yield first, first + lag, _length(points.xy_m[first + lag] - points.xy_m[first])
-
-
-def _steps(points: Located) -> tuple[Ints, Ints]:
-    """Count steps from zone to zone, and their speeds by the zone where they start."""
-    n_zones = len(points.arena.zones)
-    start, end, speed_m_s = _moves(points)
-    zone = points.zone.astype(np.intp) - 1
-    transition = count_cells(zone[start] * n_zones + zone[end], (n_zones, n_zones))
-    speed = count_by_zone(
-        points.zone[start], speed_m_s, limits=points.arena.bins.speed_m_s, n_zones=n_zones
-    )
-    return transition, speed
-
-
-def _moves(points: Located) -> tuple[Indices, Indices, Floats]:
-    """Return where steps of one track id start and end, and their speeds in m/s."""
-    order = np.argsort(points.agent, kind="stable")
-    agent, k = points.agent[order], points.k[order]
-    follows = (agent[1:] == agent[:-1]) & (k[1:] == k[:-1] + 1)
-    start, end = order[:-1][follows], order[1:][follows]
-    return start, end, _length(points.xy_m[end] - points.xy_m[start]) / points.dt_s
-
-
-def _length(xy_m: Floats) -> Floats:
-    return np.hypot(xy_m[:, 0], xy_m[:, 1])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from zfcal.behaviour.histograms import bin_edges
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
@@ -38,12 +39,12 @@ def test_the_mean_of_a_histogram_by_hand():
     """Three at 0.01 and one at 0.19 on bins of 0.02: (3 x 0.01 + 0.19) / 4."""
     counts = np.array([3, 0, 0, 0, 0, 0, 0, 0, 0, 1])
 
-    assert histogram_mean(counts, (0.0, 0.2)) == pytest.approx(0.055)
+    assert histogram_mean(counts, bin_edges((0.0, 0.2))) == pytest.approx(0.055)
 
 
 def test_an_empty_histogram_has_no_mean():
     """Nothing observed is unknown, not zero."""
-    assert np.isnan(histogram_mean(np.zeros(10, dtype=np.int64), (0.0, 0.2)))
+    assert np.isnan(histogram_mean(np.zeros(10, dtype=np.int64), bin_edges((0.0, 0.2))))
 
 
 def test_transition_tables_have_their_numbers(arenas):
