@@ -7,9 +7,10 @@ be pooled; what is counted is in ``features``, what is alike about two of them i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ ATTRIBUTES: Mapping[str, str] = MappingProxyType(
     {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
 )
 """Under which names the statistics that the compiled simulation counts are held."""
+
+_SUMMED = tuple(ATTRIBUTES.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,6 +55,8 @@ class Statistics:
         Agent-samples that lay a little outside and were put at the wall.
     n_void
         Agent-samples farther outside; they are in no other count.
+    further
+        Counts of further statistics by name, shape as `Statistic.shape` says.
     """
 
     zone_names: tuple[str, ...]
@@ -62,6 +67,7 @@ class Statistics:
     speed: Ints
     n_settled: int = 0
     n_void: int = 0
+    further: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.zone_names)
@@ -72,6 +78,12 @@ class Statistics:
             "transition": (n, n),
             "speed": (n, N_BINS),
         }
+        for name, counts in self.further.items():
+            if counts.ndim not in {1, 2} or counts.dtype != np.int64 or (counts < 0).any():
+                raise InputError(
+                    f"Statistic {name} needs counts of one or two axes, got {counts.dtype} of "
+                    f"shape {counts.shape}, least {counts.min(initial=0)}."
+                )
         for name, shape in shapes.items():
             counts = getattr(self, name)
             if counts.shape != shape or counts.dtype != np.int64 or (counts < 0).any():
@@ -81,19 +93,49 @@ class Statistics:
                 )
 
     def of(self, name: str) -> Ints:
-        """Return the counts of the statistic with a name."""
-        counts: Ints = getattr(self, ATTRIBUTES[name])
-        return counts
+        """Return the counts of the statistic with a name.
+
+        Raises
+        ------
+        InputError
+            It was not counted.
+        """
+        if name in ATTRIBUTES:
+            counts: Ints = getattr(self, ATTRIBUTES[name])
+            return counts
+        if name not in self.further:
+            raise InputError(
+                f"Statistic {name} was not counted, only {', '.join(self.names)}.",
+                hint=f"Count it with: zfcal analyse TRIAL --features {name}",
+            )
+        return self.further[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What was counted: D, W, O, T, V and the further statistics."""
+        return (*ATTRIBUTES, *self.further)
 
     def __add__(self, other: Statistics) -> Statistics:
-        check_zones(self.zone_names, other.zone_names)
-        sums = {f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)[1:]}
-        return Statistics(zone_names=self.zone_names, **sums)
+        return self._joined(other, np.add)
 
     def __sub__(self, part: Statistics) -> Statistics:
-        check_zones(self.zone_names, part.zone_names)
-        rests = {f.name: getattr(self, f.name) - getattr(part, f.name) for f in fields(self)[1:]}
-        return Statistics(zone_names=self.zone_names, **rests)
+        return self._joined(part, np.subtract)
+
+    def _joined(self, other: Statistics, join: np.ufunc) -> Statistics:
+        check_zones(self.zone_names, other.zone_names)
+        if set(self.names) != set(other.names):
+            raise InputError(
+                f"Statistics hold different ones: {', '.join(self.names)} and "
+                f"{', '.join(other.names)}."
+            )
+        counts = {name: join(getattr(self, name), getattr(other, name)) for name in _SUMMED}
+        return Statistics(
+            zone_names=self.zone_names,
+            n_settled=int(join(self.n_settled, other.n_settled)),
+            n_void=int(join(self.n_void, other.n_void)),
+            further={name: join(own, other.further[name]) for name, own in self.further.items()},
+            **counts,
+        )
 
 
 def check_zones(a: tuple[str, ...], b: tuple[str, ...]) -> None:
@@ -111,7 +153,7 @@ def check_zones(a: tuple[str, ...], b: tuple[str, ...]) -> None:
         )
 
 
-def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
+def measure(samples: SamplesOrLocated, arena: Arena, *, further: Sequence[str] = ()) -> Statistics:
     """Count what all the given agents did.
 
     Parameters
@@ -120,6 +162,8 @@ def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         The agents of a window; take those of one kind for the control case.
     arena
         Gives zones, walls and the ranges of the bins.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
@@ -128,10 +172,13 @@ def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         when one track id is inside at sample k and at k + 1 of the window.
     """
     located = locate(samples, arena)
-    return measure_role(located, np.ones(len(located), dtype=np.bool_), pairs_within=True)
+    everybody = np.ones(len(located), dtype=np.bool_)
+    return measure_role(located, everybody, pairs_within=True, further=further)
 
 
-def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
+def measure_robot(
+    samples: SamplesOrLocated, arena: Arena, *, further: Sequence[str] = ()
+) -> Statistics:
     """Count what the robot did: its own W, O, T and V, and D of robot-fish pairs.
 
     Parameters
@@ -140,6 +187,8 @@ def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         Fish and robots of a window.
     arena
         Gives zones, walls and the ranges of the bins.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
@@ -147,10 +196,12 @@ def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         Several robots are pooled; pairs of two robots do not count.
     """
     located = locate(samples, arena)
-    return measure_role(located, located.kind == ROBOT)
+    return measure_role(located, located.kind == ROBOT, further=further)
 
 
-def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -> Statistics:
+def measure_role(
+    located: Located, role: Bools, *, pairs_within: bool = False, further: Sequence[str] = ()
+) -> Statistics:
     """Count what the agents in a role did, and their distances to the others.
 
     Parameters
@@ -162,6 +213,8 @@ def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -
     pairs_within
         Whether D is over pairs with both ends in the role, rather than over
         pairs with one end in it.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
@@ -174,6 +227,7 @@ def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -
         **{attribute: count(named(name), points) for name, attribute in ATTRIBUTES.items()},
         n_settled=int(located.settled[role].sum()),
         n_void=int((role & ~present).sum()),
+        further={name: count(named(name), points) for name in further},
     )
 
 
@@ -193,7 +247,7 @@ def measure_each(located: Located, column: NDArray[np.intp], n_columns: int) -> 
     -------
     ndarray of int64, shape (column, count)
         For each agent the counts that `measure_role` finds for it alone, in the
-        order of `from_counts`.
+        order of `from_counts`; no further statistics.
     """
     present = located.zone > 0
     seen, who = located.take(present), column[present]
@@ -224,7 +278,7 @@ def from_counts(counts: Ints, zone_names: tuple[str, ...]) -> Statistics:
     n = len(zone_names)
     shapes = ((n, N_BINS), (n, N_BINS), (n,), (n, n), (n, N_BINS))
     *parts, rest = np.split(counts, np.cumsum([math.prod(shape) for shape in shapes]))
-    arrays = {
+    arrays: dict[str, Any] = {
         name: part.reshape(shape)
         for name, part, shape in zip(ATTRIBUTES.values(), parts, shapes, strict=True)
     }

@@ -84,7 +84,15 @@ def statistics_picture(cases: Mapping[str, Statistics], arena: Arena, *, title: 
 
 def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena) -> Iterator[Panel]:
     """Yield the panels of one statistic."""
-    counts = {case: stats.of(statistic.name) for case, stats in cases.items()}
+    # What another version has counted in other bins is not laid over these.
+    counts = {
+        case: stats.of(statistic.name)
+        for case, stats in cases.items()
+        if statistic.name in stats.names
+        and stats.of(statistic.name).shape == statistic.shape(arena)
+    }
+    if FISH_CASE not in counts:
+        return
     if statistic.form == "zones":
         yield _occupation(statistic, counts, arena.zone_names)
     elif statistic.form == "table":
