@@ -54,9 +54,15 @@ def test_a_position_outside_is_a_loss(stays):
 
 
 def test_a_window_s_end_cuts_a_stay(stays):
-    """130 s left are 120 s and 10 s; the clock starts with the first sample."""
-    assert stays([L] * 130) == ({5: 1, 8: 1}, {})
+    """240 s left are twice 120 s; the clock starts with the first sample."""
+    assert stays([L] * 240) == ({8: 2}, {})
     assert stays([L] * 120, first_k=60) == ({8: 1}, {})
+
+
+def test_what_remains_after_whole_windows_is_left_out(stays):
+    """10 s more would be a short stay only because the recording ends; 10 s alone count."""
+    assert stays([L] * 130) == ({8: 1}, {})
+    assert stays([L] * 10) == ({5: 1}, {})
 
 
 def test_two_animals_stay_each_for_itself(tank, samples_of):

@@ -9,7 +9,8 @@ first sample to one step after its last. Three rules:
 * Samples that are missing for up to a second do not end a stay, if the animal is in the same
   zone before and after. A longer loss does.
 * Time is cut into windows of 120 s, from the first sample on. Tracks of any length, such as
-  a model's long run, are so comparable with a window's.
+  a model's long run, are so comparable with a window's; what remains after the last whole
+  window is left out.
 * A stay that is cut, by the end of a window or by a loss, counts with the time that was seen.
   To leave it out would drop the animals that never leave. As estimates of the time in a zone
   the longest stays are too short; as a comparison both sides are cut alike.
@@ -39,12 +40,15 @@ def observe(points: Points) -> Iterator[Observed]:
         return
     agent, zone, k = located.agent[own], located.zone[own], located.k[own]
     window = np.floor((k - located.k[0]) * located.dt_s / WINDOW_S + 1e-9)
+    n_whole = int((k.max() - located.k[0] + 1) * located.dt_s / WINDOW_S + 1e-9)
     most = int(MAX_GAP_S / located.dt_s + 1e-9) + 1
     goes_on = (np.diff(k) <= most) & (agent[1:] == agent[:-1])
     goes_on &= (zone[1:] == zone[:-1]) & (window[1:] == window[:-1])
     first = np.flatnonzero(np.concatenate([[True], ~goes_on]))
     last = np.append(first[1:], len(own)) - 1
     # A time on an edge belongs to the bin above, whatever the step's rounding.
+    kept = window[first] < max(n_whole, 1)
+    first, last = first[kept], last[kept]
     yield Observed(at=own[first], value=np.round((k[last] - k[first] + 1) * located.dt_s, 9))
 
 
