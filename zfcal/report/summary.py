@@ -50,7 +50,14 @@ class Gap:
 
 def statements(view: TrialView) -> list[Statement]:
     """Return what there is to say about a trial, the most important first."""
-    made = (_model(view), _worst(view), _robot(view), _halves(view), _parameters(view))
+    made = (
+        _model(view),
+        _named(view),
+        _worst(view),
+        _robot(view),
+        _halves(view),
+        _parameters(view),
+    )
     return [statement for statement in made if statement is not None]
 
 
@@ -132,6 +139,22 @@ def _model(view: TrialView) -> Statement | None:
         question="Does the model behave like these fish?",
         answer=" ".join(parts),
         figure=(_percent(mean), "of what a perfect model would score"),
+    )
+
+
+def _named(view: TrialView) -> Statement | None:
+    """Say what was calibrated on, where it is not S, and how far that came."""
+    last = view.calibrated
+    if last is None or last.score is None:
+        return None
+    mark = last.score
+    return Statement(
+        question="What was the model calibrated on?",
+        answer=f"On the score of {', '.join(last.score_of)}, which is not S and not to be "
+        f"compared with it. In the last window it is {mark.value:.2f}; a perfect model would score "
+        f"{mark.ceiling:.2f} (95 % of its windows between {mark.low:.2f} and {mark.high:.2f}). S "
+        "above is of D, W, O and T alone, and was not optimised.",
+        figure=(_percent(mark), "of what a perfect model would score"),
     )
 
 

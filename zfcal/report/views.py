@@ -138,12 +138,18 @@ class Round:
         Lower and upper bound by gene name, in the parameter's own unit.
     unidentified
         Names of the parameters that the window does not pin down.
+    score
+        The score of the statistics that it was calibrated on, with its ceiling; None for S.
+    score_of
+        Names of these statistics.
     """
 
     second: int
     parameters: Parameters
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     unidentified: frozenset[str] = frozenset()
+    score: Mark | None = None
+    score_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.places import is_regular
 from zfcal.artifacts.settings import read_trial
+from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
@@ -211,6 +212,7 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
         return True
     estimated = None
     options = run.options
+    features = options.settings.features
     began_s = time.monotonic()
     if options.seed_likelihood:
         template = run.group.template
@@ -220,7 +222,7 @@ def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken
         control=control,
         guests=None if estimated is None else estimated.genes,
         seeds=SeedSource(trial_seed=run.seed, window_end_s=places.end_s),
-        previous=None if previous is None else read_previous(previous),
+        previous=None if previous is None else read_previous(previous, features),
     )
     key = checkpoint_key(expected)
     if options.budget_s is not None:
@@ -262,6 +264,18 @@ def _control_or_tell(run: _Run, places: RoundPlaces) -> Statistics | None:
     if not control.occupation.sum():
         problem = f"{places.stats}: the window holds no position of a fish inside the arena."
         run.tell(LeftOut(path=places.stats, problem=problem, damaged=False))
+        return None
+    missing = set(run.options.settings.features) - set(control.names)
+    if missing:
+        names = ",".join(further(run.options.settings.features))
+        run.tell(
+            LeftOut(
+                path=places.stats,
+                problem=f"{places.stats}: holds no {', '.join(sorted(missing))}.",
+                hint=f"Count it first: zfcal analyse {run.root} --features {names}",
+                damaged=False,
+            )
+        )
         return None
     _warn_if_stale(run, places)
     return control
