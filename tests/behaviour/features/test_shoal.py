@@ -76,12 +76,12 @@ def test_a_robot_has_fish_for_neighbours_and_no_shoal(observed):
 
 
 def test_each_is_one_histogram_of_the_group(tank, samples_of):
-    """0.05 in the bins of 0.011 m and of 0.022 m; one in the last bin of polarisation."""
+    """0.05 in bins of 0.02 m, 0.1 in bins of 0.022 m; the last bin of polarisation."""
     two = [[(0.15, 0.1), (0.25, 0.1)], [(0.15, 0.2), (0.25, 0.2)]]
     counts = measure(samples_of(two), tank, further=NAMES)
     at = {name: np.argwhere(counts.of(name)).tolist() for name in NAMES}
     assert {name: counts.of(name).shape for name in NAMES} == dict.fromkeys(NAMES, (1, 10))
-    assert at == {"spread": [[0, 4]], "polarisation": [[0, 9]], "neighbour": [[0, 4]]}
+    assert at == {"spread": [[0, 2]], "polarisation": [[0, 9]], "neighbour": [[0, 4]]}
     assert [int(counts.of(name).sum()) for name in NAMES] == [2, 1, 4]
 
 

@@ -87,8 +87,8 @@ STATISTICS = (
         label="Spread of the group",
         phrase="the spread of the group",
         observe=observe_spread,
-        # As far from the centroid as half of how far two can be apart.
-        edges=lambda arena: bin_edges(arena.bins.distance_m) / 2,
+        # Of two at the ends of the tank; the range of D is that of neighbours.
+        edges=lambda arena: bin_edges((0.0, arena.extent_m / 2)),
         per_zone=False,
         unit="m",
         title="Spread of the group",
