@@ -17,6 +17,7 @@ from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.tables import make_table, write_table
+from zfcal.behaviour.features.registry import COUNTED, further, ordered
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.rows import join_tables, statistics_to_rows
 from zfcal.errors import InputError
@@ -56,16 +57,25 @@ class AnalyseOptions:
     control
         Robot-free trials whose fish, pooled, are the control group; empty for
         the trial's own fish, window by window.
+    features
+        Statistics to count; D, W, O, T and V are counted in any case.
     """
 
     scoring: str = "paper"
     control: tuple[Path, ...] = ()
+    features: tuple[str, ...] = COUNTED
 
     def __post_init__(self) -> None:
         if self.scoring not in SCORINGS:
             raise InputError(
                 f"No scoring is called {self.scoring!r}, expected one of {', '.join(SCORINGS)}."
             )
+        object.__setattr__(self, "features", ordered([*COUNTED, *self.features]))
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """What is counted beside D, W, O, T and V."""
+        return further(self.features)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +99,9 @@ class _Shared:
         return self.opened.trial.n_robots > 0 and self.options.scoring == "paper"
 
     def stats_lineage(self, hashes: dict[int, str]) -> Lineage:
-        return self._lineage(STATS, hashes, {})
+        # Statistics of before there were further ones stay up to date.
+        names = self.options.further
+        return self._lineage(STATS, hashes, {"features": list(names)} if names else {})
 
     def scores_lineage(self, hashes: dict[int, str]) -> Lineage:
         return self._lineage(SCORES, hashes, {"scoring": self.options.scoring})
@@ -237,6 +249,7 @@ def _window(shared: _Shared, end_s: int) -> Item:
             pool=None if pooled is None else pooled.pool,
             has_robot=shared.opened.trial.n_robots > 0,
             control=shared.control,
+            further=shared.options.further,
         )
         yield Draft(output=stats, write=partial(_write_stats, shared, window))
         yield Draft(

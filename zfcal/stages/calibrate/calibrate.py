@@ -18,6 +18,7 @@ from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.places import is_regular
+from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
@@ -261,7 +262,7 @@ def _search(
         control=control,
         guests=None if estimated is None else estimated.genes,
         seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
-        previous=None if previous is None else read_previous(previous),
+        previous=None if previous is None else read_previous(previous, options.settings.features),
     )
     if options.budget_s is not None:
         # The estimate is a part of the round.
@@ -284,6 +285,13 @@ def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:
     if not control.occupation.sum():
         problem = f"{places.stats}: the window holds no position of a fish inside the arena."
         shared.run.tell(LeftOut(path=places.stats, problem=problem, damaged=False))
+        return None
+    missing = set(shared.options.settings.features) - set(control.names)
+    if missing:
+        names = ",".join(further(shared.options.settings.features))
+        problem = f"{places.stats}: holds no {', '.join(sorted(missing))}."
+        hint = f"Count it first: zfcal analyse {shared.root} --features {names}"
+        shared.run.tell(LeftOut(path=places.stats, problem=problem, hint=hint, damaged=False))
         return None
     _warn_if_stale(shared, places)
     return control

@@ -5,7 +5,7 @@ For recordings whose behaviour is to be learnt from one half and judged on the o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
 from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
 from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics, measure
@@ -176,9 +177,11 @@ def evaluate_model(
 
 
 def pooled_fish(
-    opened: OpenTrial, segments: Segments, span_s: tuple[int, int]
+    opened: OpenTrial, segments: Segments, span_s: tuple[int, int], further: Sequence[str] = ()
 ) -> tuple[Statistics, list[int]]:
     """Return the statistics of the fish in a stretch, and the starts of its segments.
+
+    Further statistics are counted where they are named.
 
     Raises
     ------
@@ -195,7 +198,7 @@ def pooled_fish(
             hint=f"Import them first: zfcal import SRC {opened.trial.root}",
         )
     points = join([segments.read(opened, start) for start in starts]).between(start_s, end_s)
-    statistics = measure(points.of_kind(FISH), opened.arena)
+    statistics = measure(points.of_kind(FISH), opened.arena, further=further)
     if not statistics.occupation.sum():
         raise InputError(
             f"{opened.trial.root}: no fish was seen inside the arena from {start_s} s to {end_s} s."
@@ -234,7 +237,8 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
     """Return the model; the tracks are read first, so that damaged ones are named at once."""
     segments = Segments()
     opened = segments.open(run.root)
-    control, starts = pooled_fish(opened, segments, span.train_s)
+    names = further_of(options.settings.features)
+    control, starts = pooled_fish(opened, segments, span.train_s, names)
     if span.held_out_s:
         starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
     output = Output(

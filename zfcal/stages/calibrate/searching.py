@@ -144,7 +144,7 @@ def run_search(
 def baseline_scores(
     round_task: RoundTask, options: CalibrateOptions, result: RoundResult
 ) -> dict[str, JSON]:
-    """Return S of what the round has to beat; empty unless baselines are asked for.
+    """Return the score of what the round has to beat; empty unless baselines are asked for.
 
     Parameters
     ----------
@@ -159,10 +159,10 @@ def baseline_scores(
         return {}
     n = result.evaluations
     luck = random_search(round_task, options.settings, n_evaluations=n)
-    scores = {"random_search": luck.scores.S}
+    scores = {"random_search": luck.scores.overall}
     if round_task.previous is not None:
         champion = round_task.previous.champion
         scores["last_window_unchanged"] = unchanged(
             round_task, options.settings, genes=champion
-        ).scores.S
+        ).scores.overall
     return {name: None if math.isnan(value) else value for name, value in scores.items()}
