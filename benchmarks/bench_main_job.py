@@ -29,8 +29,8 @@ from zfcal.calibrate.objective import Group, SeedSource, express
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.likelihood import fit
+from zfcal.model.scene import make_scene
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
-from zfcal.model.steps import steps_of
 from zfcal.parameters import Parameters, gene_names, natural, to_genes
 from zfcal.tracks import Samples
 
@@ -210,7 +210,7 @@ def recovery(effort: Effort) -> list[dict[str, object]]:
     for seed in effort.seeds:
         xy, _ = simulate_tracks(TRUTH, ARENA, n_agents=5, n_steps=9000, seed=seed)
         begin = time.perf_counter()
-        by_likelihood = fit(steps_of(_samples(xy), ARENA, fov_rad=TRUTH.fov_rad), ARENA, TRUTH)
+        by_likelihood = fit(make_scene(_samples(xy), ARENA), TRUTH)
         likelihood_s = time.perf_counter() - begin
         begin = time.perf_counter()
         by_score = calibrate_window(

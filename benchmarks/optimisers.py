@@ -32,9 +32,8 @@ from zfcal.calibrate import search
 from zfcal.calibrate.evolve import overall_score, score_and_diversities
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.likelihood import fit
-from zfcal.model.steps import steps_of
+from zfcal.model.scene import make_scene
 from zfcal.parameters import to_genes
-from zfcal.tracks import FISH
 
 Floats = NDArray[np.float64]
 
@@ -50,9 +49,7 @@ population: chosen among 0.2, 0.3, 0.5, among 0.05, 0.1, 0.2, and among 12, 24, 
 def likelihood_estimate(window: Window) -> Floats:
     """Return the most likely genome of a window's fish, shape (gene,)."""
     group = window.task.group
-    steps = steps_of(window.samples, group.arena, fov_rad=group.template.fov_rad)
-    fish = window.samples.agent[window.samples.kind == FISH]
-    found = fit(steps.take(np.isin(steps.agent, fish)), group.arena, group.template)
+    found = fit(make_scene(window.samples, group.arena), group.template)
     return to_genes(found.parameters)
 
 

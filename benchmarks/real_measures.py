@@ -31,13 +31,13 @@ from zfcal.parameters import Parameters
 from zfcal.report.figures.statistics import histogram_mean
 from zfcal.stages.analyse.analyse import POOLED_FROM_S
 from zfcal.stages.calibrate.holdout import evaluate_model
-from zfcal.stages.calibrate.likelihood import CERTAIN, estimate
+from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import score_table
 from zfcal.stages.events import say_nothing
 from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import Segments, segment_path, segment_starts
 from zfcal.stages.windows import whole_segments
-from zfcal.tracks import FISH, ROBOT
+from zfcal.tracks import FISH, GUESS, ROBOT
 
 FEATURES = ("D", "W", "O", "T")
 
@@ -129,7 +129,7 @@ def positions_table(root: Path) -> dict[str, Any]:
         confidence.append(tracks.confidence)
         end_s = max(end_s, float(tracks.time_s[-1])) if len(tracks) else end_s
     fish = np.concatenate(kinds) == FISH
-    guessed = np.concatenate(confidence) < CERTAIN
+    guessed = np.concatenate(confidence) < GUESS
     points = located(root).of_kind(FISH)
     return {
         "duration_s": round(end_s + 1 / opened.trial.fps, 3),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .options import EXISTING, makes_artifacts, speaks, takes_trials
+from .options import EXISTING, makes_artifacts, names, speaks, takes_trials
 from .output import Output
 from .streams import each_trial
 
@@ -31,6 +31,12 @@ if TYPE_CHECKING:
     show_default=True,
     help="legacy: as the authors' published scripts compute the score.",
 )
+@click.option(
+    "--features",
+    type=names,
+    metavar="NAMES",
+    help="Count these as well, such as residence,curvature.",
+)
 @makes_artifacts
 @speaks
 def command(
@@ -39,6 +45,7 @@ def command(
     *,
     control: tuple[Path, ...],
     scoring: str,
+    features: tuple[str, ...] | None,
     dry_run: bool,
     force: bool,
 ) -> None:
@@ -53,13 +60,16 @@ def command(
     Example:
         zfcal analyse trial
         zfcal analyse day1 day2 --control alone1 --control alone2
+        zfcal analyse trial --features residence,curvature
         zfcal import tracks.csv trial --format csv | zfcal analyse -
     """
     from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
     from zfcal.stages.opening import Task
     from zfcal.stages.segments import Segments
 
-    options = AnalyseOptions(scoring=scoring, control=control)
+    options = AnalyseOptions(scoring=scoring, control=control, features=features or ())
+    if features is not None and not options.further:
+        raise click.UsageError("--features names none beyond D, W, O, T and V: these are counted.")
     segments = Segments()
 
     def work(found: Work) -> None:

@@ -8,7 +8,7 @@ import click
 
 from .calibration import round_options
 from .durations import span
-from .options import PLACE, makes_artifacts, speaks, takes_trials
+from .options import PLACE, makes_artifacts, names, speaks, takes_trials
 from .output import Output
 
 
@@ -19,6 +19,14 @@ from .output import Output
 @click.option("--window", type=span, metavar="START:END", help="One pooled window instead.")
 @click.option("--held-out", type=span, metavar="START:END", help="Score the model there as well.")
 @click.option("-o", "--out", "output", type=PLACE, help="Where the model of --window goes.")
+@click.option(
+    "--features",
+    type=names,
+    default="D,W,O,T",
+    show_default=True,
+    metavar="NAMES",
+    help="The statistics whose similarity counts.",
+)
 @makes_artifacts
 @speaks
 def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
@@ -33,6 +41,7 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         zfcal calibrate trial --generations 20 --seed 1
         zfcal calibrate trial --budget 50s
         zfcal calibrate trial*/ --cluster tcp://host:8786
+        zfcal calibrate trial --features D,W,O,T,residence,curvature
         zfcal calibrate trial --window 0:900 --held-out 900:1800 -o first-half.toml
     """
     from .calibration import choose, each_round, on_cluster, span_task

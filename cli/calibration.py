@@ -95,6 +95,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
     click.UsageError
         Two options contradict each other, or one could not take effect.
     """
+    from zfcal.behaviour.features.registry import SCORED, further
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.opening import Task
@@ -107,7 +108,10 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         steps=options["steps"],
         optimiser=options["optimiser"],
         champion=options["champion"],
+        features=options.get("features", SCORED),
     )
+    if options.get("cluster") is not None and further(settings.features):
+        raise click.UsageError("--cluster counts D, W, O, T and V: no other --features.")
     chosen = CalibrateOptions(
         settings=settings,
         budget_s=options["budget_s"],

@@ -46,6 +46,14 @@ class Fours(click.IntRange):
         return number
 
 
+def names(text: str) -> tuple[str, ...]:
+    """Return the names that stand between commas."""
+    found = tuple(name.strip() for name in text.split(","))
+    if not all(found):
+        raise click.BadParameter(f"{text!r} holds an empty name; give them as D,W,O,T.")
+    return found
+
+
 def laid_out(command: Command) -> Command:
     """Keep the lines of the example in the help as they are.
 

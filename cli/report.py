@@ -66,7 +66,7 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
     )
     from zfcal.stages.events import LeftOut, Made, Planned, UpToDate
     from zfcal.stages.opening import at_work
-    from zfcal.stages.settled import settled
+    from zfcal.stages.stage import settled
 
     def work() -> None:
         reason = report_reason(roots, folder) or ("forced" if task.force else None)

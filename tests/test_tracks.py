@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from zfcal.errors import InputError
-from zfcal.tracks import FISH, KINDS, ROBOT, Samples, Tracks, concatenate
+from zfcal.tracks import FISH, KINDS, ROBOT, Samples, Tracks, concatenate, joined
 
 
 def tracks_of(frames, agents):
@@ -143,3 +145,47 @@ def test_a_kind_that_is_not_there_leaves_no_agents():
 
     assert none.xy_m.shape == (3, 0, 2)
     assert len(none.agent) == 0
+
+
+def test_samples_are_joined_with_what_is_missing_between_them():
+    """Samples 5 and 6 of agents 10 and 11, 9 and 10 of agents 11 and 12; 4 to 9 are asked for."""
+    one = samples_of(2, [FISH, ROBOT])
+    two = replace(samples_of(2, [ROBOT, FISH]), k=np.array([9, 10]), agent=np.array([11, 12]))
+
+    both = joined([one, two], first=4, stop=10)
+
+    assert both.k.tolist() == [4, 5, 6, 7, 8, 9]
+    assert both.agent.tolist() == [10, 11, 12]
+    assert both.kind.tolist() == [FISH, ROBOT, FISH]
+    seen = ~np.isnan(both.xy_m[..., 0])
+    assert seen.tolist() == [[k in (5, 6), k in (5, 6, 9), k == 9] for k in range(4, 10)]
+    assert both.xy_m[5].tolist()[1:] == [[0.0, 0.0], [1.0, 0.0]]
+    assert (np.isnan(both.confidence) == ~seen).all()
+
+
+def test_agents_of_no_sample_that_is_asked_for_are_left_out():
+    """Two agents, of whom the second is seen in the last sample alone."""
+    samples = samples_of(3, [FISH, FISH])
+    samples.xy_m[:2, 1] = np.nan
+
+    assert joined([samples], first=5, stop=7).agent.tolist() == [10]
+    assert joined([samples], first=5, stop=8).agent.tolist() == [10, 11]
+    assert joined([samples], first=5, stop=5).xy_m.shape == (0, 0, 2)
+
+
+def test_an_agent_of_two_kinds_is_refused_where_samples_are_joined():
+    """A fish in one segment, the robot in the next."""
+    one = samples_of(2, [FISH])
+    two = replace(one, k=one.k + 2, kind=np.array([ROBOT], dtype=np.int8))
+
+    with pytest.raises(InputError, match="agent 10 is of two kinds"):
+        joined([one, two], first=5, stop=9)
+
+
+@pytest.mark.parametrize("steps", [[], [0.2, 0.25]])
+def test_samples_of_no_step_or_of_two_are_not_joined(steps):
+    """There is no clock that holds them."""
+    parts = [replace(samples_of(2, [FISH]), dt_s=step) for step in steps]
+
+    with pytest.raises(InputError, match="one step dt_s"):
+        joined(parts, first=5, stop=9)

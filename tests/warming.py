@@ -47,13 +47,13 @@ def count(n_agents):
 def estimate():
     """Estimate the most likely parameters of a few fish, as a round does before its search."""
     from zfcal.model.likelihood import fit
-    from zfcal.model.steps import steps_of
+    from zfcal.model.scene import make_scene
 
     tank, fish = tank_and_fish()
     # Not simulated: that is another part.
     steps_m = np.random.default_rng(1).normal(0.0, 0.004, (200, 3, 2))
     xy_m = np.array([0.24, 0.77]) + np.clip(np.cumsum(steps_m, axis=0), -0.05, 0.05)
-    fit(steps_of(_samples(xy_m), tank, fov_rad=fish.fov_rad), tank, fish)
+    fit(make_scene(_samples(xy_m), tank), fish)
 
 
 def tracker():

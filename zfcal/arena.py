@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 VOID = 0
@@ -25,8 +26,6 @@ _AREA_TOLERANCE = 1e-6
 
 _INSIDE_M = 1e-9
 """How far inside the wall a settled point is put."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,12 @@ The two shapes in which every other part sees a trial. Files are read in
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 FISH = 0
@@ -19,7 +20,9 @@ ROBOT = 1
 KINDS = ("fish", "robot")
 """Names of the kinds, in the order of their codes."""
 
-Floats = NDArray[np.float64]
+GUESS = 0.5
+"""A position of a lower confidence is a guess. It counts as a place wherever places count, and is
+seen by the others; no step of a likelihood begins or ends in it, and no robot is driven by it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +43,7 @@ class Tracks:
     heading_rad : ndarray of float32, shape (row,)
         Counter-clockwise from x; NaN where unknown.
     confidence : ndarray of float32, shape (row,)
-        In [0, 1]; below 0.5 a position is a guess.
+        In [0, 1]; below `GUESS` a position is a guess.
     """
 
     time_s: Floats
@@ -153,6 +156,11 @@ class Samples:
     xy_m: Floats
     confidence: NDArray[np.float32]
 
+    @property
+    def guessed(self) -> NDArray[np.bool_]:
+        """Whether a position is a guess, shape (sample, agent); False where there is none."""
+        return np.asarray(self.confidence < GUESS)
+
     def of_kind(self, kind: int) -> Samples:
         """Return the samples of one kind of agent only."""
         return self.take_agents(self.kind == kind)
@@ -167,3 +175,60 @@ class Samples:
             xy_m=self.xy_m[:, chosen],
             confidence=self.confidence[:, chosen],
         )
+
+
+def joined(parts: Iterable[Samples], *, first: int, stop: int) -> Samples:
+    """Return the samples of consecutive parts of a recording, such as its segments.
+
+    Parameters
+    ----------
+    parts
+        One at least, of one step; in order of time, none overlapping. What lies between two
+        of them is missing.
+    first, stop
+        The samples are ``range(first, stop)``; agents that are in none of them are left out.
+
+    Raises
+    ------
+    InputError
+        There is no part, they differ in their step, or an agent is of two kinds.
+    """
+    parts = list(parts)
+    if not parts or any(part.dt_s != parts[0].dt_s for part in parts):
+        steps = sorted({part.dt_s for part in parts})
+        raise InputError(f"Samples to join must be of one step dt_s, got {steps}.")
+    kept = [_between(part, first, stop) for part in parts]
+    agent, row, column = np.unique(
+        np.concatenate([part.agent for part in kept]), return_index=True, return_inverse=True
+    )
+    kinds = np.concatenate([part.kind for part in kept])
+    changed = np.flatnonzero(kinds != kinds[row][column])
+    if changed.size:
+        who = int(agent[column[changed[0]]])
+        raise InputError(f"Tracks: agent {who} is of two kinds; an id belongs to one agent.")
+    shape = (max(stop - first, 0), len(agent))
+    xy_m = np.full((*shape, 2), np.nan)
+    confidence = np.full(shape, np.nan, dtype=np.float32)
+    for part, columns in zip(kept, _pieces(column, [len(p.agent) for p in kept]), strict=True):
+        at = np.ix_(part.k - first, columns)
+        xy_m[at], confidence[at] = part.xy_m, part.confidence
+    return Samples(
+        dt_s=parts[0].dt_s,
+        k=np.arange(first, first + shape[0], dtype=np.int64),
+        agent=agent,
+        kind=kinds[row],
+        xy_m=xy_m,
+        confidence=confidence,
+    )
+
+
+def _between(part: Samples, first: int, stop: int) -> Samples:
+    """Return the samples from one to another, and the agents that are in them."""
+    rows = (part.k >= first) & (part.k < stop)
+    xy_m, confidence = part.xy_m[rows], part.confidence[rows]
+    cut = replace(part, k=part.k[rows], xy_m=xy_m, confidence=confidence)
+    return cut.take_agents(np.flatnonzero((~np.isnan(xy_m[..., 0])).any(axis=0)))
+
+
+def _pieces(values: NDArray[np.intp], sizes: list[int]) -> list[NDArray[np.intp]]:
+    return np.split(values, np.cumsum(sizes)[:-1])

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.diagnose.candidates import candidate_of
 from zfcal.diagnose.heldout import (
     Steps,
-    candidate_of,
     effect_steps,
     evaluate,
     fit_base,

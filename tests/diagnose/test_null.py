@@ -12,6 +12,7 @@ from zfcal.diagnose.null import (
     Measurement,
     check_length,
     from_replicates,
+    moments_of,
     replicate,
     run_null,
     theory,
@@ -66,6 +67,25 @@ def test_centre_and_spread_by_hand():
     assert null.n == 2
     assert null.largest == pytest.approx([2 * math.sqrt(2) / math.sqrt(28 / 21)] * 2)
     assert null.standardised(np.array([2.0, 2.0]))[0] == 0.0
+
+
+def test_moments_by_hand():
+    """Of 0 and 4, with a weight of ten: squares 8, so 18 / 11; half as much more for one more."""
+    moments = moments_of(np.array([[0.0], [4.0]]), 10.0)
+
+    assert moments.centre == pytest.approx([2.0])
+    assert moments.variance == pytest.approx([18 / 11])
+    assert moments.df == 11
+    assert moments.spread_of_one_more(2) == pytest.approx([math.sqrt(18 / 11 * 1.5)])
+
+
+def test_without_replicates_the_theory_is_left():
+    """Centre 0, variance 1, and the degrees of freedom that it counts for."""
+    moments = moments_of(np.zeros((0, 3)), 10.0)
+
+    assert moments.centre.tolist() == [0.0] * 3
+    assert moments.variance.tolist() == [1.0] * 3
+    assert moments.df == 10
 
 
 def test_chances_by_hand():

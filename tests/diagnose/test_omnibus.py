@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.stats import chi2, kstest, norm
 
 from zfcal.diagnose.chances import by_context, normal_of, rare_by_context
@@ -77,10 +78,23 @@ def test_a_chi_square_keeps_its_tail(value, df):
     assert norm.logsf(z) == pytest.approx(chi2.logsf(value, df), rel=1e-6)
 
 
-def test_a_chi_square_beyond_all_numbers_stays_finite_and_in_order():
-    """10,000 with ten degrees of freedom is larger than 5,000, and both are finite."""
-    assert 30 < normal_of(5_000.0, 10) < normal_of(10_000.0, 10) < math.inf
+@pytest.mark.parametrize("df", [1, 4, 60, 900])
+def test_a_chi_square_beyond_all_numbers_has_the_tail_that_goes_on(df):
+    """On both sides of a tail of 1e-290 the steps are alike: it grows as the root of the value."""
+    edge = brentq(lambda value: chi2.logsf(value, df) + 290 * math.log(10), df, df + 3_000)
+    z = [normal_of(edge + by, df) for by in np.linspace(-3, 3, 8)]
+    steps = np.diff(z)
+
+    assert (steps > 0).all()
+    assert steps == pytest.approx(np.full(7, steps[0]), rel=0.02)
+    assert z[0] == pytest.approx(36.4, abs=0.1)
+
+
+def test_a_chi_square_without_freedom_is_no_number():
+    """And one that leaves nothing over is not less than three standard deviations below."""
     assert math.isnan(normal_of(1.0, 0))
+    assert normal_of(0.0, 4) == pytest.approx(-3.0902, abs=1e-4)
+    assert normal_of(1e6, 4) == pytest.approx(1e3, rel=1e-3)
 
 
 def test_a_context_by_hand():

@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from zfcal.diagnose.candidates import askable, candidates_of
-from zfcal.diagnose.scores import by_track, centred, excess_deviate, normal_deviate, summed, tame
+from zfcal.diagnose.scores import by_track, centred, excess_deviate, summed, tame
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
@@ -223,15 +222,6 @@ def test_sums_by_track():
     sums, squares = by_track(np.array([7, 3, 7], dtype=np.int32), np.array([1.0, 2.0, 3.0]))
     assert sums.tolist() == [2.0, 4.0]
     assert squares.tolist() == [4.0, 10.0]
-
-
-def test_a_chi_square_as_a_normal_deviate():
-    """The median is about zero, the upper 2.5 % at 1.96, and far out it stays finite."""
-    assert normal_deviate(float(stats.chi2.isf(0.025, 4)), 4) == pytest.approx(1.95996, abs=1e-4)
-    assert normal_deviate(float(stats.chi2.median(4)), 4) == pytest.approx(0.0, abs=1e-6)
-    far = [normal_deviate(chi2, 4) for chi2 in (1000.0, 1480.0, 1500.0, 2000.0, 1e6)]
-    assert far == sorted(far)
-    assert far == pytest.approx([math.sqrt(c) for c in (1000, 1480, 1500, 2000, 1e6)], rel=0.02)
 
 
 def test_one_wild_value_is_tamed():

@@ -28,12 +28,10 @@ from zfcal.model.kernels.extended import (
     extended_sums,
     make_cells,
 )
-from zfcal.model.kernels.likelihood import PER_CELL
-from zfcal.model.likelihood import fit
+from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.onestep import heading_density
 from zfcal.model.scene import make_scene
 from zfcal.model.simulate import simulate_tracks
-from zfcal.model.steps import ANGLES, steps_of
 from zfcal.model.views import view_of
 from zfcal.tracks import Samples
 
@@ -98,30 +96,6 @@ def having(model, effects):
 def nats_of(x, turns, view):
     """Return the log densities of a zone's turns."""
     return zone_scores(x, turns, view)[0]
-
-
-@pytest.mark.slow
-def test_the_hill_is_that_of_the_base_models_likelihood(walk, scene, two_rooms, model):
-    """The base's top is as high here, to 1e-3 nats of some 9,000, and nothing higher is missed.
-
-    Kappas and alpha may go beyond what a gene can hold, so the top here can be the higher one;
-    the climb ends where no step promises 0.02 nats in a zone.
-    """
-    base = fit(steps_of(walk, two_rooms, fov_rad=model.fov_rad), two_rooms, model)
-    fitted = maximise(scene, model)
-
-    view, there = view_of(scene, base.parameters), 0.0
-    for x, turns, name in zip(
-        start_of(base.parameters), zone_turns(scene), base.lapse, strict=True
-    ):
-        x[-1] = base.lapse[name]
-        there += nats_of(x, turns, view).sum()
-    assert fitted.used.sum() == base.n_steps
-    assert there == pytest.approx(base.nats_per_step * base.n_steps, abs=1e-3)
-    assert fitted.nats > there - 0.06
-    for own, other in zip(fitted.parameters.zones, base.parameters.zones, strict=True):
-        assert own.kappa_0 == pytest.approx(other.kappa_0, rel=0.03)
-        assert own.alpha == pytest.approx(other.alpha, rel=0.05)
 
 
 def test_the_maximum_does_not_depend_on_the_start(scene, model):

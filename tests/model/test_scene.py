@@ -25,7 +25,6 @@ from zfcal.model.kernels.world import (
 )
 from zfcal.model.scene import cos_of, make_scene, thin
 from zfcal.model.simulate import simulate_tracks
-from zfcal.model.steps import steps_of
 from zfcal.tracks import FISH, ROBOT, Samples
 
 DT_S = 0.2
@@ -165,12 +164,31 @@ def test_many_short_tracks_need_few_columns_and_lose_no_step(two_rooms, walk):
     assert len(own) == len(scene.turns)
 
 
-def test_a_guessed_position_counts_as_missing(two_rooms):
-    """Confidence 0.49 is a guess; 0.5 is not."""
+def test_no_step_begins_or_ends_in_a_guess(two_rooms):
+    """Confidence 0.49 is one; 0.5 is not."""
     path = line((0.2, 0.75), 8)
     low, enough = [1, 1, 1, 0.49, 1, 1, 1, 1], [1, 1, 1, 0.5, 1, 1, 1, 1]
     assert make_scene(samples_of(path, confidence=[low]), two_rooms).turns.at.tolist() == [1, 5, 6]
     assert len(make_scene(samples_of(path, confidence=[enough]), two_rooms).turns) == 6
+    for confidence, at in ((low, [1, 5, 6]), (enough, [1, 2, 3, 4, 5, 6])):
+        samples = samples_of(path, confidence=[confidence])
+        assert make_scene(samples, two_rooms).moves.at.tolist() == at
+
+
+def test_a_guess_is_seen_by_the_others(two_rooms):
+    """The second fish is a guess at sample 3: the first sees it then as at other times."""
+    paths = line((0.2, 0.75), 8), line((0.25, 0.75), 8)
+    guess = [[1] * 8, [1, 1, 1, 0.2, 1, 1, 1, 1]]
+    scene = make_scene(samples_of(*paths, confidence=guess), two_rooms)
+
+    assert (scene.states[:, ZONE, 1] > 0).all()
+    assert scene.tracks[:, 1].tolist() == [2] * 8
+    assert scene.turns.at[scene.turns.who == 1].tolist() == [1, 5, 6]
+    first = scene.turns.take(scene.turns.who == 0)
+    assert first.at.tolist() == [1, 2, 3, 4, 5, 6]
+    _, angle = perceive(scene.states, first.at, first.who, 0, cos_of(2.0))
+    assert (angle[:, 1] > 0).all()
+    assert scene.n_fish == 2
 
 
 def test_a_position_outside_is_not_there_and_one_at_the_wall_is(two_rooms):
@@ -233,23 +251,20 @@ def test_a_robots_column_is_no_fishs(two_rooms):
     assert set(scene.moves.track) == {2}
 
 
-def test_the_turns_are_those_of_the_likelihood(two_rooms, model, walk):
-    """Which steps, from where to where, and what was seen: as `steps_of` has them."""
-    scene, steps = make_scene(walk, two_rooms), steps_of(walk, two_rooms, fov_rad=model.fov_rad)
-    turns = scene.turns
+def test_the_turns_are_those_of_plain_arithmetic(two_rooms, walk):
+    """Two displacements of 2 mm or more: their directions, the speed, and the zones at the ends."""
+    turns, xy = make_scene(walk, two_rooms).turns, walk.xy_m
+    moved = np.diff(xy, axis=0)
+    length = np.hypot(moved[..., 0], moved[..., 1])
+    at, who = np.nonzero((length[:-1] >= 0.002) & (length[1:] >= 0.002))
 
-    assert turns.at.tolist() == (steps.k - walk.k[0]).tolist()
-    assert turns.track.tolist() == steps.agent.tolist()
-    assert np.array_equal(turns.zone, steps.zone)
-    assert np.array_equal(turns.landing, steps.landing)
-    assert np.array_equal(turns.share, steps.share)
-    for name in ("heading", "taken", "along_wall", "speed_m_s"):
-        assert getattr(turns, name) == pytest.approx(getattr(steps, name), abs=1e-9)
-    _, angle = perceive(scene.states, turns.at, turns.who, 0, cos_of(model.fov_rad))
-    known = turns.at > 20
-    assert np.sort(angle[known], axis=1)[:, 1:] == pytest.approx(
-        np.sort(steps.angle_sr[known], axis=1)[:, -4:], abs=1e-9
-    )
+    assert turns.at.tolist() == (at + 1).tolist()
+    assert turns.track.tolist() == (who + 1).tolist()
+    assert turns.zone.tolist() == two_rooms.zone_of(xy[at + 1, who]).tolist()
+    assert turns.landing.tolist() == two_rooms.zone_of(xy[at + 2, who]).tolist()
+    assert turns.speed_m_s == pytest.approx(length[at + 1, who] / DT_S)
+    for steps, unit in ((at, turns.heading), (at + 1, turns.taken)):
+        assert unit == pytest.approx(moved[steps, who] / length[steps, who][:, None], abs=1e-9)
 
 
 def test_who_responds_late_sees_where_others_were(two_rooms):

@@ -306,7 +306,7 @@ def _write_round(trial, arena, end_s):
 def stub_model(two_rooms, wander):
     """Return wandering agents for any model: the long simulation compiles for long."""
     statistics = measure(wander(two_rooms, seed=9), two_rooms)
-    return lambda *_: statistics
+    return lambda *_, **__: statistics
 
 
 @pytest.fixture

@@ -31,8 +31,15 @@ def test_the_model_is_simulated_as_the_round_confirmed_it(two_rooms, rounds_of, 
         genes[None], n_counted=5, n_steps=confirmation.n_steps, seeds=confirmation.seeds
     )
 
-    found = long_run(champion, trial, two_rooms, settings=settings)
+    names = ("residence", "neighbour")
+    found = long_run(champion, trial, two_rooms, settings=settings, further=names)
+    recorded = group.record(
+        genes[None], names, n_counted=5, n_steps=confirmation.n_steps, seeds=confirmation.seeds
+    )
 
     assert found.occupation.sum() == 2 * 100 * 5
     for name in ("distance", "wall", "occupation", "transition", "speed"):
         assert np.array_equal(getattr(found, name), getattr(expected, name).sum(axis=(0, 1))), name
+    for name in names:
+        assert np.array_equal(found.of(name), recorded[name].sum(axis=(0, 1))), name
+    assert found.of("neighbour").sum() == 2 * 100 * 5

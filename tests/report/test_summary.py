@@ -47,6 +47,20 @@ def test_a_feature_that_s_hides_is_named(make_view, course):
     assert "in each zone" not in said
 
 
+def test_a_score_of_other_statistics_is_not_called_s(make_view):
+    """It stands with what it is of, beside its ceiling; without one nothing is said."""
+    view = make_view()
+    assert not [s for s in statements(view) if "calibrated on" in s.question]
+    score = Mark(value=0.6, low=0.7, high=0.9, ceiling=0.8)
+    last = replace(view.rounds[-1], score=score, score_of=("D", "curvature"))
+
+    said = answer_to(replace(view, rounds=[*view.rounds[:-1], last]), "What was the model")
+
+    assert said.answer.startswith("On the score of D, curvature, which is not S")
+    assert "it is 0.60; a perfect model would score 0.80" in said.answer
+    assert said.figure == ("75 %", "of what a perfect model would score")
+
+
 def test_a_single_window_is_spoken_of_as_one(make_view, course):
     """No mean over one window, and its interval is named."""
     courses = {(MODEL, "S", None): course([0.8], ceiling=0.85)}

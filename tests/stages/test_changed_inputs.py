@@ -19,7 +19,7 @@ from zfcal.artifacts.reading import contents as reading
 from zfcal.artifacts.reading.contents import hash_of, read_bytes
 from zfcal.cameras.lens import Lens
 from zfcal.diagnose.findings import Note as Said
-from zfcal.errors import ChangedError, InputError, ZfcalError
+from zfcal.errors import ChangedError, ZfcalError
 from zfcal.report import page
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
@@ -35,8 +35,8 @@ from zfcal.stages.extend.extend import ExtendOptions, extend
 from zfcal.stages.import_ import Source, import_tracks
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.opening import Task
-from zfcal.stages.settled import Items, settled
 from zfcal.stages.simulate import SimulateOptions, simulate
+from zfcal.stages.stage import settled
 from zfcal.stages.track.plan import TrackOptions
 from zfcal.stages.track.track import track
 from zfcal.virtual.film import FilmOptions, film
@@ -489,28 +489,3 @@ def test_settled_work_is_done_twice_at_most(tmp_path):
 def test_settled_work_gives_its_result(tmp_path):
     """Once, where nothing changes."""
     assert settled(lambda: 7, say_nothing) == 7
-
-
-def test_items_are_opened_anew_where_something_has_changed(tmp_path):
-    """What they share is read again, and each item is made from it."""
-    path = tmp_path / "settings"
-    path.write_text("old")
-    items = Items(lambda: read_bytes(path), say_nothing)
-    made = []
-
-    def work(settings):
-        hash_of(path)
-        made.append(settings)
-        return True
-
-    assert items.make(tmp_path / "1", work)
-    path.write_text("new")
-    assert items.make(tmp_path / "2", work)
-    assert items.make(tmp_path / "3", work)
-    assert made == [b"old", b"new", b"new"]
-
-
-def test_other_errors_pass_through(tmp_path):
-    """What is missing is missing the second time as well."""
-    with pytest.raises(InputError):
-        Items(lambda: read_bytes(tmp_path / "x"), say_nothing)

@@ -16,10 +16,11 @@ from zfcal.stages.recording import (
     check_same_source,
     cut,
     hash_sources,
+    segmented,
     starts_between,
     starts_of_recording,
-    write_segments,
 )
+from zfcal.stages.stage import OneThing, run
 from zfcal.tracks import Tracks, concatenate
 
 LINEAGE = Lineage(schema="zfcal.tracks/1", command="import", inputs={"a.csv": "0" * 64})
@@ -48,9 +49,19 @@ def trial(make_trial):
     return read_trial(root)
 
 
+def write_segments(trial, recorded, tell, *, task=None):
+    """Write the segments of a recording that are missing or stale."""
+    tracks, end_s, lineage = recorded
+
+    def item(run):
+        return segmented(run, trial, lineage, [], lambda: Recording(tracks=tracks, end_s=end_s))
+
+    run(OneThing(name="import", item=item), trial.root, tell, task=task)
+
+
 def recording_of(tracks, end_s, lineage=LINEAGE):
-    """Return tracks as a recording."""
-    return Recording(tracks=tracks, end_s=end_s, lineage=lineage)
+    """Return tracks, to when they go, and where they come from."""
+    return tracks, end_s, lineage
 
 
 def test_rows_fall_into_the_minute_in_which_they_are():

@@ -1,12 +1,17 @@
 """Reading segments: each once, and no more of them in memory than is bearable."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join
 from zfcal.behaviour.statistics import measure
 from zfcal.errors import InputError
 from zfcal.stages import segments as module
-from zfcal.stages.segments import Segments, segment_hashes, segment_path
+from zfcal.stages.segments import Segments, guess_options, segment_hashes, segment_path
 from zfcal.tracks import FISH
 
 STARTS = [0, 60, 120, 180]
@@ -15,13 +20,13 @@ STARTS = [0, 60, 120, 180]
 @pytest.fixture
 def reads(monkeypatch):
     """Return a list that hears which segments are read from the disk."""
-    heard, locate = [], module._locate
+    heard, read = [], module.read_segment
 
-    def watch(opened, path, start_s):
+    def watch(opened, start_s):
         heard.append(start_s)
-        return locate(opened, path, start_s)
+        return read(opened, start_s)
 
-    monkeypatch.setattr(module, "_locate", watch)
+    monkeypatch.setattr(module, "read_segment", watch)
     return heard
 
 
@@ -98,3 +103,17 @@ def test_a_segment_that_is_missing_has_no_hash(make_trial):
     root = make_trial(seconds=120)
     with pytest.raises(InputError, match=r"tracks/000120.parquet: no such file"):
         segment_hashes(root, [0, 120])
+
+
+def test_a_lineage_states_how_guesses_count_where_there_are_some(make_trial):
+    """One of 0.49 in the second minute; one of a half is none, and a damaged file has none."""
+    root = make_trial(seconds=180)
+    paths = [segment_path(root, start) for start in STARTS[:3]]
+    for path, confidence in zip(paths, (0.5, 0.49, 1.0), strict=True):
+        rows = read_tracks(path)
+        unsure = np.where(np.arange(len(rows)) == 7, confidence, 1.0).astype(np.float32)
+        write_tracks(path, replace(rows, confidence=unsure), read_lineage(path))
+    paths[2].write_bytes(paths[2].read_bytes()[:1000])
+
+    assert guess_options([paths[0], paths[2]]) == {}
+    assert guess_options(paths) == {"guesses": "seen"}

@@ -39,6 +39,8 @@ class Ceiling:
         `score_keys`; NaN where no comparison has that score.
     n_windows
         How many comparisons.
+    named
+        Mean, low and high of the score of statistics that were named; None where S counts.
     """
 
     zone_names: tuple[str, ...]
@@ -46,6 +48,12 @@ class Ceiling:
     low: tuple[float, ...]
     high: tuple[float, ...]
     n_windows: int
+    named: tuple[float, float, float] | None = None
+
+    @property
+    def overall(self) -> tuple[float, float, float]:
+        """Mean, low and high of what decides: S, or the score of what was named."""
+        return self.of("S") if self.named is None else self.named
 
     def of(self, feature: str, zone: str | None = None) -> tuple[float, float, float]:
         """Return mean, low and high of one score.
@@ -98,13 +106,23 @@ def summarise(scores: list[Scores]) -> Ceiling:
         tuple(float(np.quantile(column, q)) if column else NAN for column in columns)
         for q in (0.025, 0.975)
     )
+    named = [s.named.value for s in scores if s.named and s.named.value == s.named.value]
     return Ceiling(
         zone_names=scores[0].zone_names,
         mean=tuple(float(np.mean(column)) if column else NAN for column in columns),
         low=low,
         high=high,
         n_windows=len(scores),
+        named=_interval(named) if scores[0].named else None,
     )
+
+
+def _interval(values: list[float]) -> tuple[float, float, float]:
+    """Return mean and 2.5 and 97.5 % quantiles; NaN of nothing."""
+    if not values:
+        return NAN, NAN, NAN
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(np.mean(values)), float(low), float(high)
 
 
 def robot_ceiling(samples: SamplesOrLocated, arena: Arena) -> list[Scores]:

@@ -1,4 +1,4 @@
-"""Histograms of ten bins, and how alike two of them are.
+"""Histograms, and how alike two of them are.
 
 Bins are half-open, the last one closed and also holding what lies beyond; what
 lies below the first edge goes into the first bin.
@@ -31,46 +31,22 @@ def bin_edges(limits: tuple[float, float]) -> Floats:
     return np.linspace(*limits, N_BINS + 1)
 
 
-def bin_of(values: ArrayLike, limits: tuple[float, float]) -> NDArray[np.intp]:
+def bin_of(values: ArrayLike, edges: ArrayLike) -> NDArray[np.intp]:
     """Return the bin of each value.
 
     Parameters
     ----------
     values : array_like, shape (...)
-        Finite numbers, in the unit of the limits.
-    limits
-        Lower and upper end of the range.
+        Finite numbers, in the unit of the edges.
+    edges : array_like, shape (bin + 1,)
+        Ascending.
 
     Returns
     -------
     ndarray of int, shape (...)
-        0 to 9.
+        From 0.
     """
-    return np.searchsorted(bin_edges(limits)[1:-1], np.asarray(values), side="right")
-
-
-def count_by_zone(
-    zone: NDArray[np.integer], values: Floats, *, limits: tuple[float, float], n_zones: int
-) -> Ints:
-    """Count values by zone and bin.
-
-    Parameters
-    ----------
-    zone : ndarray of int, shape (value,)
-        Zone ids from 1; none is void.
-    values : ndarray, shape (value,)
-        Finite numbers, in the unit of the limits.
-    limits
-        Range of the ten bins.
-    n_zones
-        Zones of the arena.
-
-    Returns
-    -------
-    ndarray of int64, shape (zone, 10)
-    """
-    cell = (zone.astype(np.intp) - 1) * N_BINS + bin_of(values, limits)
-    return count_cells(cell, (n_zones, N_BINS))
+    return np.searchsorted(np.asarray(edges)[1:-1], np.asarray(values), side="right")
 
 
 def count_cells(cell: NDArray[np.intp], shape: tuple[int, int]) -> Ints:

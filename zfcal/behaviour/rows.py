@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS
 from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.features.registry import named
+from zfcal.behaviour.features.statistic import GROUP_ROW
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.scores import NAN, Scores, score_keys
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
 from zfcal.errors import InputError
 
 STATISTICS_COLUMNS = (
@@ -46,8 +48,6 @@ COMPARED = ("social-vs-control", "robot-vs-fish", "model-vs-control")
 
 Table: TypeAlias = dict[str, list[Any]]
 
-_FEATURES = {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
-
 
 def join_tables(tables: Sequence[Table]) -> Table:
     """Return the rows of several tables of the same columns, one after the other.
@@ -76,8 +76,9 @@ def statistics_to_rows(statistics: Statistics, *, window_end_s: int, case: str) 
     -------
     dict of list
         The `STATISTICS_COLUMNS`. A row per zone and bin for D, W and V, per
-        zone for O, per pair of zones for T, also where the count is 0. The
-        frequency is the count's share of its histogram (of its row for T, of
+        zone for O, per pair of zones for T, also where the count is 0; then
+        the further statistics, in which the zone of what belongs to the group
+        is ``all``. The frequency is the count's share of its histogram (of its row for T, of
         all zones for O), None where that has no count.
 
     Raises
@@ -88,13 +89,14 @@ def statistics_to_rows(statistics: Statistics, *, window_end_s: int, case: str) 
     _check_name("case", case, CASES)
     rows: list[tuple[Any, ...]] = []
     names = statistics.zone_names
-    for feature, attribute in _FEATURES.items():
-        counts = getattr(statistics, attribute)
+    for feature in statistics.names:
+        statistic, counts = named(feature), statistics.of(feature)
         shares = frequencies(counts)
+        rooms = names if statistic.per_zone else (GROUP_ROW,)
         for at in np.ndindex(counts.shape):
-            to_zone = names[at[1]] if feature == "T" else None
-            number = at[1] if feature in "DWV" else None
-            key = (names[at[0]], to_zone, number)
+            to_zone = names[at[1]] if statistic.form == "table" else None
+            number = at[1] if statistic.form == "bins" else None
+            key = (rooms[at[0]], to_zone, number)
             rows.append((feature, *key, int(counts[at]), _or_none(float(shares[at]))))
     columns = dict(zip(STATISTICS_COLUMNS[2:], map(list, zip(*rows, strict=True)), strict=True))
     return {"window_end_s": [window_end_s] * len(rows), "case": [case] * len(rows), **columns}
@@ -142,6 +144,8 @@ def _statistics(cells: dict[tuple[Any, ...], Any], *, where: str) -> Statistics:
     }
     wanted["O"] = [("O", zone, None, None) for zone in names]
     wanted["T"] = [("T", zone, to, None) for zone in names for to in names]
+    others = dict.fromkeys(feature for feature, *_ in cells if feature not in ATTRIBUTES)
+    wanted |= {feature: _grid(feature, cells, names) for feature in others}
     keys = [key for part in wanted.values() for key in part]
     for problem, found in (
         ("no row for", [key for key in keys if key not in cells]),
@@ -155,11 +159,29 @@ def _statistics(cells: dict[tuple[Any, ...], Any], *, where: str) -> Statistics:
             )
 
     def counts(feature: str) -> NDArray[np.int64]:
-        values = np.array([cells[key] for key in wanted[feature]], dtype=np.int64)
-        return values if feature == "O" else values.reshape(len(names), -1)
+        part = wanted[feature]
+        values = np.array([cells[key] for key in part], dtype=np.int64)
+        is_row = part[0][2:] == (None, None)
+        return values if is_row else values.reshape(len({zone for _, zone, *_ in part}), -1)
 
-    counted: dict[str, Any] = {name: counts(feature) for feature, name in _FEATURES.items()}
-    return Statistics(zone_names=names, **counted)
+    counted: dict[str, Any] = {name: counts(feature) for feature, name in ATTRIBUTES.items()}
+    return Statistics(
+        zone_names=names, further={feature: counts(feature) for feature in others}, **counted
+    )
+
+
+def _grid(
+    feature: str, cells: Mapping[tuple[Any, ...], Any], names: tuple[str, ...]
+) -> list[tuple[Any, ...]]:
+    """Return the rows of a further statistic, whether or not its package is installed here."""
+    own = [key for key in cells if key[0] == feature]
+    rooms = (GROUP_ROW,) if own[0][1] == GROUP_ROW and GROUP_ROW not in names else names
+    last = max((b for *_, b in own if b is not None), default=None)
+    if last is not None:
+        return [(feature, zone, None, b) for zone in rooms for b in range(last + 1)]
+    if own[0][2] is not None:
+        return [(feature, zone, to, None) for zone in names for to in names]
+    return [(feature, zone, None, None) for zone in names]
 
 
 def scores_to_rows(

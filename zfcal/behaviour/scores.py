@@ -6,12 +6,14 @@ D, W, O, T and S are the names of the paper (Cazenille et al., data analysis).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.behaviour.features.registry import named as named_statistic
 from zfcal.behaviour.histograms import similarity
 from zfcal.behaviour.statistics import Statistics, check_zones
 from zfcal.errors import InputError
@@ -40,6 +42,28 @@ class Counts(Protocol):
     @property
     def transition(self) -> Ints:
         """T, shape (..., zone, zone)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedScore:
+    """How alike two groups are in statistics that were named: a score that is not S.
+
+    Parameters
+    ----------
+    features
+        Their names.
+    similarities
+        Similarity of each, the mean over zones; NaN where neither side has a count.
+    value
+        Geometric mean of those that are not NaN.
+    n_features
+        How many those are.
+    """
+
+    features: tuple[str, ...]
+    similarities: tuple[float, ...]
+    value: float
+    n_features: int
 
 
 class FeatureScores(NamedTuple):
@@ -103,6 +127,8 @@ class Scores:
         Geometric mean of the features that are not NaN.
     n_features
         How many those are.
+    named
+        The score of other statistics, where these are what counts; None for S.
     """
 
     zone_names: tuple[str, ...]
@@ -115,6 +141,7 @@ class Scores:
     I_T: float
     S: float
     n_features: int
+    named: NamedScore | None = None
 
     def __post_init__(self) -> None:
         for name in ("D", "W", "T"):
@@ -125,6 +152,11 @@ class Scores:
                     f"got {len(values)}."
                 )
             object.__setattr__(self, name, values)
+
+    @property
+    def overall(self) -> float:
+        """What decides: S, or the score of the statistics that were named."""
+        return self.S if self.named is None else self.named.value
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -202,10 +234,45 @@ def from_zones(*, D: Floats, W: Floats, O: Floats, T: Floats) -> FeatureScores: 
     FeatureScores
     """
     I_D, I_W, I_T = _mean(D), _mean(W), _mean(T)
-    S, n_features = _geometric_mean(np.stack([I_D, I_W, O, I_T], axis=-1))
+    S, n_features = geometric_mean(np.stack([I_D, I_W, O, I_T], axis=-1))
     return FeatureScores(
         D=D, W=W, T=T, I_D=I_D, I_W=I_W, I_O=O, I_T=I_T, S=S, n_features=n_features
     )
+
+
+def similarities(
+    counts: Mapping[str, Ints], control: Mapping[str, Ints], features: Sequence[str]
+) -> Floats:
+    """Return how alike many candidates and a control group are in some statistics.
+
+    Parameters
+    ----------
+    counts
+        Of each statistic, with a leading axis over candidates.
+    control
+        The same without that axis.
+    features
+        Names of the statistics.
+
+    Returns
+    -------
+    ndarray, shape (candidate, feature)
+        The mean over zones, as in `population_scores`; NaN where neither side has a count.
+    """
+    columns = []
+    for name in features:
+        alike = named_statistic(name).compare(counts[name], control[name])
+        columns.append(_mean(alike) if alike.ndim > 1 else alike)
+    return np.stack(columns, axis=-1)
+
+
+def named_scores(features: Sequence[str], values: Floats) -> list[NamedScore]:
+    """Return the scores that follow from similarities, shape (candidate, feature), one by one."""
+    score, n_features = geometric_mean(values)
+    return [
+        NamedScore(features=tuple(features), similarities=tuple(row), value=value, n_features=n)
+        for row, value, n in zip(values.tolist(), score.tolist(), n_features.tolist(), strict=True)
+    ]
 
 
 def compare(a: Statistics, b: Statistics) -> Scores:
@@ -246,7 +313,7 @@ def _mean(values: Floats) -> Floats:
     return np.where(n > 0, total / np.where(n > 0, n, 1), np.nan)
 
 
-def _geometric_mean(values: Floats) -> tuple[Floats, Ints]:
+def geometric_mean(values: Floats) -> tuple[Floats, Ints]:
     """Return the geometric mean over the last axis of what is not NaN, and of how many."""
     known = ~np.isnan(values)
     n = known.sum(axis=-1)

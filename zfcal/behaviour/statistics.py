@@ -1,28 +1,36 @@
 """The counts that describe a group in a window: D, W, O, T and V.
 
 Names of features are the paper's. Counts, not frequencies, so that windows can
-be pooled; what is alike about two of them is in ``scores``.
+be pooled; what is counted is in ``features``, what is alike about two of them in ``scores``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
-from zfcal.behaviour.histograms import count_by_zone, count_cells
+from zfcal.behaviour.features.registry import named
+from zfcal.behaviour.features.statistic import Points, count, count_each
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.errors import InputError
 from zfcal.tracks import ROBOT
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+
+ATTRIBUTES: Mapping[str, str] = MappingProxyType(
+    {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
+)
+"""Under which names the statistics that the compiled simulation counts are held."""
+
+_SUMMED = tuple(ATTRIBUTES.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,6 +55,8 @@ class Statistics:
         Agent-samples that lay a little outside and were put at the wall.
     n_void
         Agent-samples farther outside; they are in no other count.
+    further
+        Counts of further statistics by name, shape as `Statistic.shape` says.
     """
 
     zone_names: tuple[str, ...]
@@ -57,6 +67,7 @@ class Statistics:
     speed: Ints
     n_settled: int = 0
     n_void: int = 0
+    further: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.zone_names)
@@ -67,6 +78,12 @@ class Statistics:
             "transition": (n, n),
             "speed": (n, N_BINS),
         }
+        for name, counts in self.further.items():
+            if counts.ndim not in {1, 2} or counts.dtype != np.int64 or (counts < 0).any():
+                raise InputError(
+                    f"Statistic {name} needs counts of one or two axes, got {counts.dtype} of "
+                    f"shape {counts.shape}, least {counts.min(initial=0)}."
+                )
         for name, shape in shapes.items():
             counts = getattr(self, name)
             if counts.shape != shape or counts.dtype != np.int64 or (counts < 0).any():
@@ -75,15 +92,50 @@ class Statistics:
                     f"got {counts.dtype} of shape {counts.shape}, least {counts.min(initial=0)}."
                 )
 
+    def of(self, name: str) -> Ints:
+        """Return the counts of the statistic with a name.
+
+        Raises
+        ------
+        InputError
+            It was not counted.
+        """
+        if name in ATTRIBUTES:
+            counts: Ints = getattr(self, ATTRIBUTES[name])
+            return counts
+        if name not in self.further:
+            raise InputError(
+                f"Statistic {name} was not counted, only {', '.join(self.names)}.",
+                hint=f"Count it with: zfcal analyse TRIAL --features {name}",
+            )
+        return self.further[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What was counted: D, W, O, T, V and the further statistics."""
+        return (*ATTRIBUTES, *self.further)
+
     def __add__(self, other: Statistics) -> Statistics:
-        check_zones(self.zone_names, other.zone_names)
-        sums = {f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)[1:]}
-        return Statistics(zone_names=self.zone_names, **sums)
+        return self._joined(other, np.add)
 
     def __sub__(self, part: Statistics) -> Statistics:
-        check_zones(self.zone_names, part.zone_names)
-        rests = {f.name: getattr(self, f.name) - getattr(part, f.name) for f in fields(self)[1:]}
-        return Statistics(zone_names=self.zone_names, **rests)
+        return self._joined(part, np.subtract)
+
+    def _joined(self, other: Statistics, join: np.ufunc) -> Statistics:
+        check_zones(self.zone_names, other.zone_names)
+        if set(self.names) != set(other.names):
+            raise InputError(
+                f"Statistics hold different ones: {', '.join(self.names)} and "
+                f"{', '.join(other.names)}."
+            )
+        counts = {name: join(getattr(self, name), getattr(other, name)) for name in _SUMMED}
+        return Statistics(
+            zone_names=self.zone_names,
+            n_settled=int(join(self.n_settled, other.n_settled)),
+            n_void=int(join(self.n_void, other.n_void)),
+            further={name: join(own, other.further[name]) for name, own in self.further.items()},
+            **counts,
+        )
 
 
 def check_zones(a: tuple[str, ...], b: tuple[str, ...]) -> None:
@@ -101,7 +153,7 @@ def check_zones(a: tuple[str, ...], b: tuple[str, ...]) -> None:
         )
 
 
-def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
+def measure(samples: SamplesOrLocated, arena: Arena, *, further: Sequence[str] = ()) -> Statistics:
     """Count what all the given agents did.
 
     Parameters
@@ -110,6 +162,8 @@ def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         The agents of a window; take those of one kind for the control case.
     arena
         Gives zones, walls and the ranges of the bins.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
@@ -118,10 +172,13 @@ def measure(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         when one track id is inside at sample k and at k + 1 of the window.
     """
     located = locate(samples, arena)
-    return measure_role(located, np.ones(len(located), dtype=np.bool_), pairs_within=True)
+    everybody = np.ones(len(located), dtype=np.bool_)
+    return measure_role(located, everybody, pairs_within=True, further=further)
 
 
-def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
+def measure_robot(
+    samples: SamplesOrLocated, arena: Arena, *, further: Sequence[str] = ()
+) -> Statistics:
     """Count what the robot did: its own W, O, T and V, and D of robot-fish pairs.
 
     Parameters
@@ -130,6 +187,8 @@ def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         Fish and robots of a window.
     arena
         Gives zones, walls and the ranges of the bins.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
@@ -137,10 +196,12 @@ def measure_robot(samples: SamplesOrLocated, arena: Arena) -> Statistics:
         Several robots are pooled; pairs of two robots do not count.
     """
     located = locate(samples, arena)
-    return measure_role(located, located.kind == ROBOT)
+    return measure_role(located, located.kind == ROBOT, further=further)
 
 
-def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -> Statistics:
+def measure_role(
+    located: Located, role: Bools, *, pairs_within: bool = False, further: Sequence[str] = ()
+) -> Statistics:
     """Count what the agents in a role did, and their distances to the others.
 
     Parameters
@@ -152,28 +213,21 @@ def measure_role(located: Located, role: Bools, *, pairs_within: bool = False) -
     pairs_within
         Whether D is over pairs with both ends in the role, rather than over
         pairs with one end in it.
+    further
+        Names of statistics to count beside D, W, O, T and V.
 
     Returns
     -------
     Statistics
     """
-    arena, n_zones = located.arena, len(located.arena.zones)
     present = located.zone > 0
-    ends = role[present]
-    points = located.take(present)
-    own = points.take(ends)
-    transition, speed = _steps(own)
+    points = Points(located=located.take(present), role=role[present], within=pairs_within)
     return Statistics(
-        zone_names=arena.zone_names,
-        distance=_pairs(points, ends, within=pairs_within),
-        wall=count_by_zone(
-            own.zone, own.wall_distance_m, limits=arena.bins.wall_distance_m, n_zones=n_zones
-        ),
-        occupation=np.bincount(own.zone, minlength=n_zones + 1)[1:].astype(np.int64),
-        transition=transition,
-        speed=speed,
+        zone_names=located.arena.zone_names,
+        **{attribute: count(named(name), points) for name, attribute in ATTRIBUTES.items()},
         n_settled=int(located.settled[role].sum()),
         n_void=int((role & ~present).sum()),
+        further={name: count(named(name), points) for name in further},
     )
 
 
@@ -193,30 +247,17 @@ def measure_each(located: Located, column: NDArray[np.intp], n_columns: int) -> 
     -------
     ndarray of int64, shape (column, count)
         For each agent the counts that `measure_role` finds for it alone, in the
-        order of `from_counts`.
+        order of `from_counts`; no further statistics.
     """
-    arena = located.arena
-    n_zones, bins = len(arena.zones), arena.bins
     present = located.zone > 0
-    points, who = located.take(present), column[present]
-    # A zone of its own for every agent and zone: then all are counted at once.
-    own = who * n_zones + points.zone
-    n_own = n_columns * n_zones
-    start, end, speed_m_s = _moves(points)
-    to = points.zone[end].astype(np.intp) - 1
-    distance = np.zeros((n_own, N_BINS), dtype=np.int64)
-    everybody = np.ones(len(points), dtype=np.bool_)
-    for first, second, apart_m in _apart(points, everybody, within=True):
-        for one in (first, second):
-            distance += count_by_zone(own[one], apart_m, limits=bins.distance_m, n_zones=n_own)
-    wall = count_by_zone(own, points.wall_distance_m, limits=bins.wall_distance_m, n_zones=n_own)
-    occupation = np.bincount(own, minlength=n_own + 1)[1:]
-    transition = count_cells((own[start] - 1) * n_zones + to, (n_own, n_zones))
-    speed = count_by_zone(own[start], speed_m_s, limits=bins.speed_m_s, n_zones=n_own)
+    seen, who = located.take(present), column[present]
+    points = Points(located=seen, role=np.ones(len(seen), dtype=np.bool_), within=True)
     n_settled = np.bincount(column[located.settled], minlength=n_columns)
     n_void = np.bincount(column[~present], minlength=n_columns)
-    parts = (distance, wall, occupation, transition, speed, n_settled, n_void)
-    return np.concatenate([part.reshape(n_columns, -1) for part in parts], axis=1)
+    parts = [count_each(named(name), points, who, n_columns) for name in ATTRIBUTES]
+    return np.concatenate(
+        [part.reshape(n_columns, -1) for part in (*parts, n_settled, n_void)], axis=1
+    )
 
 
 def n_counts(n_zones: int) -> int:
@@ -237,57 +278,8 @@ def from_counts(counts: Ints, zone_names: tuple[str, ...]) -> Statistics:
     n = len(zone_names)
     shapes = ((n, N_BINS), (n, N_BINS), (n,), (n, n), (n, N_BINS))
     *parts, rest = np.split(counts, np.cumsum([math.prod(shape) for shape in shapes]))
-    names = [f.name for f in fields(Statistics)[1:6]]
-    arrays = {
-        name: part.reshape(shape) for name, part, shape in zip(names, parts, shapes, strict=True)
+    arrays: dict[str, Any] = {
+        name: part.reshape(shape)
+        for name, part, shape in zip(ATTRIBUTES.values(), parts, shapes, strict=True)
     }
     return Statistics(zone_names=zone_names, n_settled=int(rest[0]), n_void=int(rest[1]), **arrays)
-
-
-def _pairs(points: Located, role: Bools, *, within: bool) -> Ints:
-    """Count distances of pairs in one zone at one sample."""
-    limits, n_zones = points.arena.bins.distance_m, len(points.arena.zones)
-    counts = np.zeros((n_zones, N_BINS), dtype=np.int64)
-    for first, _, apart_m in _apart(points, role, within=within):
-        counts += count_by_zone(points.zone[first], apart_m, limits=limits, n_zones=n_zones)
-    return counts
-
-
-def _apart(
-    points: Located, role: Bools, *, within: bool
-) -> Iterator[tuple[Indices, Indices, Floats]]:
-    """Yield pairs of points in one zone at one sample, and their distances in metres."""
-    # The points of a sample follow each other: compare each with the next, the one after, ...
-    # This needs no table of agents, whatever the number of track ids.
-    for lag in range(1, len(points)):
-        together = points.k[lag:] == points.k[:-lag]
-        if not together.any():
-            break
-        wanted = role[lag:] & role[:-lag] if within else role[lag:] ^ role[:-lag]
-        first = np.flatnonzero(together & wanted & (points.zone[lag:] == points.zone[:-lag]))
-        yield first, first + lag, _length(points.xy_m[first + lag] - points.xy_m[first])
-
-
-def _steps(points: Located) -> tuple[Ints, Ints]:
-    """Count steps from zone to zone, and their speeds by the zone where they start."""
-    n_zones = len(points.arena.zones)
-    start, end, speed_m_s = _moves(points)
-    zone = points.zone.astype(np.intp) - 1
-    transition = count_cells(zone[start] * n_zones + zone[end], (n_zones, n_zones))
-    speed = count_by_zone(
-        points.zone[start], speed_m_s, limits=points.arena.bins.speed_m_s, n_zones=n_zones
-    )
-    return transition, speed
-
-
-def _moves(points: Located) -> tuple[Indices, Indices, Floats]:
-    """Return where steps of one track id start and end, and their speeds in m/s."""
-    order = np.argsort(points.agent, kind="stable")
-    agent, k = points.agent[order], points.k[order]
-    follows = (agent[1:] == agent[:-1]) & (k[1:] == k[:-1] + 1)
-    start, end = order[:-1][follows], order[1:][follows]
-    return start, end, _length(points.xy_m[end] - points.xy_m[start]) / points.dt_s
-
-
-def _length(xy_m: Floats) -> Floats:
-    return np.hypot(xy_m[:, 0], xy_m[:, 1])

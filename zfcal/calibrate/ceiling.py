@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.behaviour.ceilings import Ceiling, summarise
-from zfcal.behaviour.scores import population_scores
+from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.objective import Seeds, Simulator, runs_of
+from zfcal.calibrate.objective import Seeds, Simulator, score_each, simulate_named
 from zfcal.errors import InputError
 
 _SDS = 2 * NormalDist().inv_cdf(0.975)
@@ -23,8 +23,14 @@ _SDS = 2 * NormalDist().inv_cdf(0.975)
 Floats = NDArray[np.float64]
 
 
-def measure_ceiling(
-    group: Simulator, genome: Floats, *, long_run: Statistics, n_steps: int, seeds: Seeds
+def measure_ceiling(  # noqa: PLR0913 - what is simulated, and what it is held against
+    group: Simulator,
+    genome: Floats,
+    *,
+    long_run: Statistics,
+    n_steps: int,
+    seeds: Seeds,
+    features: tuple[str, ...] = SCORED,
 ) -> Ceiling:
     """Simulate windows of a model and score each against the model's own long run.
 
@@ -41,6 +47,8 @@ def measure_ceiling(
         Steps of a window.
     seeds : ndarray of uint64, shape (window,)
         One per window, none of them used for the long run.
+    features
+        What counts; `long_run` holds it.
 
     Returns
     -------
@@ -52,11 +60,15 @@ def measure_ceiling(
             f"A ceiling needs at least one window of one step, got {len(seeds)} windows "
             f"of {n_steps} steps."
         )
-    counts = group.simulate(
-        genome[None, :], n_counted=group.n_fish or group.n_agents, n_steps=n_steps, seeds=seeds
+    runs = simulate_named(
+        group,
+        genome[None, :],
+        features,
+        n_counted=group.n_fish or group.n_agents,
+        n_steps=n_steps,
+        seeds=seeds,
     )
-    scores = population_scores(runs_of(counts, 0), long_run)
-    return summarise(scores.each(long_run.zone_names))
+    return summarise(score_each(runs.of_genome(0), long_run, features))
 
 
 def window_noise(ceiling: Ceiling) -> float:
@@ -72,5 +84,5 @@ def window_noise(ceiling: Ceiling) -> float:
     float
         NaN where S is null in every window.
     """
-    _, low, high = ceiling.of("S")
+    _, low, high = ceiling.overall
     return (high - low) / _SDS

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.behaviour.scores import Scores, population_scores
+from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.objective import Objective, as_statistics
+from zfcal.calibrate.objective import Objective, score_each
 from zfcal.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -28,11 +28,11 @@ class Confirmed:
     genes : ndarray, shape (gene,)
         The winner.
     scores
-        Its similarities with the window; S is NaN where every feature is null.
+        Its similarities with the window; NaN where every feature is null.
     long_run
         The counts of its simulation, all agents.
     candidates : ndarray, shape (genome,)
-        S of all genomes that were compared, in the order given.
+        Score of all genomes that were compared, in the order given.
     """
 
     genes: Floats
@@ -53,15 +53,15 @@ def confirm(objective: Objective, genes: Floats) -> Confirmed:
     """
     if len(genes) == 0:
         raise InputError("No genome to confirm: the search has evaluated none.")
-    counts = objective.counts(genes)
-    scores = population_scores(counts, objective.control)
-    best = int(np.argmax(np.nan_to_num(scores.S, nan=-1.0)))
-    zone_names = objective.control.zone_names
+    found = objective.simulate(genes)
+    scores = score_each(found, objective.control, objective.features)
+    candidates = np.array([each.overall for each in scores])
+    best = int(np.argmax(np.nan_to_num(candidates, nan=-1.0)))
     return Confirmed(
         genes=genes[best],
-        scores=scores.each(zone_names)[best],
-        long_run=as_statistics(counts, best, zone_names),
-        candidates=scores.S,
+        scores=scores[best],
+        long_run=found.as_statistics(best, objective.control.zone_names),
+        candidates=candidates,
     )
 
 

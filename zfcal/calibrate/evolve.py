@@ -20,7 +20,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zfcal.behaviour.scores import from_zones
+from zfcal.behaviour.scores import geometric_mean
 from zfcal.calibrate.nsga2 import (
     crossover,
     crowding_distances,
@@ -34,7 +34,7 @@ from zfcal.errors import InputError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Evaluate = Callable[[Floats], Floats]
-"""From genes, shape (individual, gene), to I_D, I_W, I_O, I_T, shape (individual, feature)."""
+"""From genes, shape (individual, gene), to similarities, shape (individual, feature)."""
 Objectives = Callable[[Floats, Floats], Floats]
 """From genes and features to objectives to maximise, shape (individual, objective)."""
 
@@ -77,25 +77,24 @@ class State:
 
     @property
     def scores(self) -> Floats:
-        """Similarity S of each individual, shape (individual,)."""
+        """Score of each individual: S, or that of the features named; shape (individual,)."""
         return overall_score(self.features)
 
 
 def overall_score(features: Floats) -> Floats:
-    """Return S, the geometric mean of the features that are not null.
+    """Return the geometric mean of the features that are not null; S, of D, W, O and T.
 
     Parameters
     ----------
-    features : ndarray, shape (individual, 4)
-        I_D, I_W, I_O, I_T in [0, 1]; NaN is null.
+    features : ndarray, shape (individual, feature)
+        Similarities in [0, 1]; NaN is null.
 
     Returns
     -------
     ndarray, shape (individual,)
         NaN where every feature is null.
     """
-    distance, wall, occupation, transition = features.T
-    return from_zones(D=distance[:, None], W=wall[:, None], O=occupation, T=transition[:, None]).S
+    return geometric_mean(np.ascontiguousarray(features))[0]
 
 
 def mean_distances(points: Floats) -> Floats:
@@ -124,12 +123,12 @@ def score_and_diversities(genes: Floats, features: Floats) -> Floats:
     ----------
     genes : ndarray, shape (individual, gene)
     features : ndarray, shape (individual, feature)
-        I_D, I_W, I_O, I_T; NaN is null.
+        Similarities; NaN is null.
 
     Returns
     -------
     ndarray, shape (individual, 3)
-        S (0 where it is null), the mean distance of the genome to the others', and
+        The score (0 where it is null), the mean distance of the genome to the others', and
         the mean distance of the features to the others'.
     """
     scores = np.nan_to_num(overall_score(features), nan=0.0)

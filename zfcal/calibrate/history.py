@@ -26,7 +26,7 @@ class Generation:
     best_score
         The highest S in the population, as the search sees it: optimistic.
     hypervolume
-        Of the population's I_D, I_W, I_O, I_T above 0.
+        Of the population's similarities above 0: of I_D, I_W, I_O, I_T, or of what was named.
     """
 
     generation: int

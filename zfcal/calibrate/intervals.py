@@ -92,7 +92,7 @@ def acceptance_threshold(score: float, ceiling: Ceiling) -> tuple[float, bool]:
     within_ceiling
         Whether the champion reaches the low end.
     """
-    mean, low, _ = ceiling.of("S")
+    mean, low, _ = ceiling.overall
     if score >= low:
         return low, True
     return score - (mean - low), False

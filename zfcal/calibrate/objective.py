@@ -6,16 +6,26 @@ goes is in ``evolve``, and what the simulation does in ``zfcal.model``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arena import Arena
-from zfcal.behaviour.scores import FeatureScores, population_scores
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.features.registry import SCORED
+from zfcal.behaviour.features.registry import further as further_of
+from zfcal.behaviour.scores import (
+    FeatureScores,
+    Scores,
+    named_scores,
+    population_scores,
+    similarities,
+)
+from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
+from zfcal.calibrate.recorded import Runs, count_recorded
 from zfcal.errors import InputError
 from zfcal.model.effects import find_effect
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
@@ -25,6 +35,7 @@ MIN_SPEEDS = 10
 """A zone with fewer measured speeds borrows those of all zones."""
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Seeds = NDArray[np.uint64]
 
 
@@ -107,6 +118,16 @@ class Simulator(Protocol):
         """Return counts with leading axes (genome, run)."""
 
 
+@runtime_checkable
+class Recorder(Protocol):
+    """A group whose paths can be looked at, for statistics that `Simulator` does not count."""
+
+    def record(
+        self, genes: Floats, names: Sequence[str], *, n_counted: int, n_steps: int, seeds: Seeds
+    ) -> dict[str, Ints]:
+        """Return counts of further statistics of the same simulations, axes (genome, run)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
     """The agents of a trial, simulated on this machine.
@@ -167,6 +188,38 @@ class Group:
             n_steps=n_steps,
             seeds=seeds,
             n_threads=self.n_workers,
+        )
+
+    def record(
+        self, genes: Floats, names: Sequence[str], *, n_counted: int, n_steps: int, seeds: Seeds
+    ) -> dict[str, Ints]:
+        """Return counts of further statistics of the simulations that `simulate` counts.
+
+        Parameters
+        ----------
+        genes : ndarray, shape (genome, gene)
+        names
+            Of the statistics.
+        n_counted, n_steps, seeds
+            As in `simulate`.
+
+        Returns
+        -------
+        dict of ndarray of int64, with leading axes (genome, run)
+        """
+        check_genome_length(genes, len(self.template.zones))
+        return count_recorded(
+            [pack_genes(genome[None, :], self.template, self.arena) for genome in genes],
+            self.arena,
+            names,
+            Runs(
+                n_agents=self.n_agents,
+                n_counted=n_counted,
+                n_robots=self.n_robots,
+                n_steps=n_steps,
+                seeds=seeds,
+                n_threads=self.n_workers,
+            ),
         )
 
 
@@ -288,6 +341,80 @@ def as_statistics(counts: Counts, row: int, zone_names: tuple[str, ...]) -> Stat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Simulated:
+    """What simulated groups did: the counts of some genomes or runs.
+
+    Parameters
+    ----------
+    counts
+        D, W, O, T and V.
+    further
+        Further statistics by name, with the same leading axes.
+    """
+
+    counts: Counts
+    further: dict[str, Ints] = field(default_factory=dict)
+
+    @property
+    def by_name(self) -> dict[str, Ints]:
+        """All of them."""
+        five = {name: getattr(self.counts, attribute) for name, attribute in ATTRIBUTES.items()}
+        return five | self.further
+
+    def pooled(self) -> Simulated:
+        """Return each genome's runs together, from leading axes (genome, run)."""
+        further = {name: values.sum(axis=1) for name, values in self.further.items()}
+        return Simulated(counts=pool_runs(self.counts), further=further)
+
+    def of_genome(self, genome: int) -> Simulated:
+        """Return one genome's runs, from leading axes (genome, run)."""
+        further = {name: values[genome] for name, values in self.further.items()}
+        return Simulated(counts=runs_of(self.counts, genome), further=further)
+
+    def as_statistics(self, row: int, zone_names: tuple[str, ...]) -> Statistics:
+        """Return one row of pooled counts as the statistics of a window."""
+        further = {name: values[row] for name, values in self.further.items()}
+        return replace(as_statistics(self.counts, row, zone_names), further=further)
+
+
+def simulate_named(  # noqa: PLR0913 - the simulator's arguments, and what to count
+    group: Simulator,
+    genes: Floats,
+    features: Sequence[str],
+    *,
+    n_counted: int,
+    n_steps: int,
+    seeds: Seeds,
+) -> Simulated:
+    """Simulate genomes and count D, W, O, T, V and what else is named, axes (genome, run)."""
+    counts = group.simulate(genes, n_counted=n_counted, n_steps=n_steps, seeds=seeds)
+    names = further_of(features)
+    if not names:
+        return Simulated(counts=counts)
+    if not isinstance(group, Recorder):
+        raise InputError(
+            f"{type(group).__name__} counts D, W, O, T and V alone, not {', '.join(names)}.",
+            hint="Calibrate on these features on this machine.",
+        )
+    found = group.record(genes, names, n_counted=n_counted, n_steps=n_steps, seeds=seeds)
+    return Simulated(counts=counts, further=found)
+
+
+def score_each(found: Simulated, control: Statistics, features: Sequence[str]) -> list[Scores]:
+    """Return the scores of each row, with the one of the named statistics unless that is S."""
+    scores = population_scores(found.counts, control).each(control.zone_names)
+    if tuple(features) == SCORED:
+        return scores
+    named = named_scores(features, _similarities(found, control, features))
+    return [replace(one, named=own) for one, own in zip(scores, named, strict=True)]
+
+
+def _similarities(found: Simulated, control: Statistics, features: Sequence[str]) -> Floats:
+    measured = {name: control.of(name) for name in features}
+    return similarities(found.by_name, measured, features)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Objective:
     """The similarity of simulated groups with a measured one.
 
@@ -301,12 +428,15 @@ class Objective:
         Steps of each run.
     seeds : ndarray of uint64, shape (run,)
         One per run, the same for all genomes.
+    features
+        The statistics whose similarity counts; `control` holds them.
     """
 
     group: Simulator
     control: Statistics
     n_steps: int
     seeds: Seeds = field(repr=False)
+    features: tuple[str, ...] = SCORED
 
     def __post_init__(self) -> None:
         if self.n_steps < 1 or len(self.seeds) < 1:
@@ -319,6 +449,19 @@ class Objective:
                 "The window holds no position of a fish inside the arena.",
                 hint="Look at its tracks with: zfcal inspect FILE",
             )
+        for name in self.features:
+            self.control.of(name)
+
+    def simulate(self, genes: Floats) -> Simulated:
+        """Return all that counts of each genome, runs pooled, leading axis (genome,)."""
+        return simulate_named(
+            self.group,
+            genes,
+            self.features,
+            n_counted=n_counted(self.group),
+            n_steps=self.n_steps,
+            seeds=self.seeds,
+        ).pooled()
 
     def counts(self, genes: Floats) -> Counts:
         """Return the counts of each genome, runs pooled, leading axis (genome,)."""
@@ -333,11 +476,15 @@ class Objective:
         return population_scores(self.counts(genes), self.control)
 
     def __call__(self, genes: Floats) -> Floats:
-        """Return I_D, I_W, I_O, I_T of each genome, shape (genome, 4); NaN is null.
+        """Return the similarities of each genome, shape (genome, feature); NaN is null.
+
+        These are I_D, I_W, I_O and I_T, unless other features are named.
 
         Parameters
         ----------
         genes : ndarray, shape (genome, gene)
             In [0, 1].
         """
-        return self.scores(genes).features
+        if self.features == SCORED:
+            return self.scores(genes).features
+        return _similarities(self.simulate(genes), self.control, self.features)

@@ -82,9 +82,9 @@ class RoundResult:
 
     @property
     def against_ceiling(self) -> float:
-        """S over its ceiling: about one for a model that misses nothing; NaN without a ceiling."""
-        mean = self.ceiling.of("S")[0]
-        return self.scores.S / mean if mean > 0 else math.nan
+        """The score over its ceiling: about one if nothing is missed; NaN without a ceiling."""
+        mean = self.ceiling.overall[0]
+        return self.scores.overall / mean if mean > 0 else math.nan
 
     @property
     def as_previous(self) -> Previous:
@@ -148,7 +148,7 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
     intervals = parameter_intervals(
         confirmed.genes,
         (progress.genes, progress.scores),
-        score=confirmed.scores.S,
+        score=confirmed.scores.overall,
         ceiling=ceiling,
         zone_names=task.control.zone_names,
     )
@@ -179,8 +179,8 @@ def _likely(task: Task, settings: Settings) -> tuple[Confirmed, Ceiling] | None:
         return None
     confirmed = confirm(task.confirmation(settings), np.atleast_2d(task.guests)[:1])
     ceiling = ceiling_of(task, settings, confirmed)
-    mean, _, _ = ceiling.of("S")
-    falls_short = mean - confirmed.scores.S
+    mean, _, _ = ceiling.overall
+    falls_short = mean - confirmed.scores.overall
     return (confirmed, ceiling) if falls_short <= window_noise(ceiling) else None
 
 
@@ -192,4 +192,5 @@ def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
         long_run=confirmed.long_run,
         n_steps=task.steps_of(settings.window_s),
         seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
+        features=settings.features,
     )

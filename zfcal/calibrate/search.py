@@ -6,17 +6,18 @@ It knows when to stop but not what comes of it: the champion is chosen in ``roun
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.behaviour.features.registry import SCORED
 from zfcal.calibrate import evolve, evolve_deap
 from zfcal.calibrate.evolve import Evaluate, State, overall_score
 from zfcal.calibrate.history import Generation, describe
-from zfcal.calibrate.objective import Purpose, SeedSource, Simulator
+from zfcal.calibrate.objective import Purpose, SeedSource, Simulator, simulate_named
 from zfcal.calibrate.pace import Deadline, Pace
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Previous, Settings, Task
 from zfcal.errors import InputError
@@ -40,7 +41,7 @@ class Progress:
     state
         The population.
     parts
-        Genes, shape (genome, gene), and features, shape (genome, 4), of all that the
+        Genes, shape (genome, gene), and features, shape (genome, feature), of all that the
         round has evaluated, in that order. As many parts as there were evaluations:
         to join them each time would cost a long search more than its breeding.
     history
@@ -64,12 +65,12 @@ class Progress:
 
     @property
     def features(self) -> Floats:
-        """Their I_D, I_W, I_O, I_T, shape (genome, 4); NaN is null."""
+        """Their similarities, shape (genome, feature); NaN is null."""
         return np.concatenate([features for _, features in self.parts])
 
     @property
     def scores(self) -> Floats:
-        """S of all genomes that the round has evaluated, shape (genome,)."""
+        """Score of all genomes that the round has evaluated, shape (genome,)."""
         return overall_score(self.features)
 
 
@@ -109,7 +110,7 @@ def search(
     closing = task.closing_work(settings)
     pace = Pace(deadline)
     if deadline is not None:
-        warm_up(task.simulator)
+        warm_up(task.simulator, settings.features)
     pace.start()
     if resume is None:
         progress = begin(task, settings, evaluate)
@@ -138,11 +139,11 @@ def _show(watch: Watch | None, progress: Progress) -> None:
         watch(progress)
 
 
-def warm_up(simulator: Simulator) -> None:
-    """Have the kernel compiled before the clock is asked how fast it is."""
+def warm_up(simulator: Simulator, features: Sequence[str] = SCORED) -> None:
+    """Have the kernels compiled before the clock is asked how fast it is."""
     genes = np.full((1, n_genes(len(simulator.template.zones))), 0.5)
     seeds = SeedSource(trial_seed=0, window_end_s=0).seeds(Purpose.EVALUATION, 1)
-    simulator.simulate(genes, n_counted=simulator.n_agents, n_steps=1, seeds=seeds)
+    simulate_named(simulator, genes, features, n_counted=simulator.n_agents, n_steps=1, seeds=seeds)
 
 
 def _take_pace(pace: Pace, task: Task, settings: Settings, evaluate: Evaluate) -> None:

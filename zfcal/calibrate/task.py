@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.behaviour.features.registry import SCORED, ordered
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.evolve import GROUP
 from zfcal.calibrate.objective import (
@@ -54,6 +55,9 @@ class Settings:
     n_windows, window_s
         Simulated windows of the ceiling and their length in seconds: that of the
         window that is calibrated on, if S is to be comparable with it.
+    features
+        The statistics whose similarity counts. Of D, W, O and T the score is S; of others
+        it is a score of its own.
     """
 
     population: int = 60
@@ -67,6 +71,7 @@ class Settings:
     long_s: float = 1800.0
     n_windows: int = 200
     window_s: float = WINDOW_S
+    features: tuple[str, ...] = SCORED
 
     def __post_init__(self) -> None:
         if self.population < GROUP or self.population % GROUP:
@@ -84,15 +89,27 @@ class Settings:
                 raise InputError(
                     f"{name} must be a positive time in seconds, got {getattr(self, name)!r}."
                 )
+        if not self.features:
+            raise InputError("features must name at least one statistic, got none.")
+        object.__setattr__(self, "features", ordered(self.features))
         if self.optimiser not in {"zfcal", "deap"}:
             raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
         if self.champion not in {"score", "likely"}:
             raise InputError(f"champion must be 'score' or 'likely', got {self.champion!r}.")
 
     @property
+    def is_scored(self) -> bool:
+        """Whether the score is S: of D, W, O and T and nothing else."""
+        return self.features == SCORED
+
+    @property
     def said(self) -> dict[str, Any]:
-        """Return what a lineage says of them; a champion by its score goes without saying."""
+        """Return what a lineage says of them; what is usual goes without saying."""
         options = asdict(self)
+        if self.is_scored:
+            del options["features"]
+        else:
+            options["features"] = list(self.features)
         if self.champion == "score":
             del options["champion"]
         return options
@@ -176,6 +193,7 @@ class Task:
             control=self.control,
             n_steps=settings.steps,
             seeds=self.seeds.seeds(Purpose.EVALUATION, settings.runs),
+            features=settings.features,
         )
 
     def confirmation(self, settings: Settings) -> Objective:
@@ -185,6 +203,7 @@ class Task:
             control=self.control,
             n_steps=self.steps_of(settings.long_s),
             seeds=self.seeds.seeds(Purpose.CONFIRMATION, settings.long_runs),
+            features=settings.features,
         )
 
     def work(self, *, n_genomes: int, n_runs: int, n_steps: int) -> float:

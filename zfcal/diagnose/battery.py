@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.kernels import (
     BEARING,
     DISTANCE,
@@ -37,14 +38,9 @@ from zfcal.diagnose.kernels import (
 from zfcal.diagnose.standing import Standing
 from zfcal.diagnose.surroundings import Surroundings, signed_angle
 from zfcal.model.fitted import Fitted
-from zfcal.model.kernels.asking import ask_speeds
-from zfcal.model.kernels.scene import perceive
-from zfcal.model.packing import pack
-from zfcal.model.scene import Scene, cos_of
-from zfcal.model.views import sees_late
+from zfcal.model.scene import Scene
 from zfcal.units import HEADING_MIN_STEP_M
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 UNITS = {
@@ -203,7 +199,7 @@ def speed_statistics(standing: Standing) -> Iterator[Steps]:
     """
     scene, about = standing.scene, standing.moves
     moves = scene.moves
-    factor = speed_factor(scene, standing.fitted)
+    factor = standing.speed_factor
     still = moves.speed_m_s < HEADING_MIN_STEP_M / scene.dt_s
     speed, v_mean, v_variance = _by_zone(moves.speed_m_s / np.maximum(factor, 1e-6), moves.zone)
     expected, variance = factor * v_mean, factor * factor * v_variance
@@ -249,18 +245,6 @@ def _quarters(scene: Scene, about: Surroundings) -> Iterator[tuple[str, Rows]]:
 def _median(values: Floats) -> float:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else np.inf
-
-
-def speed_factor(scene: Scene, fitted: Fitted) -> Floats:
-    """Return by what a model's effects multiply the speed of each move, shape (move,)."""
-    moves = scene.moves
-    factor = np.ones(len(moves))
-    packed = pack([fitted.parameters], scene.arena)
-    if len(packed.speeds):
-        cos_fov = cos_of(fitted.parameters.fov_rad)
-        _, angle = perceive(scene.states, moves.at, moves.who, sees_late(packed), cos_fov)
-        ask_speeds(scene.states, moves.at, moves.who, packed, angle, factor)
-    return factor
 
 
 def _by_zone(values: Floats, zone: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,6 +107,17 @@ def company_of(scene: Scene) -> Company:
     )
 
 
+def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
+    """Return an effect at the shape that its parameters have, defaults where they have none."""
+    return _at(find_effect(name), values)
+
+
+def _at(effect: Effect, values: Mapping[str, float]) -> Candidate:
+    own = {p.name: values.get(p.name, p.default) for p in effect.parameters}
+    shape = {key: value for key, value in own.items() if key != effect.strength}
+    return Candidate(effect=effect, shape=shape)
+
+
 def candidates_of(
     effects: tuple[Effect, ...], arena: Arena, *, without: tuple[str, ...] = ()
 ) -> tuple[Candidate, ...]:
@@ -125,8 +136,7 @@ def candidates_of(
     for effect in effects:
         if effect.name in without:
             continue
-        rest = {p.name: p.default for p in effect.parameters if p.name != effect.strength}
-        made += [Candidate(effect=effect, shape=rest | shape) for shape in effect.shapes(arena)]
+        made += [_at(effect, shape) for shape in effect.shapes(arena)]
     return tuple(made)
 
 
@@ -164,13 +174,7 @@ def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[s
 
 def in_model(model: Parameters) -> tuple[Candidate, ...]:
     """Return the effects that a model has, at their shapes."""
-    made = []
-    for name, values in model.effects.items():
-        effect = find_effect(name)
-        own = {p.name: values.get(p.name, p.default) for p in effect.parameters}
-        shape = {key: value for key, value in own.items() if key != effect.strength}
-        made.append(Candidate(effect=effect, shape=shape))
-    return tuple(made)
+    return tuple(candidate_of(name, values) for name, values in model.effects.items())
 
 
 def _longest_track_s(scene: Scene) -> float:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtri
+from scipy.special import chdtrc, gammaln, ndtri, ndtri_exp
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.kernels import sums_in_bins
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEAST_IN_BIN = 20
 _LEAST_TAIL = 1e-290
@@ -20,23 +17,28 @@ _MOST_TAIL = 0.999
 
 
 def normal_of(chi2: float, df: int) -> float:
-    """Return a chi-square as a standard normal number of the same tail; NaN without freedom.
+    r"""Return a chi-square as a standard normal number of the same tail; NaN without freedom.
 
-    Beyond the range of numbers by the formula of Wilson and Hilferty (1931, Proceedings of
-    the National Academy of Sciences 17: 684-688).
+    Where the tail is beyond the range of numbers its logarithm is taken, to the second term of
+    :math:`\Gamma(a, x) \approx x^{a - 1} e^{-x} / (1 - (a - 1) / x)`.
     """
     if df < 1:
         return math.nan
     tail = float(chdtrc(df, chi2))
     if tail > _LEAST_TAIL:
-        return -float(ndtri(min(tail, _MOST_TAIL)))
-    by = 2 / (9 * df)
-    return ((chi2 / df) ** (1 / 3) - (1 - by)) / math.sqrt(by)
+        return normal_of_tail(tail)
+    a, x = df / 2, chi2 / 2
+    return normal_of_log((a - 1) * math.log(x) - x - float(gammaln(a)) - math.log1p((1 - a) / x))
 
 
 def normal_of_tail(tail: float) -> float:
     """Return the standard normal number with that much probability above it."""
     return -float(ndtri(min(max(tail, _LEAST_TAIL), _MOST_TAIL)))
+
+
+def normal_of_log(log_tail: float) -> float:
+    """Return the standard normal number with that much probability above it, by its logarithm."""
+    return -float(ndtri_exp(min(log_tail, math.log(_MOST_TAIL))))
 
 
 def least_of(tails: Floats | float, n: int) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, in_model, is_generic
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.leftover import outlasts
@@ -28,8 +29,6 @@ from zfcal.model.effects import find_effect
 from zfcal.model.extended import log_p_at, maximise
 from zfcal.model.fitted import MIN_STEPS, Fitted
 from zfcal.model.scene import Moves, Scene, thin
-
-Floats = NDArray[np.float64]
 
 BLOCK_S = 60.0
 _ROUNDS = 2

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.surroundings import Surroundings, signed_angle
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NOWHERE = -1
 _MINUTE_S = 60.0

@@ -10,16 +10,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import summed
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
 from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
 from zfcal.model.scene import Scene
-
-Floats = NDArray[np.float64]
 
 LATE_S = 12.0
 NAMES = ("neighbours' heading 12 s ago", "a shuffled turn")

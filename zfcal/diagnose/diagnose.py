@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, in_model, not_forms_of
 from zfcal.diagnose.case import (
     QUICK_REPLICATES,
@@ -58,9 +58,6 @@ from zfcal.diagnose.selection import (
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.together import together
 from zfcal.diagnose.tracing import trace
-
-Floats = NDArray[np.float64]
-
 
 _GENERIC_REPLICATES = 8
 _AT_LARGE_REPLICATES = 20

@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Ints
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.contexts import N_FIELDS, field_of
 from zfcal.model.kernels.world import X, Y
 from zfcal.model.scene import Scene
-
-Ints = NDArray[np.int64]
 
 _BY_PLACE = ("generic:speed:place", "generic:speed:wall")
 """What such a lamp is: these are asked for across fields."""

@@ -8,9 +8,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 class Verdict(StrEnum):

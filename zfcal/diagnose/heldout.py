@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import rel_entr
 
-from zfcal.diagnose.candidates import Candidate
+from zfcal.arrays import Floats, Ints
+from zfcal.diagnose.candidates import candidate_of
 from zfcal.diagnose.fields import is_within_fields
 from zfcal.diagnose.freezes import rested_steps
 from zfcal.diagnose.naming import refit
@@ -27,13 +28,9 @@ from zfcal.diagnose.speeds import chain_of, log_density
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import Fitted
-from zfcal.model.packing import pack
+from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.scene import Scene, thin
-from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters, ZoneParameters
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 Effects = Mapping[str, Mapping[str, float]]
 """Effects by name, each with its parameters."""
@@ -67,14 +64,6 @@ def scene_of(scene: Scene, block: Ints, chosen: NDArray[np.bool_]) -> Scene:
         return np.asarray(chosen[block[at]] & (before == block[at]) & (after == block[at]))
 
     return thin(scene, within(scene.turns.at), within(scene.moves.at))
-
-
-def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
-    """Return an effect at the shape that its parameters have."""
-    effect = find_effect(name)
-    known = {p.name: values.get(p.name, p.default) for p in effect.parameters}
-    shape = {key: value for key, value in known.items() if key != effect.strength}
-    return Candidate(effect=effect, shape=shape)
 
 
 def fit_base(scene: Scene, model: Parameters) -> Screen:
@@ -246,7 +235,7 @@ def speed_gains(
         parts.append(_factor_gains(model, base, field, random))
     if any(effect.stops for effect in effects):
         parts.append(_stop_gains(model, trained))
-    before = _factor(base)
+    before = base.model_factor
     return Gains(
         base=Steps(
             at=moves.at, values=log_density(moves.speed_m_s, before, moves.zone, field=field)
@@ -267,7 +256,7 @@ def _factor_gains(
 ) -> tuple[Floats, Floats]:
     """Return gains of factors on speed, and what draws of the model itself would gain."""
     moves = base.scene.moves
-    ours, theirs = _factor(model), _factor(base)
+    ours, theirs = model.model_factor, base.model_factor
 
     def gain(speed: Floats) -> Floats:
         own = log_density(speed, ours, moves.zone, field=field)
@@ -281,11 +270,6 @@ def _factor_gains(
             drawn[rows] = random.permutation(model.own_speeds[rows])
         expected += gain(drawn * ours) / _DRAWS
     return gain(moves.speed_m_s), expected
-
-
-def _factor(screen: Screen) -> Floats:
-    """Return the factor of a model's effects on each speed; a fish at rest has one as well."""
-    return screen.speed_factor(pack([screen.fitted.parameters], screen.scene.arena))
 
 
 def _stop_gains(model: Screen, trained: Screen) -> tuple[Floats, Floats]:

@@ -7,11 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.world import HX, HY, KIND, SPEED, ZONE, X, Y
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _TIE_RAD = 1e-9
 

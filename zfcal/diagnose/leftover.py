@@ -14,15 +14,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, candidates_of
 from zfcal.diagnose.scores import Score, basis_of
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.surroundings import surroundings
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
 
 _OUTLASTS = 0.75
 """Share of its standard errors that an effect must keep."""

@@ -11,19 +11,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.battery import Steps, heading_statistics, speed_statistics
 from zfcal.diagnose.findings import Located
+from zfcal.diagnose.null import moments_of
 from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST = 12
 MOST_OF_ONE = 3
@@ -213,10 +212,9 @@ def _moments(z: Floats) -> tuple[float, float]:
     It is drawn toward the 1 of the model's own law, and not less than that: what a fit has
     taken off a statistic's spread it takes off otherwise where noise has shifted the fit.
     """
-    centre = float(z.mean())
-    squares = float(((z - centre) ** 2).sum())
-    variance = (squares + _PRIOR_WEIGHT) / (z.size - 1 + _PRIOR_WEIGHT)
-    return centre, math.sqrt(max(variance, 1.0) * (1 + 1 / z.size))
+    moments = moments_of(z[:, None], _PRIOR_WEIGHT)
+    wide = replace(moments, variance=np.maximum(moments.variance, 1.0))
+    return float(moments.centre[0]), float(wide.spread_of_one_more(z.size)[0])
 
 
 def located(

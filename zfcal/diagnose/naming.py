@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
@@ -24,8 +25,6 @@ from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free
 from zfcal.model.kernels.world import TRAIT
 from zfcal.model.scene import Moves, Scene, thin
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 10
 _SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)

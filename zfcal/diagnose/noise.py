@@ -31,10 +31,8 @@ from numpy.typing import NDArray
 from scipy.special import gammainc, gammaincinv
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.tracks import Tracks
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _STRETCH_S = 2.0
 _QUIET = 0.1

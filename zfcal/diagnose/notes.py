@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.case import is_suspicious
 from zfcal.diagnose.controls import NAMES, ask_controls
 from zfcal.diagnose.findings import Note
@@ -14,8 +14,6 @@ from zfcal.diagnose.null import from_replicates, theory
 from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
-
-Floats = NDArray[np.float64]
 
 _CONTROL = 4.5
 

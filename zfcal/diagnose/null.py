@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.diagnose.screening import Screen
 from zfcal.errors import InputError
 from zfcal.model.extended import maximise
@@ -27,7 +28,6 @@ from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import Parameters
 from zfcal.tracks import ROBOT, Samples
 
-Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _ROUNDS = 2
@@ -37,7 +37,7 @@ UNLIKE = 0.25
 """Share of what noise makes of a statistic that its replicates may miss."""
 
 _PRIOR_WEIGHT = 20.0
-"""Replicates that the theory, a spread of one, counts for."""
+"""Replicates that the theory, a spread of one, counts for in what suspects are asked."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +100,44 @@ def theory(n_statistics: int) -> Null:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moments:
+    """What replicates show of statistics, drawn toward the theory.
+
+    Parameters
+    ----------
+    centre, variance : ndarray, shape (statistic,)
+        The mean; and the variance about it, drawn toward the theory's one.
+    df
+        Degrees of freedom of the variance.
+    """
+
+    centre: Floats
+    variance: Floats
+    df: float
+
+    def spread_of_one_more(self, n: int) -> Floats:
+        """Return the standard deviation of one more about the mean of n."""
+        return np.asarray(np.sqrt(self.variance * (1 + 1 / max(n, 1))))
+
+
+def moments_of(table: Floats, weight: float) -> Moments:
+    """Return centre and variance of statistics; the theory's variance of one has a weight.
+
+    Parameters
+    ----------
+    table : ndarray, shape (replicate, statistic)
+        Without replicates the theory is left.
+    weight
+        Replicates that the theory counts for.
+    """
+    n = len(table)
+    centre = table.mean(axis=0) if n else np.zeros(table.shape[1])
+    df = max(n - 1, 0) + weight
+    squares = ((table - centre) ** 2).sum(axis=0)
+    return Moments(centre=centre, variance=(squares + weight) / df, df=df)
+
+
 def from_replicates(table: Floats) -> Null:
     """Return the null that replicates show.
 
@@ -108,11 +146,10 @@ def from_replicates(table: Floats) -> Null:
     table : ndarray, shape (replicate, statistic)
     """
     n = len(table)
-    centre = table.mean(axis=0)
-    variance = ((table - centre) ** 2).sum(axis=0)
-    spread = np.sqrt((variance + _PRIOR_WEIGHT) / (n - 1 + _PRIOR_WEIGHT))
-    z = np.abs(table - centre) * np.sqrt(n / (n - 1)) / spread
-    return Null(centre=centre, spread=spread, n=n, largest=z.max(axis=1, initial=0.0))
+    moments = moments_of(table, _PRIOR_WEIGHT)
+    spread = np.sqrt(moments.variance)
+    z = np.abs(table - moments.centre) * np.sqrt(n / (n - 1)) / spread
+    return Null(centre=moments.centre, spread=spread, n=n, largest=z.max(axis=1, initial=0.0))
 
 
 def replicate(

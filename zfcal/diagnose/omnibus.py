@@ -25,19 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
-from zfcal.diagnose.battery import speed_factor
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.chances import LEAST_IN_BIN, by_context, normal_of
 from zfcal.diagnose.contexts import contexts, speed_context
 from zfcal.diagnose.kernels import product_sums
-from zfcal.diagnose.null import UNLIKE
+from zfcal.diagnose.null import UNLIKE, moments_of
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.ranks import DEGREES, heading_ranks, scores_of, speed_ranks
 from zfcal.diagnose.rare import rare_statistics, run_statistics
 from zfcal.diagnose.standing import Standing
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LAGS = 5
 _BINS = 20
@@ -132,7 +129,7 @@ def _scored(standing: Standing, rng: np.random.Generator) -> Iterator[_Scores]:
     sorted_by = contexts(scene, moves, about)
     # Speeds are ranked within their zones: that says nothing.
     del sorted_by["zone"]
-    ranks = speed_ranks(moves, speed_factor(scene, fitted), rng)
+    ranks = speed_ranks(moves, standing.speed_factor, rng)
     yield _Scores(
         name="speed", steps=moves, values=scores_of(ranks), near=about.near, contexts=sorted_by
     )
@@ -225,14 +222,12 @@ def judge(
     made: dict[str, float] = {}
     tails: dict[str, float] = {}
     for name, z in measured.items():
-        drawn = np.array([null[name] for null in nulls if name in null])
-        centre = float(drawn.mean()) if drawn.size else 0.0
-        squares = float(((drawn - centre) ** 2).sum())
-        df = max(drawn.size - 1, 0) + prior
-        spread = math.sqrt((squares + prior) / df * (1 + 1 / max(drawn.size, 1)))
-        spread = math.hypot(spread, UNLIKE * centre)
+        drawn = np.array([[null[name]] for null in nulls if name in null]).reshape(-1, 1)
+        moments = moments_of(drawn, prior)
+        centre = float(moments.centre[0])
+        spread = math.hypot(float(moments.spread_of_one_more(len(drawn))[0]), UNLIKE * centre)
         made[name] = (z - centre) / spread if n else z
-        tails[name] = float(stdtr(df, -made[name])) if n else float(ndtr(-z))
+        tails[name] = float(stdtr(moments.df, -made[name])) if n else float(ndtr(-z))
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])

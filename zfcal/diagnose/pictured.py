@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.findings import Trace
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _CELLS = 24
 """Squares of the map along the longer side of the tank."""

@@ -10,12 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.chances import least_of, normal_of_tail
-
-Floats = NDArray[np.float64]
 
 _HARMONICS = (1, 5, 20)
 _SHORTEST_PERIOD_S = 5.0

@@ -10,13 +10,11 @@ it is ranked in several orders: each asks another question.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.kernels import cell_ranks
 from zfcal.diagnose.surroundings import Surroundings
 from zfcal.model.scene import Moves, Turns
-
-Floats = NDArray[np.float64]
 
 DEGREES = 2
 """Legendre polynomials of a rank that are taken: one for the place, one for the spread."""

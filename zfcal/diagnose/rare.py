@@ -13,15 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr, bdtrc
 
-from zfcal.diagnose.battery import speed_factor
 from zfcal.diagnose.chances import LEAST_IN_BIN, normal_of_tail, rare_by_context
 from zfcal.diagnose.contexts import contexts
 from zfcal.diagnose.kernels import rare_headings
 from zfcal.diagnose.ranks import speed_ranks
 from zfcal.diagnose.standing import Standing
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _FLOOR = 0.03
 _CONTEXTS = (
@@ -83,7 +79,7 @@ def run_statistics(standing: Standing, rng: np.random.Generator) -> dict[str, fl
         Orders equal speeds.
     """
     scene, moves = standing.scene, standing.scene.moves
-    ranks = speed_ranks(moves, speed_factor(scene, standing.fitted), rng)
+    ranks = speed_ranks(moves, standing.speed_factor, rng)
     near = standing.moves.near
     table = np.full((len(scene.k) + 2, scene.states.shape[2]), np.nan)
     track = np.full(table.shape, -1, dtype=np.int64)

@@ -14,14 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, optimize, special
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.diagnose.screening import Screen
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _LONGEST = 30
 """Steps at rest after which one more says nothing new."""

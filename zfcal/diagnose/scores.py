@@ -10,18 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtri
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.chances import normal_of_log
 from zfcal.model.fitted import Fitted
-
-Floats = NDArray[np.float64]
 
 _FLOOR = 0.01
 """Share of a uniform law in a heading's density, beside the lapse that was fitted."""
-
-_LEAST_TAIL = 1e-260
-"""Smaller ones count by their logarithm."""
 
 _SEVERAL = 60.0
 """Steps of one size that a score must be made of, to be as good as normal."""
@@ -116,18 +112,6 @@ def by_track(track: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats]:
     return sums, squares
 
 
-def normal_deviate(chi2: float, df: int) -> float:
-    """Return the normal deviate of the same upper tail as a chi-square."""
-    tail = float(chdtrc(df, chi2))
-    if tail > _LEAST_TAIL:
-        return -float(ndtri(tail))
-    if tail > 0.0:
-        return math.sqrt(-2 * math.log(tail))
-    # Beyond what a double holds: the first term of its logarithm's expansion.
-    half = chi2 / 2
-    return math.sqrt(-2 * ((df / 2 - 1) * math.log(half) - half - math.lgamma(df / 2)))
-
-
 def excess_deviate(count: float, expected: float) -> float:
     r"""Return a count as a normal deviate, where it was to be so large; however small both are.
 
@@ -139,7 +123,7 @@ def excess_deviate(count: float, expected: float) -> float:
     away = expected - count + (count * math.log(count / expected) if count > 0.0 else 0.0)
     if count <= expected:
         return -math.sqrt(2 * max(away, 0.0))
-    return max(0.0, -float(ndtri(math.exp(-away)))) if away < 700 else math.sqrt(2 * away)
+    return max(0.0, normal_of_log(-away))
 
 
 def summed(candidate: Candidate, steps: Floats) -> Score:

@@ -23,7 +23,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.chances import normal_of
 from zfcal.diagnose.fields import fields_of, is_within_fields
 from zfcal.diagnose.freezes import rest_score, rested_steps
 from zfcal.diagnose.scores import (
@@ -32,15 +34,12 @@ from zfcal.diagnose.scores import (
     basis_of,
     by_track,
     centred,
-    normal_deviate,
     summed,
     tables_of,
     tame,
 )
 from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
-from zfcal.model.kernels.asking import ask_speeds
-from zfcal.model.kernels.scene import perceive
 from zfcal.model.kernels.scores import (
     component_score,
     factor_score,
@@ -51,21 +50,20 @@ from zfcal.model.kernels.scores import (
 )
 from zfcal.model.kernels.world import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
-from zfcal.model.scene import Scene, cos_of
+from zfcal.model.scene import Scene
 from zfcal.model.views import (
     Polynomial,
+    angles_of_moves,
     attended,
     components_of,
     factors_of,
     harmonics,
     late_sight,
     polynomial_of,
+    speed_factor,
     spin_of,
 )
 from zfcal.units import HEADING_MIN_STEP_M
-
-Floats = NDArray[np.float64]
-
 
 _LEFT = 1e-4
 """Share of a score's squares below which the model explains all of it."""
@@ -285,7 +283,7 @@ class Screen:
         spread2 = max(0.0, float(each.var(ddof=1) - (1 / information).mean()))
         return Score(
             candidate=candidate,
-            z=normal_deviate(q, len(sums) - 1),
+            z=normal_of(q, len(sums) - 1),
             strength=float(np.sqrt(spread2)),
             information=float(information.sum()),
             steps=steps,
@@ -297,9 +295,7 @@ class Screen:
 
     @cached_property
     def _move_angles(self) -> Floats:
-        moves = self.scene.moves
-        cos_fov = cos_of(self.fitted.parameters.fov_rad)
-        return perceive(self.scene.states, moves.at, moves.who, 0, cos_fov)[1]
+        return angles_of_moves(self.scene, self._moves)
 
     @cached_property
     def own_speeds(self) -> Floats:
@@ -312,12 +308,8 @@ class Screen:
         return self.speed_factor(self._moves)
 
     def speed_factor(self, packed: Packed) -> Floats:
-        """Return the factor of a model's effects on the speed of each move."""
-        moves = self.scene.moves
-        factor = np.ones(len(moves))
-        if len(packed.speeds):
-            ask_speeds(self.scene.states, moves.at, moves.who, packed, self._move_angles, factor)
-        return factor
+        """Return the factor of effects on the speed of each move, seen as the fitted model sees."""
+        return speed_factor(self.scene, packed, self._move_angles)
 
     @cached_property
     def still(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, is_generic
 from zfcal.diagnose.chances import least_of
 from zfcal.diagnose.foreseen import Known, unforeseen
@@ -28,7 +28,6 @@ from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.sides import directions, feigned, with_direction
 from zfcal.diagnose.together import together
 
-Floats = NDArray[np.float64]
 Told = Callable[[str, int, int], None]
 
 LEVEL = 0.02

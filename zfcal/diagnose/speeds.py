@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.fields import is_known, is_within_fields
 from zfcal.diagnose.rests import ChainFit, Runs, fit_chain, runs_of
@@ -30,8 +31,6 @@ from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import bounds_of, without_effects
 from zfcal.model.packing import pack
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 _BINS = 20
 _SPARE, _MOST_BINS = 2, 200

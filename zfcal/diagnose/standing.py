@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats
 from zfcal.diagnose.surroundings import Surroundings, probabilities, surroundings
 from zfcal.model.fitted import Fitted
+from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
+from zfcal.model.views import speed_factor
 
-Floats = NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Standing:
     """A scene under a model.
 
@@ -35,6 +34,11 @@ class Standing:
     probability: Floats
     turns: Surroundings
     moves: Surroundings
+
+    @cached_property
+    def speed_factor(self) -> Floats:
+        """By what the model's effects multiply the speed of each move, shape (move,)."""
+        return speed_factor(self.scene, pack([self.fitted.parameters], self.scene.arena))
 
 
 def standing_of(scene: Scene, fitted: Fitted, table: Floats | None = None) -> Standing:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.kernels import (
     COMPANY,
     KNOWN,
@@ -43,8 +44,6 @@ from zfcal.model.kernels.world import (
     Y,
 )
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
 
 COMPANY_M = 0.10
 """Others as near as that are company: about a body length and a step of 0.2 s each."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.findings import Trace
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
 from zfcal.model.kernels.world import SPEED, WALL, ZONE, X, Y
 from zfcal.model.scene import Moves, Scene
-
-Floats = NDArray[np.float64]
 
 _BINS = 12
 _BY_TIME = ("fatigue", "habituation")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.moves import draw_one
@@ -43,8 +43,6 @@ from zfcal.model.kernels.world import (
     settle,
 )
 from zfcal.model.simulate import tank_of
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

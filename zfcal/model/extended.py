@@ -1,8 +1,7 @@
-"""Likelihood of a model with effects, and its maximum, from a scene.
+"""The maximum of the likelihood of a model, with effects or without, from a scene.
 
-The density of a heading is that of `zfcal.model.likelihood`, with the components,
-factors and changes of perception of the model's effects in it, which come from the very
-functions that a simulation calls. Base parameters have exact gradients; an effect's
+The density of a heading is that of `zfcal.model.fitted`; what the model's effects make of it comes
+from the very functions that a simulation calls. Base parameters have exact gradients; an effect's
 parameters have differences. The maximum is climbed by the method of Berndt, Hall, Hall
 and Hausman (1974, Annals of Economic and Social Measurement 3: 653-665): the
 information is the sum of the outer products of the steps' scores.
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.model.effects import find_effect
 from zfcal.model.fitted import (
     SCALES,
@@ -35,12 +35,34 @@ from zfcal.model.scene import Scene
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters, ZoneParameters
 
-Floats = NDArray[np.float64]
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Within which kappa of the base, kappa of the neighbours and alpha are looked for.
+
+    Parameters
+    ----------
+    low, high
+        In units of `SCALES`.
+    """
+
+    low: tuple[float, float, float] = (1e-3, 1e-3, 0.0)
+    high: tuple[float, float, float]
 
 
-_LOW, _HIGH = np.array([1e-3, 1e-3, 0.0]), np.array([4.0, 4.0, 10.0])
+GENES = Bounds(high=(1.0, 1.0, 1.0))
+"""What a genome can hold: an estimate that joins a search has to be one of its individuals."""
+
+WIDE = Bounds(high=(4.0, 4.0, 10.0))
+"""What a model is doubted within. A parameter that is held at a bound has a slope there, which
+reads as an effect: the scores of suspects have what the base could explain projected off, and that
+holds at a maximum alone."""
+
 _LOG_GAMMA_SPAN = 7.0
+"""An attraction below e^-7 of the largest one is not told from zero."""
+
 _LAPSE = (1e-6, 0.2)
+_FIRST_LAPSE = 0.005
 _DIFFERENCE = 1e-4
 """Of a parameter's range, and at most so much in its unit: places may be 100 m away."""
 _SHRINK = 0.2
@@ -50,15 +72,18 @@ _ENOUGH_NATS = 0.02
 _RIDGE = 1e-9
 
 
-def start_of(parameters: Parameters) -> tuple[Floats, ...]:
+def start_of(parameters: Parameters, bounds: Bounds = WIDE) -> tuple[Floats, ...]:
     """Return where a fit starts, per zone: a model's own parameters, and one lapse in 200."""
     made = []
     for zone in parameters.zones:
         base = zone.kappa_0 if zone.kappa_w is None else zone.kappa_w
-        own = np.clip(np.array([base, zone.kappa_f, zone.alpha]) / SCALES, _LOW, _HIGH)
+        own = np.array([base, zone.kappa_f, zone.alpha]) / SCALES
+        own = np.clip(own, bounds.low, bounds.high)
         gamma = np.array([zone.gamma[name] for name in parameters.zone_names])
         log_gamma = np.log(np.maximum(gamma / gamma.max(), math.exp(-_LOG_GAMMA_SPAN)))
-        made.append(np.concatenate([np.maximum(own, [0.02, 0.02, 0.02]), log_gamma, [0.005]]))
+        made.append(
+            np.concatenate([np.maximum(own, [0.02, 0.02, 0.02]), log_gamma, [_FIRST_LAPSE]])
+        )
     return tuple(made)
 
 
@@ -68,6 +93,7 @@ def maximise(
     *,
     free: Free = (),
     start: Sequence[Floats] | None = None,
+    bounds: Bounds = WIDE,
     rounds: int = _MOST_ROUNDS,
     n_workers: int = 1,
 ) -> Fitted:
@@ -83,14 +109,18 @@ def maximise(
         Parameters of effects to be fitted along with the base's.
     start
         Per zone, as `zone_scores` takes it; None for the model's own.
+    bounds
+        Within which the base's parameters are looked for.
     rounds
         At most so many steps uphill.
     n_workers
         Threads; the numbers do not depend on them.
     """
     seen = view_of(scene, without_effects(parameters), n_workers=n_workers)
-    climb = _Climb(scene=scene, given=parameters, free=free, seen=seen, n_workers=n_workers)
-    x = [values.copy() for values in (start_of(parameters) if start is None else start)]
+    climb = _Climb(
+        scene=scene, given=parameters, free=free, seen=seen, within=bounds, n_workers=n_workers
+    )
+    x = [values.copy() for values in (start_of(parameters, bounds) if start is None else start)]
     here = climb.at(parameters, x)
     psi = None
     for _ in range(rounds):
@@ -154,6 +184,7 @@ class _Climb:
     given: Parameters
     free: Free
     seen: View
+    within: Bounds = WIDE
     n_workers: int = 1
 
     def bounds(self, name: str, key: str) -> tuple[float, float]:
@@ -219,11 +250,12 @@ class _Climb:
 
     def step(self, here: Fitted, psi: Floats) -> Fitted | None:
         """Return a better point, None if none is found."""
-        blocks, by_psi, promise = _directions(here, psi, self._pushed(here.parameters, psi))
+        pushed = self._pushed(here.parameters, psi)
+        blocks, by_psi, promise = _directions(here, psi, pushed, self.within)
         length = 1.0
         while length * promise > _ENOUGH_NATS:
             x = [
-                _shifted(own, length * by, turns) if turns.enough else own
+                _shifted(own, length * by, turns, self.within) if turns.enough else own
                 for own, by, turns in zip(here.x, blocks, self.turns, strict=True)
             ]
             there = self.at(self._moved(here.parameters, length * by_psi), x)
@@ -285,19 +317,20 @@ def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, f
     return max(found.low, ends[0]), min(found.high, ends[1])
 
 
-def _limits(x: Floats, turns: ZoneTurns) -> tuple[Floats, Floats]:
-    low = np.concatenate([_LOW, np.where(turns.reachable, -_LOG_GAMMA_SPAN, 0.0), [_LAPSE[0]]])
-    high = np.concatenate([_HIGH, np.full(x.size - 4, np.inf), [_LAPSE[1]]])
+def _limits(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floats]:
+    least = np.where(turns.reachable, -_LOG_GAMMA_SPAN, 0.0)
+    low = np.concatenate([bounds.low, least, [_LAPSE[0]]])
+    high = np.concatenate([bounds.high, np.full(x.size - 4, np.inf), [_LAPSE[1]]])
     high[3:-1][~turns.reachable] = 0.0
     return low, high
 
 
-def _shifted(x: Floats, by: Floats, turns: ZoneTurns) -> Floats:
+def _shifted(x: Floats, by: Floats, turns: ZoneTurns, bounds: Bounds) -> Floats:
     """Return a zone's parameters moved within their limits, the largest log gamma zero."""
     moved = x + by
     # A common factor of all gammas is no matter: it goes before the limits, not after.
     moved[3:-1] -= moved[3:-1][turns.reachable].max()
-    return np.clip(moved, *_limits(x, turns))
+    return np.clip(moved, *_limits(x, turns, bounds))
 
 
 def _is_better(there: Fitted, here: Fitted) -> bool:
@@ -324,7 +357,7 @@ def _information(here: Fitted, psi: Floats) -> Floats:
 
 
 def _directions(
-    here: Fitted, psi: Floats, psi_pushed: NDArray[np.bool_]
+    here: Fitted, psi: Floats, psi_pushed: NDArray[np.bool_], bounds: Bounds
 ) -> tuple[list[Floats], Floats, float]:
     """Return the way uphill, per zone and for the effects' parameters, and the nats it promises."""
     information = _information(here, psi)
@@ -332,7 +365,7 @@ def _directions(
     open_ = np.diag(information) > 1e-12
     at = 0
     for x, turns in zip(here.x, here.turns, strict=True):
-        low, high = _limits(x, turns)
+        low, high = _limits(x, turns, bounds)
         pushed = ((x <= low) & (slope[at : at + x.size] < 0)) | (
             (x >= high) & (slope[at : at + x.size] > 0)
         )

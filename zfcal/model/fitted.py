@@ -1,7 +1,17 @@
 """A fitted model: the density of each heading, zone by zone, and its derivatives.
 
-The density is that of `zfcal.model.likelihood` with components, factors and changes of
-perception in it. How its maximum is found stands in `zfcal.model.extended`.
+The density of a heading, given where everybody was and the speed of the step, is explicit, so
+no simulation is needed. The parameters of a zone bear on the steps that start in it and on no
+others: each zone is a small problem of its own.
+
+``log p = log(b + alpha f) - log sum_e (gamma_e / gamma_landing) (B_e + alpha F_e)``
+
+with b and f the base's and the neighbours' density at the heading taken (f weighted by solid
+angle) and B_e, F_e their integrals over headings that land in zone e; components, factors and
+changes of perception of a model's effects come in beside them. With a lapse, a heading is drawn
+from the uniform law with a small probability, so that a tracking error does not weigh ten nats.
+
+How the maximum is found stands in `zfcal.model.extended`.
 """
 
 from __future__ import annotations
@@ -15,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e, i1e
 
+from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.kernels.extended import (
     BASE,
@@ -27,24 +38,23 @@ from zfcal.model.kernels.extended import (
     extended_density,
     extended_sums,
 )
+from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.scene import Scene
-from zfcal.model.steps import ANGLES
 from zfcal.model.views import View
-from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
+from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, Parameters
 
 Rows = NDArray[np.intp]
 
 Free = tuple[tuple[str, str], ...]
 """Parameters of effects that are fitted: name of the effect, name of the parameter."""
 
-SCALES = np.array([30.0, 30.0, 50.0])
+SCALES = np.array([KAPPA_0_MAX, KAPPA_F_MAX, ALPHA_MAX])
 """Units of kappa of the base, kappa of the neighbours, and alpha in a fit."""
 
 _UNIFORM = 1 / (2 * math.pi)
 
 MIN_STEPS = 30
+"""With fewer steps in a zone nothing is estimated there."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
@@ -36,8 +37,6 @@ from zfcal.model.kernels.world import (
 from zfcal.model.packing import pack
 from zfcal.model.simulate import check_sampler, tank_of
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 def heading_density(

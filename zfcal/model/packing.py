@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import i0e
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
@@ -24,8 +25,6 @@ from zfcal.model.kernels.world import (
     Packed,
 )
 from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales, n_genes
-
-Floats = NDArray[np.float64]
 
 
 def check_model(parameters: Parameters, arena: Arena) -> None:

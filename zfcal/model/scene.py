@@ -1,8 +1,7 @@
 """Measured tracks as the states that agents decided in, with all that effects may ask.
 
-Where `steps` holds what the base model's likelihood asks, a scene holds the whole
-state of everybody at each sample, as the kernels of a simulation have it, so that an
-effect's own compiled functions give its likelihood.
+A scene holds the whole state of everybody at each sample, as the kernels of a simulation have
+it, so that an effect's own compiled functions give its likelihood.
 """
 
 from __future__ import annotations
@@ -15,20 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
-from zfcal.model.kernels.likelihood import PER_CELL
+from zfcal.model.kernels.landing import ANGLES, PER_CELL, landing_shares
 from zfcal.model.kernels.scene import fill_states
 from zfcal.model.kernels.world import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
-from zfcal.model.steps import ANGLES, landing_shares
 from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
 from zfcal.units import HEADING_MIN_STEP_M
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-_LEAST_CONFIDENCE = 0.5
-"""Below it a position is a guess, and no step starts or ends in it."""
 
 _MIN_SAMPLES = 3
 
@@ -69,7 +62,8 @@ class Turns(Moves):
     heading, taken, along_wall : ndarray, shape (step, 2)
         Unit vectors: before, after, and along the wall.
     share : ndarray of uint8, shape (step, ANGLES, zone)
-        Landing zones of each cell of headings; see `zfcal.model.steps.Steps`.
+        For each cell of headings, how many of its 4 places land in each zone at the step's
+        speed.
     """
 
     landing: Ints
@@ -131,7 +125,8 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
     """Return the states and steps of measured tracks.
 
     A step counts where its agent has one track id at three samples in a row, inside the
-    tank and with a confidence of one half or more, never interpolated.
+    tank and none of them a guess, never interpolated. What is guessed is seen by the others all the
+    same: it is there, and from near.
 
     Parameters
     ----------
@@ -147,13 +142,16 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
     """
     if not (samples.kind == FISH).any() or len(samples.k) < _MIN_SAMPLES:
         raise InputError(
-            f"A diagnosis needs fish at three samples in a row, got {len(samples.k)} samples of "
+            f"A likelihood needs fish at three samples in a row, got {len(samples.k)} samples of "
             f"{int((samples.kind == FISH).sum())} fish and {int((samples.kind != FISH).sum())} "
             f"robots."
         )
-    xy, _ = arena.settle(np.where(_sure(samples)[..., None], samples.xy_m, np.nan))
+    xy, _ = arena.settle(samples.xy_m)
     columns, kinds = _columns(~np.isnan(xy[..., 0]), samples.kind)
     folded, tracks = _fold(xy, columns, samples.agent, len(kinds))
+    sure = tracks >= 0
+    at, track = np.nonzero(samples.guessed)
+    sure[at, columns[track]] = False
     states = fill_states(
         np.ascontiguousarray(folded),
         kinds.astype(np.float64),
@@ -167,7 +165,7 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
     states[:, SPEED][unknown] = np.nanmean(speed) if not unknown.all() else 0.0
     present = states[:, ZONE] > 0
     by_kind = [int(present[:, kinds == kind].sum(axis=1).max(initial=0)) for kind in (0, 1)]
-    parts = _Parts(states=states, speed=speed, kinds=kinds, tracks=tracks)
+    parts = _Parts(states=states, speed=speed, kinds=kinds, tracks=tracks, sure=sure)
     return Scene(
         arena=arena,
         dt_s=samples.dt_s,
@@ -179,10 +177,6 @@ def make_scene(samples: Samples, arena: Arena) -> Scene:
         n_fish=by_kind[0],
         n_robots=by_kind[1],
     )
-
-
-def _sure(samples: Samples) -> NDArray[np.bool_]:
-    return np.asarray(~(samples.confidence < _LEAST_CONFIDENCE))
 
 
 def _columns(seen: NDArray[np.bool_], kind: NDArray[np.int8]) -> tuple[Ints, NDArray[np.int8]]:
@@ -229,10 +223,15 @@ class _Parts:
     speed: Floats
     kinds: NDArray[np.int8]
     tracks: NDArray[np.int32]
+    sure: NDArray[np.bool_]
 
     def usable(self) -> tuple[Ints, Ints]:
-        """Return sample and column of the steps of fish with a known speed before and after."""
-        known = ~np.isnan(self.speed)
+        """Return sample and column of the steps of fish with a known speed before and after.
+
+        The speed of a guess, or out of one, is not known.
+        """
+        known = ~np.isnan(self.speed) & self.sure
+        known[1:] &= self.sure[:-1]
         rows = known[:-1] & known[1:] & (self.kinds == FISH)[None, :]
         at, who = np.nonzero(rows)
         return at.astype(np.int64), who.astype(np.int64)

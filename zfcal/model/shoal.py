@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
@@ -38,8 +39,6 @@ from zfcal.model.kernels.world import (
 from zfcal.model.packing import pack
 from zfcal.model.simulate import burn_in_steps, individuals, tank_of
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 _AWAY_M = 1e9
 

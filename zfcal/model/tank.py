@@ -19,6 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import ASK, FINE, Tank, crosses, segment_distance2, zone_exact
 from zfcal.model.kernels.rooms import make_rooms
@@ -29,8 +30,6 @@ _SINGLE_M = 1e-6
 """More than what a length in a tank loses in single precision."""
 _ROUNDING_M = 1e-12
 """More than what a place in a tank loses where it is looked up in parts of cells."""
-
-Floats = NDArray[np.float64]
 
 
 @kernel

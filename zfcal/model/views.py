@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.kernels.asking import (
@@ -20,18 +20,17 @@ from zfcal.model.kernels.asking import (
     ask_factors,
     ask_harmonics,
     ask_rotations,
+    ask_speeds,
     attend,
 )
 from zfcal.model.kernels.extended import harmonic_tilt
+from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import head_late, perceive
 from zfcal.model.kernels.world import Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
-from zfcal.model.steps import ANGLES
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,6 +163,40 @@ def attended(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
         sets.append(np.empty_like(own))
         attend(scene.states, turns.at, turns.who, packed, own, sets[-1])
     return np.concatenate(sets, axis=1)
+
+
+def angles_of_moves(scene: Scene, packed: Packed) -> Floats:
+    """Return the solid angles at which a model's agents saw others before each move.
+
+    As a simulation has them when it asks for a speed: late where all that is seen is, and with the
+    effects on sight.
+
+    Returns
+    -------
+    ndarray, shape (move, agent)
+    """
+    moves, late = scene.moves, sees_late(packed)
+    _, angle = perceive(scene.states, moves.at, moves.who, late, float(packed.cos_fov[0]))
+    if not len(packed.sights):
+        return angle
+    changed = np.empty_like(angle)
+    attend(scene.states, moves.at, moves.who, packed, angle, changed)
+    return changed
+
+
+def speed_factor(scene: Scene, packed: Packed, angle_sr: Floats | None = None) -> Floats:
+    """Return by what a model's effects multiply the speed of each move, shape (move,).
+
+    Parameters
+    ----------
+    angle_sr : ndarray, shape (move, agent)
+        What was seen before each, from `angles_of_moves`; by default as this model sees.
+    """
+    moves, factor = scene.moves, np.ones(len(scene.moves))
+    if len(packed.speeds):
+        seen = angles_of_moves(scene, packed) if angle_sr is None else angle_sr
+        ask_speeds(scene.states, moves.at, moves.who, packed, seen, factor)
+    return factor
 
 
 def components_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:

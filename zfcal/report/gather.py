@@ -5,7 +5,7 @@ A file that is damaged is left out and named; the rest is still shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from zfcal.artifacts.models import read_model_for, read_result
 from zfcal.artifacts.reading.contents import numbered_of, open_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
+from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.sampling import sample
@@ -27,7 +28,7 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
-from zfcal.report.views import Course, CourseKey, Round, Source, TrialView
+from zfcal.report.views import Course, CourseKey, Mark, Round, Source, TrialView
 from zfcal.trial import Trial
 from zfcal.units import SEGMENT_S
 
@@ -131,14 +132,15 @@ def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
     ]
     calibrated = next((r for r in reversed(rounds) if r.second > 0), None)
     seen = see(_stretches(reader))
+    counted = _statistics(reader, None if calibrated is None else calibrated.second)
     return TrialView(
         root=root,
         trial=trial,
         arena=arena,
         courses=courses,
-        statistics=_statistics(reader, None if calibrated is None else calibrated.second),
+        statistics=counted,
         rounds=rounds,
-        model_statistics=_simulated(calibrated, trial, arena) if alone else None,
+        model_statistics=_simulated(calibrated, trial, arena, counted) if alone else None,
         seen=seen,
         integration=measure_integration(
             courses, seen, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
@@ -150,13 +152,21 @@ def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
     )
 
 
-def _simulated(calibrated: Round | None, trial: Trial, arena: Arena) -> Statistics | None:
+def _simulated(
+    calibrated: Round | None,
+    trial: Trial,
+    arena: Arena,
+    counted: Mapping[tuple[int, str], Statistics],
+) -> Statistics | None:
     if calibrated is None:
         return None
     # It brings the compiler along, which takes longer than the simulation.
     from zfcal.report.simulated import long_run
 
-    return long_run(calibrated, trial, arena)
+    # What the fish's window holds and is known here, so that both can be laid over each other.
+    fish = counted.get((calibrated.second, "control"))
+    names = () if fish is None else [name for name in fish.further if name in statistics()]
+    return long_run(calibrated, trial, arena, further=names)
 
 
 def _courses(reader: _Reader) -> tuple[dict[CourseKey, Course], dict[str, Any]]:
@@ -207,14 +217,29 @@ def _round(reader: _Reader, second: int, path: Path) -> Round | None:
     model = reader.attempt(path, lambda p: read_model_for(p, arena, dt_s=dt_s))
     if model is None:
         return None
-    said = read_result(path).get("intervals", {}).get("parameters", {})
+    result = read_result(path)
+    said = result.get("intervals", {}).get("parameters", {})
+    score, names = _named(result.get("score"))
     known = {name: row for name, row in said.items() if {"low", "high", "identified"} <= row.keys()}
     return Round(
         second=second,
         parameters=model,
         intervals={name: (float(row["low"]), float(row["high"])) for name, row in known.items()},
         unidentified=frozenset(name for name, row in known.items() if not row["identified"]),
+        score=score,
+        score_of=names,
     )
+
+
+def _named(said: Any) -> tuple[Mark | None, tuple[str, ...]]:
+    """Return the score of named statistics that a model's result holds, and their names."""
+    if not isinstance(said, dict) or "value" not in said:
+        return None, ()
+    value, low, high, ceiling = (
+        float("nan") if said.get(key) is None else float(said[key])
+        for key in ("value", "ceiling_low", "ceiling_high", "ceiling")
+    )
+    return Mark(value=value, low=low, high=high, ceiling=ceiling), tuple(said.get("of", ()))
 
 
 def _stretches(reader: _Reader) -> Iterator[Located]:

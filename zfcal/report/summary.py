@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.contents import Statement
@@ -29,13 +30,6 @@ _NOTHING = 0.005
 """A score that is printed as 0.00 or below it."""
 
 _FEW = 4
-
-_PLACES = {
-    "D": "the distances between fish",
-    "W": "the distances to the wall",
-    "T": "the moves between zones",
-    "O": "the times in each zone",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +50,14 @@ class Gap:
 
 def statements(view: TrialView) -> list[Statement]:
     """Return what there is to say about a trial, the most important first."""
-    made = (_model(view), _worst(view), _robot(view), _halves(view), _parameters(view))
+    made = (
+        _model(view),
+        _named(view),
+        _worst(view),
+        _robot(view),
+        _halves(view),
+        _parameters(view),
+    )
     return [statement for statement in made if statement is not None]
 
 
@@ -141,9 +142,26 @@ def _model(view: TrialView) -> Statement | None:
     )
 
 
+def _named(view: TrialView) -> Statement | None:
+    """Say what was calibrated on, where it is not S, and how far that came."""
+    last = view.calibrated
+    if last is None or last.score is None:
+        return None
+    mark = last.score
+    return Statement(
+        question="What was the model calibrated on?",
+        answer=f"On the score of {', '.join(last.score_of)}, which is not S and not to be "
+        f"compared with it. In the last window it is {mark.value:.2f}; a perfect model would score "
+        f"{mark.ceiling:.2f} (95 % of its windows between {mark.low:.2f} and {mark.high:.2f}). S "
+        "above is of D, W, O and T alone, and was not optimised.",
+        figure=(_percent(mark), "of what a perfect model would score"),
+    )
+
+
 def _hidden(view: TrialView) -> Iterator[str]:
     """Name the features below their own interval in most windows: the mean S can hide them."""
-    for feature, words in _PLACES.items():
+    for feature in SCORED:
+        words = named(feature).phrase
         course = view.course(MODEL, feature)
         known = ~(np.isnan(course.value) | np.isnan(course.low))
         below = int((course.value[known] < course.low[known]).sum())
@@ -178,15 +196,16 @@ def _worst(view: TrialView) -> Statement | None:
     if not ranked:
         return None
     feature, zone, mark = ranked[0]
+    what = named(feature).phrase
     where = f" in the zone {zone}" if zone else ""
     if _shortfall(mark) < _NOTICED:
         answer = (
-            f"Nothing stands out: the least alike are {_PLACES[feature]}{where}, and they still "
+            f"Nothing stands out: the least alike are {what}{where}, and they still "
             f"reach {_percent(mark)} of their ceiling."
         )
     else:
         answer = (
-            f"Most of all {_PLACES[feature]}{where}: {mark.value:.2f} where a perfect model would "
+            f"Most of all {what}{where}: {mark.value:.2f} where a perfect model would "
             f"score {mark.ceiling:.2f}. {_direction(view, feature, zone)}"
         ).rstrip()
     return Statement(
@@ -209,10 +228,8 @@ def _direction(view: TrialView, feature: str, zone: str | None) -> str:
         stay = [float(frequencies(s.transition)[index, index]) for s in (fish, model)]
         return _said("a fish was still there one step later {} of the time, the model's {}",
                      [f"{100 * share:.1f} %" for share in stay], stay)  # fmt: skip
-    bins = view.arena.bins
-    limits = bins.distance_m if feature == "D" else bins.wall_distance_m
-    counts = [s.distance[index] if feature == "D" else s.wall[index] for s in (fish, model)]
-    means = [histogram_mean(each, limits) for each in counts]
+    edges = named(feature).edges_in(view.arena)
+    means = [histogram_mean(s.of(feature)[index], edges) for s in (fish, model)]
     what = "two fish there were {} apart" if feature == "D" else "fish there kept {} from the wall"
     return _said(what + " on average, the model's {}",
                  [f"{100 * mean:.1f} cm" for mean in means], means)  # fmt: skip
@@ -268,13 +285,15 @@ def _robot(view: TrialView) -> Statement | None:
         else "the robot stands out more than fish do from each other."
     )
     least = min(
-        (f for f in _PLACES if f in found.robot and found.robot[f].against_ceiling > 0),
+        (f for f in SCORED if f in found.robot and found.robot[f].against_ceiling > 0),
         key=lambda f: found.robot[f].against_ceiling,
         default=None,
     )
     if least is not None and found.robot[least].against_ceiling < _NEAR:
         part = found.robot[least]
-        answer += f" Least fish-like are {_PLACES[least]}: {part.value:.2f} of {part.ceiling:.2f}."
+        answer += (
+            f" Least fish-like are {named(least).phrase}: {part.value:.2f} of {part.ceiling:.2f}."
+        )
     return Statement(
         question="Does the robot move like a fish?",
         answer=answer,

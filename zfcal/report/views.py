@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.artifacts.lineage import Lineage
+from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
 from zfcal.report.seen import Seen
@@ -28,13 +29,7 @@ SOCIAL = "social-vs-control"
 ROBOT = "robot-vs-fish"
 
 FEATURE_NAMES: Mapping[str, str] = MappingProxyType(
-    {
-        "D": "Inter-individual distances",
-        "W": "Distances to nearest wall",
-        "O": "Zone occupation",
-        "T": "Zone transitions",
-        "S": "Biomimetic score S",
-    }
+    {name: named(name).label for name in SCORED} | {"S": "Biomimetic score S"}
 )
 """The features, by the paper's letters, in its order."""
 
@@ -143,12 +138,18 @@ class Round:
         Lower and upper bound by gene name, in the parameter's own unit.
     unidentified
         Names of the parameters that the window does not pin down.
+    score
+        The score of the statistics that it was calibrated on, with its ceiling; None for S.
+    score_of
+        Names of these statistics.
     """
 
     second: int
     parameters: Parameters
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     unidentified: frozenset[str] = frozenset()
+    score: Mark | None = None
+    score_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

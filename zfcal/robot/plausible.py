@@ -14,14 +14,11 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.robot.body import WHEEL_LIMIT_M_S
-from zfcal.tracks import AgentPose
+from zfcal.tracks import GUESS, AgentPose
 
 TOLERANCE_M = 0.03
 """So far outside the water a position may be measured: a zebrafish's length, twice the robot's
 radius. Cameras are off by millimetres; whoever is farther out is not in the tank with any part."""
-
-LEAST_CONFIDENCE = 0.5
-"""Below it a position is a guess (`zfcal.tracks`)."""
 
 CONSISTENT_FRAMES = 5
 """After so many frames at a place that it cannot have driven to the robot is there all the same."""
@@ -89,10 +86,8 @@ class Plausibility:
         x, y = agent.x_m, agent.y_m
         if not (math.isfinite(x) and math.isfinite(y)):
             return Doubt(kind="not-finite", says=f"its position ({x}, {y}) is no number")
-        if not agent.confidence >= LEAST_CONFIDENCE:
-            says = (
-                f"its confidence is {agent.confidence:g}, at least {LEAST_CONFIDENCE:g} is wanted"
-            )
+        if not agent.confidence >= GUESS:
+            says = f"its confidence is {agent.confidence:g}, at least {GUESS:g} is wanted"
             return Doubt(kind="unsure", says=says)
         away = self._away(x, y)
         if not away <= self._tolerance_m:

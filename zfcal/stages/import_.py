@@ -10,21 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.readers import ImportOptions, guess_format, import_foreign
-from zfcal.stages.events import Note, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
-from zfcal.stages.recording import (
-    TRACKS,
-    Recording,
-    check_same_source,
-    hash_sources,
-    stale_segments,
-    starts_of_recording,
-    write_segments,
-)
-from zfcal.stages.segments import segment_path
-from zfcal.stages.settled import settled
+from zfcal.stages.events import Note, Tell
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_of_recording
+from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 
 _LIMITS = {"n_fish", "n_robots"}
@@ -79,35 +71,28 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
     InputError
         The trial does not exist, or the file is wrong or does not fit it.
     """
-    task = task or Task()
-    opened = open_trial(root)
+    read_trial(root)
     name = source.format or _guessed(source.path, tell)
+    stage = OneThing(name="import", item=lambda run: _recording(run, source, name))
+    run(stage, root, tell, task=task)
+
+
+def _recording(run: Run, source: Source, name: str) -> Item:
+    opened = open_trial(run.root)
     options = _options(opened, source.options)
-    with at_work(root, "import", task):
-        settled(lambda: _import(opened, source, (name, options), tell, task=task), tell)
 
+    def record() -> Recording:
+        tracks = _read(source, name, options, run.tell)
+        tell_outside(opened, tracks, run.tell)
+        tell_missing(opened, tracks, run.tell)
+        return Recording(
+            tracks=tracks,
+            end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
+            extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
+        )
 
-def _import(
-    opened: OpenTrial, source: Source, form: tuple[str, ImportOptions], tell: Tell, *, task: Task
-) -> None:
-    root, (name, options) = opened.trial.root, form
     lineage = _lineage(opened, source, name, options)
-    check_same_source(opened.trial, lineage, task)
-    starts = starts_of_recording(root)
-    if starts and not stale_segments(opened.trial, lineage, starts, task):
-        for start in starts:
-            tell(UpToDate(path=segment_path(root, start)))
-        return
-    tracks = _read(source, name, options, tell)
-    tell_outside(opened, tracks, tell)
-    tell_missing(opened, tracks, tell)
-    recording = Recording(
-        tracks=tracks,
-        end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
-        lineage=lineage,
-        extra={"noise_m": options.noise_m} if options.noise_m is not None else {},
-    )
-    write_segments(opened.trial, recording, tell, task=task)
+    return segmented(run, opened.trial, lineage, starts_of_recording(run.root), record)
 
 
 def _guessed(path: Path, tell: Tell) -> str:

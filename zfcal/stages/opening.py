@@ -87,10 +87,10 @@ def at_work(root: Path, command: str, task: Task) -> Iterator[None]:
         yield
 
 
-def reason_to_make(
-    path: Path, expected: Lineage, task: Task, tell: Tell, *, ignore: tuple[str, ...] = ()
-) -> str | None:
+def reason_to_make(path: Path, expected: Lineage, task: Task, tell: Tell) -> str | None:
     """Return why an artifact is to be made now; None if it is not, which is told.
+
+    For what does not go through `zfcal.stages.stage.run`.
 
     Parameters
     ----------
@@ -102,17 +102,8 @@ def reason_to_make(
         A forced task always has a reason, a dry run never.
     tell
         Hears of an artifact that is up to date, or that would be made.
-    ignore
-        Options that do not bear on the result.
     """
-    reason = stale_reason([path], expected, ignore_options=ignore)
-    return tell_reason(path, expected, task, tell, reason=reason)
-
-
-def tell_reason(
-    path: Path, expected: Lineage, task: Task, tell: Tell, *, reason: str | None
-) -> str | None:
-    """Return what `reason_to_make` does, where it is known already why an artifact is stale."""
+    reason = stale_reason([path], expected)
     if reason is None and task.force:
         reason = "forced"
     if reason is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,9 +14,10 @@ from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading.contents import hash_of, hold_steady
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.events import Made, Note, Progress, Tell
-from zfcal.stages.opening import Task, reason_to_make
+from zfcal.stages.events import Note, Progress
+from zfcal.stages.opening import Task
 from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.stages.stage import Draft, Item, Output, Run, Write
 from zfcal.stages.taken import unless_taken
 from zfcal.tracks import Tracks
 from zfcal.trial import Trial
@@ -32,7 +33,7 @@ _SLACK_S = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """Tracks of a whole trial, and where they come from.
+    """Tracks of a whole trial.
 
     Parameters
     ----------
@@ -40,15 +41,12 @@ class Recording:
         All rows.
     end_s
         The second up to which the recording went, also if nobody was seen.
-    lineage
-        Of every segment.
     extra
         Further metadata of every segment.
     """
 
     tracks: Tracks
     end_s: float
-    lineage: Lineage
     extra: Mapping[str, JSON] = field(default_factory=dict)
 
 
@@ -143,45 +141,71 @@ def starts_between(first_s: float, end_s: float) -> list[int]:
     return list(range(first, max(int(np.ceil(end_s - _SLACK_S)), first + 1), STEP_S))
 
 
-def stale_segments(trial: Trial, lineage: Lineage, starts: list[int], task: Task) -> bool:
-    """Return whether a segment is to be made, or one is there that does not belong."""
-    silent = Task(force=task.force)
-    told: list[object] = []
-    reasons = (
-        reason_to_make(segment_path(trial.root, start), lineage, silent, told.append)
-        for start in starts
-    )
-    return any(reasons) or bool(set(segment_starts(trial.root)) - set(starts))
-
-
-def write_segments(trial: Trial, recording: Recording, tell: Tell, *, task: Task) -> None:
-    """Write the segments of a recording that are missing or stale, in order.
+def segmented(
+    run: Run, trial: Trial, lineage: Lineage, starts: list[int], record: Callable[[], Recording]
+) -> Item:
+    """Return the segments of a recording, of which those missing or stale are written.
 
     Parameters
     ----------
-    trial
-        Where they go.
-    recording
-        What they hold. A minute in which nobody was seen has a segment without
-        rows; the last segment may be a part.
-    tell
-        Hears of each.
-    task
-        Whether to write at all.
+    run, trial
+        On which trial.
+    lineage
+        Of every segment.
+    starts
+        The seconds at which the segments start; empty where only the recording tells.
+    record
+        Returns the whole recording.
+
+    Raises
+    ------
+    InputError
+        The trial holds tracks of another source, and the task is not forced.
+    """
+    check_same_source(trial, lineage, run.task)
+    # To remove those that the recording does not reach any more is a reason as well.
+    others = set(segment_starts(run.root)) - set(starts)
+    outputs = [
+        Output(
+            path=segment_path(run.root, start),
+            lineage=lineage,
+            otherwise="others are there" if others else None,
+        )
+        for start in starts
+    ]
+    return Item(outputs=outputs, compute=lambda: _parts(run, lineage, record()), apart=True)
+
+
+def _parts(run: Run, lineage: Lineage, recording: Recording) -> Iterator[Draft]:
+    """Yield the segments, in order, and remove those of an earlier, longer recording.
+
+    A minute in which nobody was seen has a segment without rows; the last one may be a part.
     """
     parts = list(cut(recording.tracks, recording.end_s))
     stretch: list[JSON] = [float(recording.tracks.time_s[0]), recording.end_s]
     for number, (start, tracks) in enumerate(parts, start=1):
-        path = segment_path(trial.root, start)
-        reason = reason_to_make(path, recording.lineage, task, tell)
-        if reason:
-            end_s = min(recording.end_s, float(start + STEP_S))
-            extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
-            with unless_taken(path, tell):
-                write_tracks(path, tracks, recording.lineage, extra=extra)
-                tell(Made(path=path, reason=reason))
-        tell(Progress(stage="segments", done=number, total=len(parts)))
-    _remove_others(trial, {start for start, _ in parts}, tell, task=task)
+        end_s = min(recording.end_s, float(start + STEP_S))
+        extra: dict[str, JSON] = {**recording.extra, STRETCH_KEY: stretch, END_KEY: end_s}
+        output = Output(path=segment_path(run.root, start), lineage=lineage)
+        yield Draft(output=output, write=_writer(tracks, extra))
+        run.tell(Progress(stage="segments", done=number, total=len(parts)))
+    _remove_others(run, {start for start, _ in parts})
+
+
+def _remove_others(run: Run, starts: set[int]) -> None:
+    why = "the recording does not reach there any more."
+    for start in set(segment_starts(run.root)) - starts:
+        path = segment_path(run.root, start)
+        if run.task.dry_run:
+            run.tell(Note(text=f"would remove {path}: {why}"))
+            continue
+        with unless_taken(path, run.tell):
+            remove(path)
+            run.tell(Note(text=f"{path}: removed, {why}"))
+
+
+def _writer(tracks: Tracks, extra: Mapping[str, JSON]) -> Write:
+    return lambda path, lineage: write_tracks(path, tracks, lineage, extra=extra)
 
 
 def cut(tracks: Tracks, end_s: float) -> Iterator[tuple[int, Tracks]]:
@@ -205,15 +229,3 @@ def cut(tracks: Tracks, end_s: float) -> Iterator[tuple[int, Tracks]]:
     edges = np.searchsorted(tracks.time_s, np.array([*starts, np.inf]) - _SLACK_S)
     for start, low, high in zip(starts, edges, edges[1:], strict=False):
         yield start, tracks.take(slice(int(low), int(high)))
-
-
-def _remove_others(trial: Trial, starts: set[int], tell: Tell, *, task: Task) -> None:
-    """Remove the segments that an earlier, longer recording of the same source left."""
-    for start in set(segment_starts(trial.root)) - starts:
-        path = segment_path(trial.root, start)
-        if task.dry_run:
-            tell(Note(text=f"would remove {path}: the recording does not reach there any more."))
-            continue
-        with unless_taken(path, tell):
-            remove(path)
-            tell(Note(text=f"{path}: removed, the recording does not reach there any more."))

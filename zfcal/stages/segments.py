@@ -1,4 +1,4 @@
-"""The closed track segments of a trial, located in its arena.
+"""The closed track segments of a trial: on the camera's clock, on the model's, in its arena.
 
 Windows overlap, and a pipe visits the same segments again and again, so what was
 located is remembered, by the content of the file.
@@ -15,6 +15,7 @@ from typing import final
 
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.reading.contents import (
     hash_of,
     numbered_of,
@@ -30,7 +31,7 @@ from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.stages.events import LeftOut, Tell
 from zfcal.stages.opening import OpenTrial, open_trial
-from zfcal.tracks import Tracks
+from zfcal.tracks import GUESS, Samples, Tracks
 from zfcal.units import SEGMENT_S
 
 STEP_S = int(SEGMENT_S)
@@ -74,6 +75,14 @@ def segment_starts(root: Path) -> list[int]:
     return [second for second in found if second % STEP_S == 0]
 
 
+def segment_files(root: Path, span_s: tuple[int, int] | None) -> list[Path]:
+    """Return the segments that a stretch of time touches, all for None, in order of time."""
+    starts = segment_starts(root)
+    if span_s is not None:
+        starts = [start for start in starts if span_s[0] - STEP_S < start < span_s[1]]
+    return [segment_path(root, start) for start in starts]
+
+
 def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
     """Return the files that can be opened and are not too large; the others are told as left out.
 
@@ -87,6 +96,21 @@ def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
         else:
             tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
     return found
+
+
+def guess_options(paths: Iterable[Path]) -> dict[str, JSON]:
+    """Return how guesses count, as a lineage states it; nothing where there are none.
+
+    Models and findings from the time when nobody saw a guess do not state it.
+    """
+
+    def has_guesses(path: Path) -> bool:
+        try:
+            return bool((read_tracks(path).confidence < GUESS).any())
+        except (DamagedError, InputError):
+            return False
+
+    return {"guesses": "seen"} if any(map(has_guesses, paths)) else {}
 
 
 def _problem_of(path: Path) -> ZfcalError | None:
@@ -154,7 +178,7 @@ class Segments:
         with one_content():
             key = (str(path.absolute()), hash_of(path), *_clock(opened))
             if key not in self._located:
-                self._located[key] = _locate(opened, path, start_s)
+                self._located[key] = locate(read_segment(opened, start_s)[1], opened.arena)
                 self._forget()
         return self._located[key]
 
@@ -209,26 +233,30 @@ def _clock(opened: OpenTrial) -> tuple[str, ...]:
     return str(opened.trial.fps), str(opened.trial.dt_s), str(id(opened.arena))
 
 
-def _locate(opened: OpenTrial, path: Path, start_s: int) -> Located:
-    trial = opened.trial
-    tracks = read_tracks(path)
-    end_s = start_s + SEGMENT_S
-    check_times(path, tracks, start_s)
-    try:
-        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
-    except InputError as error:
-        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
-    return locate(samples, opened.arena)
+def read_segment(opened: OpenTrial, start_s: int) -> tuple[Tracks, Samples]:
+    """Return a segment on the camera's clock, and on the model's.
 
-
-def check_times(path: Path, tracks: Tracks, start_s: int) -> None:
-    """Refuse a segment whose rows lie outside the minute that its name states.
+    All that is made from tracks is made from this. A sample is taken from the frames of its
+    own segment: a segment then has the same samples in every window.
 
     Raises
     ------
     DamagedError
-        They do.
+        The file is damaged, of another schema, or holds what no tracker writes.
     """
+    trial, path = opened.trial, segment_path(opened.trial.root, start_s)
+    tracks = read_tracks(path)
+    end_s = start_s + SEGMENT_S
+    _check_times(path, tracks, start_s)
+    try:
+        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
+    except InputError as error:
+        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
+    return tracks, samples
+
+
+def _check_times(path: Path, tracks: Tracks, start_s: int) -> None:
+    """Refuse a segment whose rows lie outside the minute that its name states."""
     end_s = start_s + SEGMENT_S
     if len(tracks) and not (tracks.time_s[0] >= start_s and tracks.time_s[-1] < end_s):
         raise DamagedError(

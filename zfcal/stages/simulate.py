@@ -16,20 +16,12 @@ from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
-from zfcal.stages.events import Planned, Tell, UpToDate
+from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
-from zfcal.stages.recording import (
-    TRACKS,
-    Recording,
-    check_same_source,
-    hash_sources,
-    stale_segments,
-    starts_between,
-    write_segments,
-)
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
 from zfcal.stages.segments import segment_path
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 Floats = NDArray[np.float64]
@@ -100,28 +92,20 @@ def simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task | N
                 tell(Planned(path=segment_path(root, start), reason="missing"))
             return
         root = made.root
-    read_trial(root)
-    with at_work(root, "simulate", task):
-        settled(lambda: _simulate(root, options, tell, task=task, new=new), tell)
+    stage = OneThing(name="simulate", item=lambda run: _simulation(run, options, is_new=new))
+    run(stage, root, tell, task=task)
 
 
-def _simulate(root: Path, options: SimulateOptions, tell: Tell, *, task: Task, new: bool) -> None:
-    opened = open_trial(root)
-    if not new:
+def _simulation(run: Run, options: SimulateOptions, *, is_new: bool) -> Item:
+    opened = open_trial(run.root)
+    if not is_new:
         _check_existing(opened, options)
-    lineage = _lineage(opened, options)
-    check_same_source(opened.trial, lineage, task)
+
+    def record() -> Recording:
+        return Recording(tracks=swim(opened, options), end_s=options.duration_s)
+
     starts = starts_between(0.0, options.duration_s)
-    if stale_segments(opened.trial, lineage, starts, task):
-        recording = Recording(
-            tracks=swim(opened, options),
-            end_s=options.duration_s,
-            lineage=lineage,
-        )
-        write_segments(opened.trial, recording, tell, task=task)
-        return
-    for start in starts:
-        tell(UpToDate(path=segment_path(root, start)))
+    return segmented(run, opened.trial, _lineage(opened, options), starts, record)
 
 
 def new_trial(root: Path, options: SimulateOptions) -> NewTrial:

@@ -1,6 +1,7 @@
-"""All tracks of a trial, or of a stretch of it, on the model's clock.
+"""All tracks of a trial, or of a stretch of it, on the camera's clock and on the model's.
 
-For whoever looks at a recording as a whole; windows are read in `segments`.
+For whoever looks at a stretch as a whole. Each segment is read as `segments` reads it, so that
+its samples are those that its statistics were made of.
 """
 
 from __future__ import annotations
@@ -11,13 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from zfcal.artifacts.tables import read_extra, read_tracks
-from zfcal.behaviour.sampling import sample
+from zfcal.behaviour.sampling import sample_range
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import LeftOut, Tell
 from zfcal.stages.opening import OpenTrial
-from zfcal.stages.segments import STEP_S, check_times, segment_path, segment_starts
-from zfcal.tracks import Samples, Tracks, concatenate
-from zfcal.units import SEGMENT_S
+from zfcal.stages.segments import STEP_S, read_segment, segment_files
+from zfcal.tracks import Samples, Tracks, concatenate, joined
 
 NOISE_KEY = "noise_m"
 """Extra metadata of a segment: the source's position noise, where it is known."""
@@ -75,21 +75,22 @@ def read_stretch(opened: OpenTrial, window_s: tuple[int, int] | None, tell: Tell
             f"{root}: has no tracks{where}.",
             hint=f"Import them first: zfcal import SRC {root}",
         )
-    read = [(path, _read_or_tell(opened, path, tell)) for path in files]
-    parts = [tracks for _, tracks in read if tracks is not None]
-    if not parts:
+    found = [_read_or_tell(opened, path, tell) for path in files]
+    read = [segment for segment in found if segment is not None]
+    if not read:
         raise InputError(
             f"{root}: none of {len(files)} segments of tracks can be read.",
             hint="Import the recording again.",
         )
-    tracks = concatenate(parts)
+    tracks = concatenate([rows for _, rows, _ in read])
     _check_rate(opened, tracks)
+    first, stop = _span(opened, tracks, files, window_s)
     return Stretch(
         tracks=tracks,
-        samples=_sample(opened, tracks, files, window_s),
+        samples=joined((samples for _, _, samples in read), first=first, stop=stop),
         files=tuple(files),
-        n_left_out=len(files) - len(parts),
-        noise_m=_noise([path for path, tracks in read if tracks is not None]),
+        n_left_out=len(files) - len(read),
+        noise_m=_noise([path for path, _, _ in read]),
     )
 
 
@@ -109,26 +110,12 @@ def read_tracked(root: Path) -> Tracks:
     return concatenate([read_tracks(path) for path in files])
 
 
-def segment_files(root: Path, window_s: tuple[int, int] | None) -> list[Path]:
-    """Return the segments of a trial that a stretch touches, in order of time."""
-    starts = segment_starts(root)
-    if window_s is not None:
-        starts = [start for start in starts if window_s[0] - STEP_S < start < window_s[1]]
-    return [segment_path(root, start) for start in starts]
-
-
-def _read_or_tell(opened: OpenTrial, path: Path, tell: Tell) -> Tracks | None:
-    trial, start_s = opened.trial, int(path.stem)
+def _read_or_tell(opened: OpenTrial, path: Path, tell: Tell) -> tuple[Path, Tracks, Samples] | None:
     try:
-        tracks = read_tracks(path)
-        check_times(path, tracks, start_s)
-        # For its rules alone: a segment that breaks them is left out, the others stay.
-        sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=start_s + SEGMENT_S)
+        return (path, *read_segment(opened, int(path.stem)))
     except (DamagedError, InputError) as error:
-        said = str(error) if str(path) in str(error) else f"{path}: {error}"
-        tell(LeftOut(path=path, problem=said, hint=error.hint))
+        tell(LeftOut(path=path, problem=str(error), hint=error.hint))
         return None
-    return tracks
 
 
 def _check_rate(opened: OpenTrial, tracks: Tracks) -> None:
@@ -146,22 +133,16 @@ def _check_rate(opened: OpenTrial, tracks: Tracks) -> None:
         )
 
 
-def _sample(
+def _span(
     opened: OpenTrial, tracks: Tracks, files: list[Path], window_s: tuple[int, int] | None
-) -> Samples:
-    trial = opened.trial
-    first_s, end_s = (int(files[0].stem), int(files[-1].stem) + STEP_S)
+) -> tuple[int, int]:
+    """Return the first sample of a stretch, and the one after its last."""
+    first_s, end_s = float(files[0].stem), float(files[-1].stem) + STEP_S
     if len(tracks):
-        end_s = min(end_s, tracks.time_s[-1] + 1 / trial.fps)
+        end_s = min(end_s, tracks.time_s[-1] + 1 / opened.trial.fps)
     if window_s is not None:
         first_s, end_s = max(first_s, window_s[0]), min(end_s, window_s[1])
-    return sample(
-        tracks,
-        fps=trial.fps,
-        dt_s=trial.dt_s,
-        start_s=float(first_s),
-        end_s=max(float(end_s), float(first_s)),
-    )
+    return sample_range(first_s, max(end_s, first_s), dt_s=opened.trial.dt_s)
 
 
 def _noise(files: list[Path]) -> float | None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Frame, Image
 from zfcal.errors import StorageError
-from zfcal.tracks import ROBOT, AgentPose, FramePoses
+from zfcal.tracks import GUESS, ROBOT, AgentPose, FramePoses
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _SHEET_COLUMNS = 4
 _TILE_PX = 320
 _ROOM_PX = 40
 _LEAST_PX = 120
-_SURE, _GUESS = 0.9, 0.5
+_SURE = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +149,7 @@ class Painter:
         if math.isfinite(agent.heading_rad):
             cv2.line(canvas, here, there, colour, 1, cv2.LINE_AA)
         # A guess is a ring, what is known a disc.
-        radius, filled = (6, 1) if agent.confidence < _GUESS else (2, -1)
+        radius, filled = (6, 1) if agent.confidence < GUESS else (2, -1)
         cv2.circle(canvas, here, radius, colour, filled, cv2.LINE_AA)
         name = f"R{agent.agent}" if agent.kind == ROBOT else str(agent.agent)
         place = (here[0] + 6, here[1] - 6)

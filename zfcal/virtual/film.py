@@ -33,7 +33,7 @@ from zfcal.stages.camera.messages import calibration_of
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
 from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.stages.segments import STEP_S, segment_path, segment_starts
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.stages.taken import unless_taken
 from zfcal.tracks import Tracks, concatenate
 from zfcal.trial import second_of

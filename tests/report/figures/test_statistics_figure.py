@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.features.registry import further
+from zfcal.behaviour.features.registry import statistics as statistics_known
+from zfcal.behaviour.histograms import bin_edges
+from zfcal.behaviour.statistics import Statistics, measure, measure_robot
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
 from zfcal.report.figures.statistics import histogram_mean, statistics_picture
@@ -38,12 +41,12 @@ def test_the_mean_of_a_histogram_by_hand():
     """Three at 0.01 and one at 0.19 on bins of 0.02: (3 x 0.01 + 0.19) / 4."""
     counts = np.array([3, 0, 0, 0, 0, 0, 0, 0, 0, 1])
 
-    assert histogram_mean(counts, (0.0, 0.2)) == pytest.approx(0.055)
+    assert histogram_mean(counts, bin_edges((0.0, 0.2))) == pytest.approx(0.055)
 
 
 def test_an_empty_histogram_has_no_mean():
     """Nothing observed is unknown, not zero."""
-    assert np.isnan(histogram_mean(np.zeros(10, dtype=np.int64), (0.0, 0.2)))
+    assert np.isnan(histogram_mean(np.zeros(10, dtype=np.int64), bin_edges((0.0, 0.2))))
 
 
 def test_transition_tables_have_their_numbers(arenas):
@@ -114,14 +117,12 @@ def test_bars_are_shares_of_each_zone(make_view):
 @pytest.mark.parametrize("name", ["two-rooms", "circular", "ring", "own"])
 def test_no_text_covers_another(arenas, wander, covered_texts, name):
     """Long zone names are wrapped or slanted, and numbers have their room."""
-    from zfcal.behaviour.statistics import measure, measure_robot
-
     arena = arenas[name]
-    samples = wander(arena)
+    samples, every = wander(arena), further(statistics_known())
     cases = {
-        "fish": measure(samples.of_kind(0), arena),
-        "model": measure(samples, arena),
-        "robot": measure_robot(samples, arena),
+        "fish": measure(samples.of_kind(0), arena, further=every),
+        "model": measure(samples, arena, further=every),
+        "robot": measure_robot(samples, arena, further=every),
     }
 
     assert covered_texts(statistics_picture(cases, arena, title="Fish and model")) == []

@@ -397,3 +397,56 @@ def test_what_a_round_writes_makes_no_trial_that_was_moved_away(trial, quick):
         with pytest.raises(StorageError, match="cannot be written"):
             write()
     assert not trial.exists()
+
+
+def test_other_features_have_a_score_that_is_not_s(trial, quick, heard):
+    """It stands under a name of its own with what it is of; S in the scores is of the four."""
+    analyse(trial, AnalyseOptions(features=("curvature",)), say_nothing)
+    named = with_settings(quick, features=("D", "W", "O", "T", "curvature"))
+    calibrate(trial, named, heard.append, task=Task(ends_s=frozenset({120})))
+
+    result = read_result(trial / "models" / "000120.toml")
+    table = read_table(trial / "scores" / "000120-model.parquet", "zfcal.scores/1").to_pydict()
+    scores, ceiling = scores_from_rows(table)[120, "model-vs-control"]
+    assert result["score"]["of"] == ["D", "W", "O", "T", "curvature"]
+    assert set(result["score"]["similarities"]) == set(result["score"]["of"])
+    assert (result["S"], result["ceiling"]) == pytest.approx((scores.S, ceiling.of("S")[0]))
+    assert result["score"]["value"] != pytest.approx(result["S"])
+    assert "optimiser_score" in result
+    assert "optimiser_S" not in result
+    lineage = read_lineage(trial / "models" / "000120.toml")
+    assert lineage.options["features"] == ["D", "W", "O", "T", "curvature"]
+
+    path = trial / "models" / "000120.parquet"
+    population, extra = read_table(path, "zfcal.population/1"), read_extra(path)
+    assert set(population.column("S").to_pylist()) == {None}
+    assert extra["features"] == result["score"]["of"]
+    previous = read_previous(path, ("D", "W", "O", "T", "curvature"))
+    assert previous.scores.tolist() == extra["score"]
+    assert np.isnan(read_previous(path).scores).all()
+
+
+def test_a_round_on_other_features_starts_from_any_population(trial, quick, heard):
+    """From one of S it takes the genomes and not the scores."""
+    calibrate(trial, quick, heard.append, task=Task(ends_s=frozenset({120})))
+    path = trial / "models" / "000120.parquet"
+    assert not np.isnan(read_previous(path).scores).any()
+    assert np.isnan(read_previous(path, ("D", "curvature")).scores).all()
+
+
+def test_statistics_without_a_feature_that_is_named_are_left_out(trial, quick, heard):
+    """With the command that counts it; what is there stays."""
+    named = with_settings(quick, features=("D", "residence", "spread"))
+    calibrate(trial, named, heard.append)
+    (first, *_) = [event for event in heard if isinstance(event, LeftOut)]
+    assert "holds no residence, spread" in first.problem
+    assert first.hint == f"Count it first: zfcal analyse {trial} --features residence,spread"
+    assert made_of(heard) == []
+
+
+def test_the_four_by_name_change_nothing(trial, quick, heard):
+    """A model that was made without naming them is up to date."""
+    calibrate(trial, quick, heard.append)
+    heard.clear()
+    calibrate(trial, with_settings(quick, features=("T", "W", "O", "D")), heard.append)
+    assert made_of(heard) == []

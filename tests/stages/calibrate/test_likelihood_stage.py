@@ -10,6 +10,8 @@ import pytest
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_model, read_model_for, read_result
 from zfcal.artifacts.tables import read_tracks, write_tracks
+from zfcal.diagnose.case import open_case
+from zfcal.diagnose.question import Question
 from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import to_genes
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
@@ -17,6 +19,7 @@ from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.events import LeftOut, Note, say_nothing
 from zfcal.stages.opening import open_trial
+from zfcal.stages.stretch import read_stretch
 
 
 def swim(root, seed=5):
@@ -47,6 +50,37 @@ def test_the_estimate_of_a_window_is_near_the_truth(make_trial):
     part = found.table["parameters"]["centre.kappa_0"]
     assert part["low"] < part["value"] < part["high"]
     assert part["identified"]
+
+
+def test_the_estimate_is_the_base_of_a_diagnosis_of_the_same_minutes(make_trial):
+    """Where the base lies within a genome, the same numbers to a tenth of an interval."""
+    opened, model = swim(make_trial())
+    question = Question(
+        samples=read_stretch(opened, (0, 240), say_nothing).samples,
+        arena=opened.arena,
+        model=model,
+        noise_m=None,
+        noise_source="",
+        n_null=1,
+        quick=True,
+        seed=1,
+        n_workers=1,
+    )
+
+    found = estimate(opened, model, (0, 240), say_nothing).found
+    base = open_case(question).screen.fitted
+
+    assert found.n_steps == base.used.sum()
+    compared = 0
+    for ours, theirs, x in zip(found.parameters.zones, base.parameters.zones, base.x, strict=True):
+        if not (x[:3] < 1).all() or ours.name not in found.lapse:
+            continue
+        compared += 1
+        assert found.lapse[ours.name] == pytest.approx(x[-1], abs=2e-3)
+        for key in ("kappa_0", "kappa_f", "alpha"):
+            low, high = found.interval[f"{ours.name}.{key}"]
+            assert getattr(ours, key) == pytest.approx(getattr(theirs, key), abs=(high - low) / 10)
+    assert compared > 0
 
 
 def test_uncertain_positions_make_no_steps(make_trial):
@@ -98,6 +132,7 @@ def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full)
     inputs = read_lineage(model).inputs
     assert {"tracks/000060.parquet", "tracks/000120.parquet"} <= set(inputs)
     assert "tracks/000000.parquet" not in inputs
+    assert "guesses" not in read_lineage(model).options
 
 
 @pytest.mark.slow

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 
 _PLACES = 12
 _POINTS = 2000
 _ROUNDS = 30
-
-Floats = NDArray[np.float64]
 
 
 def places(arena: Arena, n: int = _PLACES) -> tuple[tuple[float, float], ...]:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.hooks import (
     call_component,
@@ -16,9 +17,6 @@ from zfcal.model.kernels.hooks import (
     call_speed,
 )
 from zfcal.model.kernels.world import Packed
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _HARDLY = 1e-6
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, lean
 from zfcal.model.kernels.crowd_cells import CLOSE_M, Crowd, in_ring, look_near, sort, weigh_rings
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
@@ -50,8 +50,6 @@ from zfcal.model.kernels.world import (
     Y,
     settle,
 )
-
-Floats = NDArray[np.float64]
 
 
 @inlined

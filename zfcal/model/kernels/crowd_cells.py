@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.perception import (
@@ -41,9 +41,6 @@ _GROWTH = 1.4
 
 _SHRINK = 1.0 - 1e-9
 """Takes rounding off a distance that is used as a lower bound."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Crowd(NamedTuple):

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.crowd import advance_crowd
 from zfcal.model.kernels.crowd_cells import make_crowd
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.pairs import Pairs, add_pairs, bin_of, make_pairs
 from zfcal.model.kernels.random import seeded
-from zfcal.model.kernels.run import Counts, Floats, Random, count_step, start
+from zfcal.model.kernels.run import Counts, Random, count_step, start
 from zfcal.model.kernels.world import (
     GRID,
     HX,

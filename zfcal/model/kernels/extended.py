@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.bells import exponential, one_over_integral
 from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.likelihood import PER_CELL
-
-Floats = NDArray[np.float64]
+from zfcal.model.kernels.landing import PER_CELL
 
 # Columns of the sums at the taken heading and over the landing zones.
 BASE, BASE_SLOPE, SOCIAL, SOCIAL_SLOPE, EXTRA, COLUMNS = range(6)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.rooms import Rooms
 
@@ -25,8 +26,6 @@ ON_WALL_M = 1e-9
 
 _TOUCH_M = 1e-12
 """A point so near to the wall is on it, hence inside; rounding is far smaller."""
-
-Floats = NDArray[np.float64]
 
 
 class Tank(NamedTuple):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel, lean
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_speed
@@ -42,7 +43,6 @@ PATIENCE = 12
 """Draws from the mixture before its law is bounded in sectors, which costs as much as twenty."""
 REDRAWS = 50
 
-Floats = NDArray[np.float64]
 Random = NDArray[np.uint64]
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation
 from zfcal.model.kernels.perception import Sight
@@ -22,8 +20,6 @@ from zfcal.model.kernels.world import (
     sight_row,
     splits,
 )
-
-Floats = NDArray[np.float64]
 
 
 @inlined

@@ -8,13 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.heading import draw_move
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.world import Packed, Work
-
-Floats = NDArray[np.float64]
 
 
 @kernel

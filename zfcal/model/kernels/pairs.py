@@ -11,17 +11,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.world import ZONE, X, Y
 
 _BINS = 10
 _PER_STRIP = 8
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Pairs(NamedTuple):

@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel, lean
 
 LENGTH_M = 0.02
@@ -28,8 +28,6 @@ _SERIES_LIMIT = 0.1
 _NOWHERE_M = 1e-100
 _INSIDE = 1e100
 """In place of a tangent: the observer's head is in, or right at, the other's body."""
-
-Floats = NDArray[np.float64]
 
 
 class Sight(NamedTuple):

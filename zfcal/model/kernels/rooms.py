@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 
 _LEAST_SHARE = 0.05
 """A part with less of the tank's area is a corner, not a room."""
@@ -25,8 +26,6 @@ _MERGE_M = 1e-6
 
 _SQUARE = 16
 """Cells of the grid along a side of those squares that are looked at as a whole."""
-
-Floats = NDArray[np.float64]
 
 
 class Rooms(NamedTuple):

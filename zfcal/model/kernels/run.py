@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel, lean
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.heading import apply_move, draw_move
@@ -39,8 +40,6 @@ from zfcal.model.kernels.world import (
     splits,
 )
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Random = NDArray[np.uint64]
 
 

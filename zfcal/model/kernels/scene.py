@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import make_sight, see
@@ -31,9 +31,6 @@ from zfcal.model.kernels.world import (
     remember,
     settle,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @kernel

@@ -7,11 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.bells import one_over_integral
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.extended import bell, make_cells
-
-Floats = NDArray[np.float64]
 
 
 @kernel

@@ -16,6 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.bells import LEAST, exponential, one_over_integral
 from zfcal.model.kernels.compiled import inlined, lean
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
@@ -44,8 +45,6 @@ _HALF_RAD = math.pi / SECTORS
 _COS, _SIN = math.cos(_HALF_RAD), math.sin(_HALF_RAD)
 _ABOVE = 1.0 + 1e-4
 """Takes the error of the exponential off an upper bound."""
-
-Floats = NDArray[np.float64]
 
 
 @inlined

@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.random import next_word, sine, uniform
 
@@ -27,8 +28,6 @@ SCALE_AT = STEPS + 1
 """Behind TAKE: one over the integral of ``exp(kappa (cos t - 1))`` over the circle."""
 
 _TO_UNIT = 1.0 / (1 << 53)
-
-Floats = NDArray[np.float64]
 
 
 @kernel

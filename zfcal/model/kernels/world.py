@@ -8,14 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.hooks import call_sight
 from zfcal.model.kernels.perception import Sight, in_vectors, see, see_first
 from zfcal.model.kernels.random import uniform
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Rows of the state, each with a number per agent; what effects may ask stands below.
 X, Y, HX, HY, SPEED, ZONE, WALL, TAU_X, TAU_Y, TIME, CLEAR = range(11)

@@ -1,8 +1,8 @@
-"""What the animals did beside what the calibrated model does: D, W, O and T."""
+"""What the animals did beside what the calibrated model does, statistic by statistic."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -14,13 +14,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.behaviour.histograms import bin_edges, frequencies, similarity
+from zfcal.behaviour.features.registry import statistics
+from zfcal.behaviour.features.statistic import Statistic
+from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
 
 Floats = NDArray[np.float64]
-Limits = tuple[float, float]
 
 FISH_CASE = "fish"
 MODEL_CASE = "model"
@@ -42,20 +43,23 @@ class _Histogram:
     Parameters
     ----------
     counts
-        Ten counts for each case.
-    limits
-        Range of the bins.
+        Counts of each bin, for each case.
+    edges
+        Edges of the bins.
     axis
         Label of the x axis.
+    statistic
+        What is counted; says how two cases are compared.
     """
 
     counts: Mapping[str, NDArray[np.int64]]
-    limits: Limits
+    edges: Floats
     axis: str
+    statistic: Statistic
 
 
 def statistics_picture(cases: Mapping[str, Statistics], arena: Arena, *, title: str) -> Picture:
-    """Return the picture of all scored statistics, the cases over each other.
+    """Return the picture of all statistics that are drawn, the cases over each other.
 
     Parameters
     ----------
@@ -66,29 +70,55 @@ def statistics_picture(cases: Mapping[str, Statistics], arena: Arena, *, title: 
     title
         Of which window the statistics are.
     """
-    colours = theme.zone_colours(arena.zone_names)
-    panels: list[Panel] = []
-    for index, zone in enumerate(arena.zone_names):
-        counts = {case: stats.distance[index] for case, stats in cases.items()}
-        shown = _Histogram(counts=counts, limits=arena.bins.distance_m, axis="distance (m)")
-        panels.append(_histogram(f"Between two fish, {zone}", shown, colours[zone]))
-    for index, zone in enumerate(arena.zone_names):
-        counts = {case: stats.wall[index] for case, stats in cases.items()}
-        shown = _Histogram(
-            counts=counts, limits=arena.bins.wall_distance_m, axis="distance to the wall (m)"
-        )
-        panels.append(_histogram(f"To the wall, {zone}", shown, colours[zone]))
-    panels.append(_occupation(cases, arena.zone_names))
-    panels.extend(_transitions(case, stats) for case, stats in cases.items())
+    shown = [statistic for statistic in statistics().values() if statistic.drawn]
     return Picture(
         name="statistics",
         title=title,
         short="Statistics",
-        panels=panels,
+        panels=[panel for statistic in shown for panel in _panels(statistic, cases, arena)],
         key=tuple(_entry(case) for case in cases),
         columns=len(arena.zone_names) if 1 < len(arena.zone_names) < _MANY_ZONES else 3,
         note=_note(cases),
     )
+
+
+def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena) -> Iterator[Panel]:
+    """Yield the panels of one statistic."""
+    # What another version has counted in other bins is not laid over these.
+    counts = {
+        case: stats.of(statistic.name)
+        for case, stats in cases.items()
+        if statistic.name in stats.names
+        and stats.of(statistic.name).shape == statistic.shape(arena)
+    }
+    if FISH_CASE not in counts:
+        return
+    if statistic.form == "zones":
+        yield _occupation(statistic, counts, arena.zone_names)
+    elif statistic.form == "table":
+        for case, table in counts.items():
+            yield _transitions(statistic, case, table, zones=arena.zone_names)
+    else:
+        yield from _histograms(statistic, counts, arena)
+
+
+def _histograms(
+    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], arena: Arena
+) -> Iterator[Panel]:
+    colours = theme.zone_colours(arena.zone_names)
+    edges = statistic.edges_in(arena)
+    unit = f" ({statistic.unit})" if statistic.unit else ""
+    for row, zone in enumerate(arena.zone_names if statistic.per_zone else (None,)):
+        shown = _Histogram(
+            counts={case: table[row] for case, table in counts.items()},
+            edges=edges,
+            axis=f"{statistic.axis}{unit}",
+            statistic=statistic,
+        )
+        if zone is None:
+            yield _histogram(statistic.title, shown, theme.INK)
+        else:
+            yield _histogram(f"{statistic.title}, {zone}", shown, colours[zone])
 
 
 def _note(cases: Mapping[str, Statistics]) -> str:
@@ -116,44 +146,59 @@ def _entry(case: str) -> Entry:
 
 
 def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
+    unit = shown.statistic.unit
     means = "; ".join(
-        f"{case} mean {mean:.3f} m"
+        f"{case} mean {mean:.3f} {unit}".rstrip()
         for case, counts in shown.counts.items()
-        if not np.isnan(mean := histogram_mean(counts, shown.limits))
+        if not np.isnan(mean := histogram_mean(counts, shown.edges))
     )
+    draw = partial(_draw_histogram, shown=shown)
+    if shown.statistic.draw is not None:
+        draw = partial(_draw_as_told, shown=shown)
     return Panel(
         title=title,
         alt=f"Histogram, {title.lower()}: {means or 'no observation'}.",
-        draw=partial(_draw_histogram, shown=shown),
+        draw=draw,
         colour=colour,
     )
 
 
-def histogram_mean(counts: NDArray[np.int64], limits: Limits) -> float:
-    """Return the mean that a histogram of ten bins tells, from their centres.
+def histogram_mean(counts: NDArray[np.int64], edges: Floats) -> float:
+    """Return the mean that a histogram tells, from the centres of its bins.
 
     Parameters
     ----------
-    counts : ndarray, shape (10,)
-    limits
-        Range of the bins; what lies beyond counts as in the last one.
+    counts : ndarray, shape (bin,)
+    edges : ndarray, shape (bin + 1,)
+        What lies beyond the last counts as in the last bin.
 
     Returns
     -------
     float
-        In the unit of the limits; NaN without a count.
+        In the unit of the edges; NaN without a count.
     """
     total = counts.sum()
-    return float(counts @ _centres(limits) / total) if total else float("nan")
+    return float(counts @ _centres(edges) / total) if total else float("nan")
 
 
-def _centres(limits: Limits) -> Floats:
-    edges = bin_edges(limits)
+def _centres(edges: Floats) -> Floats:
     return (edges[1:] + edges[:-1]) / 2
 
 
+def _draw_as_told(axes: Axes, *, shown: _Histogram) -> None:
+    """Leave it to the statistic, and say how alike the cases are."""
+    if shown.statistic.draw is not None:
+        shown.statistic.draw(axes, shown.counts)
+    axes.set(xlabel=shown.axis)
+    _remark(axes, shown.counts, shown.statistic)
+
+
 def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
-    edges, centres = bin_edges(shown.limits), _centres(shown.limits)
+    widths = np.diff(shown.edges)
+    is_even = bool(np.allclose(widths, widths[0]))
+    # Bins of unequal width are drawn side by side: to scale the small ones could not be seen.
+    edges = shown.edges if is_even else np.arange(len(shown.edges), dtype=np.float64)
+    centres = _centres(edges)
     top = 0.0
     for case, counts in shown.counts.items():
         share = frequencies(counts)
@@ -167,12 +212,16 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
             style = "-" if case == MODEL_CASE else ":"
             marker = theme.MARKER_OF[COLOURS[case]]
             axes.plot(centres, share, color=COLOURS[case], ls=style, marker=marker)
-    axes.set(xlabel=shown.axis, ylabel="share", xlim=shown.limits, ylim=(0, top * 1.22 or 1))
-    axes.xaxis.set_major_locator(MaxNLocator(5))
-    _remark(axes, shown.counts)
+    limits = (float(edges[0]), float(edges[-1]))
+    axes.set(xlabel=shown.axis, ylabel="share", xlim=limits, ylim=(0, top * 1.22 or 1))
+    if is_even:
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+    else:
+        axes.set_xticks(edges[::2], [f"{edge:g}" for edge in shown.edges[::2]])
+    _remark(axes, shown.counts, shown.statistic)
 
 
-def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]]) -> None:
+def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]], statistic: Statistic) -> None:
     """Write how alike fish and model are, or who was never seen here."""
     empty = [case for case, values in counts.items() if not values.sum()]
     text = ""
@@ -181,33 +230,43 @@ def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]]) -> None:
     elif empty:
         text = "none seen: " + ", ".join(empty)
     elif {FISH_CASE, MODEL_CASE} <= counts.keys():
-        text = f"similarity {float(similarity(counts[FISH_CASE], counts[MODEL_CASE])):.2f}"
+        alike = float(statistic.compare(counts[FISH_CASE], counts[MODEL_CASE]))
+        text = f"similarity {alike:.2f}"
     axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
 
 
-def _occupation(cases: Mapping[str, Statistics], zones: Sequence[str]) -> Panel:
-    shares = {case: frequencies(stats.occupation) for case, stats in cases.items()}
+def _occupation(
+    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], zones: Sequence[str]
+) -> Panel:
+    shares = {case: frequencies(values) for case, values in counts.items()}
     said = "; ".join(
         f"{case} " + ", ".join(f"{zone} {s:.0%}" for zone, s in zip(zones, share, strict=True))
         for case, share in shares.items()
         if not np.isnan(share).any()
     )
     return Panel(
-        title="Share of time in each zone",
-        alt=f"Bars of the share of time in each zone: {said or 'no observation'}.",
-        draw=partial(_draw_occupation, cases=cases, zones=zones),
+        title=statistic.title,
+        alt=f"Bars of the {statistic.title[0].lower()}{statistic.title[1:]}: "
+        f"{said or 'no observation'}.",
+        draw=partial(_draw_occupation, statistic=statistic, counts=counts, zones=zones),
     )
 
 
-def _draw_occupation(axes: Axes, *, cases: Mapping[str, Statistics], zones: Sequence[str]) -> None:
+def _draw_occupation(
+    axes: Axes,
+    *,
+    statistic: Statistic,
+    counts: Mapping[str, NDArray[np.int64]],
+    zones: Sequence[str],
+) -> None:
     at = np.arange(len(zones))
-    width = 0.8 / len(cases)
+    width = 0.8 / len(counts)
     hatches = {ROBOT_CASE: "....", MODEL_CASE: "////"}
     top = 0.0
-    for index, (case, stats) in enumerate(cases.items()):
-        share = 100 * np.nan_to_num(frequencies(stats.occupation))
+    for index, (case, values) in enumerate(counts.items()):
+        share = 100 * np.nan_to_num(frequencies(values))
         top = max(top, float(share.max()))
-        x = at + (index - (len(cases) - 1) / 2) * width
+        x = at + (index - (len(counts) - 1) / 2) * width
         bars = axes.bar(x, share, width=0.92 * width, color=COLOURS[case], alpha=0.45, lw=0)
         if case in hatches:
             for bar in bars:
@@ -223,17 +282,18 @@ def _draw_occupation(axes: Axes, *, cases: Mapping[str, Statistics], zones: Sequ
         label.set(color=colours[zone], fontweight="bold")
     axes.set(ylabel="% of the time", ylim=(0, top * 1.22 or 1))
     axes.grid(visible=False, axis="x")
-    _remark(axes, {case: stats.occupation for case, stats in cases.items()})
+    _remark(axes, counts, statistic)
 
 
-def _transitions(case: str, stats: Statistics) -> Panel:
-    zones = stats.zone_names
-    share = frequencies(stats.transition)
+def _transitions(
+    statistic: Statistic, case: str, counts: NDArray[np.int64], *, zones: Sequence[str]
+) -> Panel:
+    share = frequencies(counts)
     stays = ", ".join(
         f"{zone} {share[z, z]:.0%}" for z, zone in enumerate(zones) if not np.isnan(share[z, z])
     )
     return Panel(
-        title=f"Transitions in one step, {case}",
+        title=f"{statistic.title}, {case}",
         alt=f"Table of transitions of the {case} between zones; stays: {stays or 'none seen'}.",
         draw=partial(_draw_transitions, share=share, zones=zones),
         size_in=(PANEL_IN[0], max(PANEL_IN[1], 0.5 * len(zones) + 1.1)),

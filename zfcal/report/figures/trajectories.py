@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from zfcal.arena import Arena
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls
-from zfcal.tracks import KINDS, ROBOT, Tracks
+from zfcal.tracks import GUESS, KINDS, ROBOT, Tracks
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,6 @@ _WIDTH_IN = 4.6
 _TIMES_IN = 3.4
 _MOST_NAMED = 25
 _FISH = ("#0072b2", "#56b4e9", "#009e73", "#e6a817", "#cc79a7", "#7d2a35")
-_GUESS = 0.5
 
 
 def draw_trajectories(arena: Arena, tracks: Tracks, path: Path) -> None:
@@ -54,7 +53,7 @@ def _draw_plan(axes: Axes, arena: Arena, tracks: Tracks) -> None:
         pieces = [np.column_stack([own.x_m, own.y_m])[part] for part in unbroken(own.frame)]
         colour = _colour(own)
         axes.add_collection(LineCollection(pieces, colors=colour, linewidths=0.7, zorder=2))
-        unsure = own.confidence < _GUESS
+        unsure = own.confidence < GUESS
         axes.plot(own.x_m[unsure], own.y_m[unsure], ".", color=colour, markersize=2, zorder=3)
     first_s, end_s = _stretch(tracks)
     axes.set_title(f"Paths, {first_s:.0f} to {end_s:.0f} s; dots are guesses")

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import add
 from pathlib import Path
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON
 from zfcal.behaviour.legacy import LegacyStatistics, measure_legacy
+from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.pooling import Pool
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.errors import InputError
 from zfcal.stages.events import Tell
 from zfcal.stages.opening import OpenTrial
-from zfcal.stages.segments import Segments, segment_hashes, segment_path
+from zfcal.stages.segments import STEP_S, Segments, segment_hashes, segment_path
 from zfcal.stages.windows import whole_segments
 
 
@@ -46,6 +51,7 @@ class ControlGroup:
     parts: tuple[tuple[OpenTrial, tuple[int, ...]], ...]
     segments: Segments
     _legacy: dict[float, LegacyStatistics] = field(default_factory=dict)
+    _further: dict[tuple[str, ...], dict[str, NDArray[np.int64]]] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -93,6 +99,37 @@ class ControlGroup:
             parts=tuple(parts),
             segments=segments,
         )
+
+    def with_further(self, names: tuple[str, ...]) -> Statistics:
+        """Return what they did with further statistics, of windows that follow each other.
+
+        A segment that has no neighbour to make a window with counts for D, W, O, T and V alone.
+
+        Raises
+        ------
+        InputError
+            There is no whole window.
+        """
+        if names and names not in self._further:
+            windows = [window for part in self.parts for window in self._windows(*part)]
+            if not windows:
+                raise InputError(
+                    f"The control group has no whole window for {', '.join(names)}.",
+                    hint="These are counted in windows of 120 s.",
+                )
+            counts = [measure(points, points.arena, further=names).further for points in windows]
+            self._further[names] = {
+                name: np.sum([one[name] for one in counts], axis=0) for name in names
+            }
+        return replace(self.statistics, further=self._further[names] if names else {})
+
+    def _windows(self, opened: OpenTrial, starts: tuple[int, ...]) -> Iterator[Located]:
+        """Yield where the fish were in each window, none overlapping the one before."""
+        known, done_s = set(starts), 0
+        for start in starts:
+            if start >= done_s and start + STEP_S in known:
+                done_s = start + 2 * STEP_S
+                yield join([self.segments.read(opened, s) for s in (start, start + STEP_S)])
 
     def legacy(self, extent_m: float) -> LegacyStatistics:
         """Return what they did as the authors' scripts count it, pooled."""

@@ -37,6 +37,8 @@ class Window:
         Whether a robot is in the tank.
     control
         The control group; None for the fish of the window itself.
+    further
+        Statistics to count beside D, W, O, T and V.
     """
 
     end_s: int
@@ -44,6 +46,7 @@ class Window:
     pool: Pool | None
     has_robot: bool
     control: ControlGroup | None = None
+    further: tuple[str, ...] = ()
 
     @property
     def is_social(self) -> bool:
@@ -53,15 +56,16 @@ class Window:
     @cached_property
     def cases(self) -> dict[str, Statistics]:
         """The statistics by case: control, and social and robot as there are."""
-        arena = self.points.arena
+        arena, further = self.points.arena, self.further
         if self.control is None:
-            cases = {"control": measure(self.points.of_kind(FISH), arena)}
+            fish = self.points.of_kind(FISH)
+            cases = {"control": measure(fish, arena, further=further)}
         else:
-            cases = {"control": self.control.statistics}
+            cases = {"control": self.control.with_further(further)}
         if self.is_social:
-            cases["social"] = measure(self.points, arena)
+            cases["social"] = measure(self.points, arena, further=further)
         if self.has_robot:
-            cases["robot"] = measure_robot(self.points, arena)
+            cases["robot"] = measure_robot(self.points, arena, further=further)
         return cases
 
 

@@ -7,86 +7,76 @@ run over all windows and the online run on the newest one are the same code.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import final
 
-from zfcal.artifacts.atomic import check_free, discard
-from zfcal.artifacts.freshness import hash_inputs, stale_reason
+from zfcal.artifacts.atomic import discard
+from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.places import is_regular
-from zfcal.artifacts.settings import read_trial
+from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.objective import Group, SeedSource, Simulator
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.calibrate.likelihood import estimate, track_files
+from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import (
     MODEL,
+    Found,
     RoundPlaces,
     checkpoint_key,
     read_control,
     read_previous,
-    result_table,
-    summary_of,
-    write_round,
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
-from zfcal.stages.events import (
-    LeftOut,
-    Made,
-    Note,
-    Planned,
-    Progress,
-    Result,
-    Tell,
-    UpToDate,
-    say_nothing,
-)
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.segments import readable
-from zfcal.stages.settled import Items
+from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.skipping import skipped_path, without_skipped
-from zfcal.stages.taken import unless_taken
+from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
 from zfcal.stages.windows import LENGTH_S
 
 _INSTANT_S = 0.001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
+class _Window:
+    """A window to calibrate, and the one before it."""
+
+    places: RoundPlaces
+    before: _Window | None
+
+    @property
+    def previous(self) -> Path | None:
+        """The population from which its round starts: the last one that is there."""
+        window = self.before
+        while window is not None and not is_regular(window.places.population):
+            window = window.before
+        return None if window is None else window.places.population
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Shared:
     """All that the rounds of one run share."""
 
+    run: Run
     opened: OpenTrial
     options: CalibrateOptions
-    task: Task
-    tell: Tell
     group: Simulator
 
     @property
     def root(self) -> Path:
-        return self.opened.trial.root
+        return self.run.root
 
     @property
     def seed(self) -> int:
         asked = self.options.seed
         return self.opened.trial.seed if asked is None else asked
-
-    def lineage(self, places: RoundPlaces, previous: Path | None, generations: int) -> Lineage:
-        trial = self.opened.trial
-        files = [places.stats, self.root / trial.model, *self.opened.arena_files]
-        files += [previous] if previous is not None else []
-        if self.options.seed_likelihood:
-            # One that is no file is no input: it is told where the estimate is made.
-            files += readable(track_files(self.root, window_span(places.end_s)), say_nothing)
-        options = calibrate_options(self.opened, self.options, generations=generations)
-        inputs = hash_inputs(self.root, files)
-        return Lineage(
-            schema=MODEL, command="calibrate", options=options, seed=self.seed, inputs=inputs
-        )
 
 
 def calibrate_options(
@@ -129,32 +119,52 @@ def calibrate(
         calibrate is at work on the trial. Damaged statistics are left out and
         told instead.
     """
-    task = task or Task()
+    run(Calibrate(options=options), root, tell, task=task)
 
-    def open_run() -> _Run:
-        opened = open_trial(root)
-        group = make_group(opened, options)
-        return _Run(opened=opened, options=options, task=task, tell=tell, group=group)
 
-    # First: where there is no trial no lock is to lie.
-    read_trial(root)
-    with at_work(root, "calibrate", task):
-        items = Items(open_run, tell)
-        ends = _ends(items.run)
-        previous: Path | None = None
-        planned = False
-        for number, end in enumerate(ends):
-            tell(Progress(stage="rounds", done=number, total=len(ends)))
-            places = RoundPlaces(root=root, end_s=end)
-            if task.wants(end) or not is_regular(places.population):
-                work = partial(_make_round, places=places, previous=previous, shaken=planned)
-                found = items.make(places.model, work)
-                if found is None:
-                    # Later rounds would start from another one than the next run's.
-                    return
-                planned |= found
-            previous = places.population if is_regular(places.population) else previous
-        tell(Progress(stage="rounds", done=len(ends), total=len(ends)))
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibrate(Stage[_Shared, _Window]):
+    """A round for each window that has statistics; each starts from the one before.
+
+    Parameters
+    ----------
+    options
+        How to calibrate.
+    """
+
+    name = "calibrate"
+    counted = "rounds"
+    is_chain = True
+
+    options: CalibrateOptions = field(default_factory=CalibrateOptions)
+
+    def open(self, run: Run) -> _Shared:
+        """Read the trial and its starting model."""
+        opened = open_trial(run.root)
+        group = make_group(opened, self.options)
+        return _Shared(run=run, opened=opened, options=self.options, group=group)
+
+    def items(self, shared: _Shared) -> list[_Window]:
+        """Return the windows up to the last one that is asked for."""
+        windows: list[_Window] = []
+        for end in _ends(shared.run):
+            places = RoundPlaces(root=shared.root, end_s=end)
+            windows.append(_Window(places=places, before=windows[-1] if windows else None))
+        shared.run.tell(Progress(stage=self.counted, done=0, total=len(windows)))
+        return windows
+
+    def place(self, shared: _Shared, key: _Window) -> Path:  # noqa: ARG002 - the protocol's
+        """Return the champion."""
+        return key.places.model
+
+    def item(self, shared: _Shared, key: _Window) -> Item | None:
+        """Return a round; one before those asked for is made only where there is none."""
+        places = key.places
+        if not shared.run.task.wants(places.end_s) and is_regular(places.population):
+            return None
+        control = _control_or_tell(shared, places)
+        return None if control is None else _round(shared, key, control)
 
 
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
@@ -176,7 +186,7 @@ def window_span(end_s: int) -> tuple[int, int]:
     return end_s - LENGTH_S, end_s
 
 
-def _ends(run: _Run) -> list[int]:
+def _ends(run: Run) -> list[int]:
     places = {path: end for end, path in numbered_of(run.root / "stats", ".parquet").items()}
     ends = [places[path] for path in readable(places, run.tell)]
     if not ends and run.task.ends_s is None:
@@ -190,103 +200,107 @@ def _ends(run: _Run) -> list[int]:
     return without_skipped(run.root, ends, run.task, run.tell)
 
 
-def _make_round(run: _Run, places: RoundPlaces, previous: Path | None, *, shaken: bool) -> bool:
-    """Make one round's files if they are missing or stale.
+def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
+    """Return a round: population, scores and champion; the model is last."""
+    places, previous = window.places, window.previous
+    lineage = _lineage(shared, places, previous)
+    # A dry run that makes the round before makes this one too, whatever the hashes say now.
+    otherwise = "the round before it is made again" if shared.run.planned else None
+    outputs = [
+        Output(
+            path=path,
+            lineage=replace(lineage, schema=schema),
+            ignore=shared.options.not_asked,
+            otherwise=otherwise,
+        )
+        for path, schema in places.artifacts
+    ]
 
-    Returns whether a dry run plans to make them; ``shaken`` says that it plans to
-    make the round before, whatever the hashes say now.
-    """
-    control = _control_or_tell(run, places)
-    if control is None:
-        return False
-    expected = run.lineage(places, previous, run.options.generations_asked)
-    reason = _reason(run, places, expected, shaken=shaken)
-    if reason is None:
-        return False
-    if _taken(run, places):
-        return False
-    if run.task.dry_run:
-        for path, _ in places.artifacts:
-            run.tell(Planned(path=path, reason=reason))
-        return True
-    estimated = None
-    options = run.options
-    began_s = time.monotonic()
+    def compute() -> Iterator[Draft]:
+        found = _search(shared, places, control, previous, key=checkpoint_key(lineage))
+        # First, so that no window is ever both passed over and calibrated.
+        discard(skipped_path(shared.root, places.end_s))
+        for output, write in zip(outputs, found.writers(places, shared.seed), strict=True):
+            yield Draft(
+                output=output.with_options(generations=found.result.generations), write=write
+            )
+        discard(places.checkpoint)
+
+    return Item(outputs=outputs, compute=compute)
+
+
+def _lineage(shared: _Shared, places: RoundPlaces, previous: Path | None) -> Lineage:
+    opened, options = shared.opened, shared.options
+    files = [places.stats, shared.root / opened.trial.model, *opened.arena_files]
+    files += [previous] if previous is not None else []
+    said = calibrate_options(opened, options, generations=options.generations_asked)
     if options.seed_likelihood:
-        template = run.group.template
-        estimated = estimate(run.opened, template, window_span(places.end_s), run.tell)
+        # One that is no file is no input: it is told where the estimate is made.
+        tracks = readable(segment_files(shared.root, window_span(places.end_s)), say_nothing)
+        said |= guess_options(tracks)
+        files += tracks
+    return shared.run.lineage(MODEL, files, options=said, seed=shared.seed)
+
+
+def _search(
+    shared: _Shared,
+    places: RoundPlaces,
+    control: Statistics,
+    previous: Path | None,
+    *,
+    key: str,
+) -> Found:
+    """Search for the model of a window, and go on from a checkpoint where there is one."""
+    options, tell = shared.options, shared.run.tell
+    began_s = time.monotonic()
+    estimated = None
+    if options.seed_likelihood:
+        template = shared.group.template
+        estimated = estimate(shared.opened, template, window_span(places.end_s), tell)
     round_task = RoundTask(
-        group=run.group,
+        group=shared.group,
         control=control,
         guests=None if estimated is None else estimated.genes,
-        seeds=SeedSource(trial_seed=run.seed, window_end_s=places.end_s),
-        previous=None if previous is None else read_previous(previous),
+        seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
+        previous=None if previous is None else read_previous(previous, options.settings.features),
     )
-    key = checkpoint_key(expected)
     if options.budget_s is not None:
         # The estimate is a part of the round.
         left_s = options.budget_s - (time.monotonic() - began_s)
         options = replace(options, budget_s=max(left_s, _INSTANT_S))
-    result = run_search(round_task, options, places.checkpoint, run.tell, key=key)
-    made = run.lineage(places, previous, result.generations)
-    lineages = {schema: replace(made, schema=schema) for _, schema in places.artifacts}
-    baselines = baseline_scores(round_task, run.options, result)
-    likelihood = None if estimated is None else estimated.table
-    # First, so that no window is ever both passed over and calibrated.
-    discard(skipped_path(run.root, places.end_s))
-    write_round(places, result, lineages, result_table(result, baselines, likelihood))
-    discard(places.checkpoint)
-    for path, _ in places.artifacts:
-        run.tell(Made(path=path, reason=reason))
-    value = {"path": str(places.model), "window_end_s": places.end_s, "seed": run.seed}
-    run.tell(Result(value={**value, **summary_of(result, baselines)}))
-    return False
+    result = run_search(round_task, options, places.checkpoint, tell, key=key)
+    return Found(
+        result=result,
+        baselines=baseline_scores(round_task, options, result),
+        likelihood=None if estimated is None else estimated.table,
+    )
 
 
-def _taken(run: _Run, places: RoundPlaces) -> bool:
-    """Return whether a folder stands where one of a round's files is to go, which is told."""
-    for path, _ in places.artifacts:
-        with unless_taken(path, run.tell):
-            check_free(path)
-            continue
-        return True
-    return False
-
-
-def _control_or_tell(run: _Run, places: RoundPlaces) -> Statistics | None:
+def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:
     try:
-        control = read_control(places.stats, run.opened.arena.zone_names)
+        control = read_control(places.stats, shared.opened.arena.zone_names)
     except (DamagedError, InputError) as error:
-        run.tell(LeftOut(path=places.stats, problem=str(error), hint=error.hint))
+        shared.run.tell(LeftOut(path=places.stats, problem=str(error), hint=error.hint))
         return None
     if not control.occupation.sum():
         problem = f"{places.stats}: the window holds no position of a fish inside the arena."
-        run.tell(LeftOut(path=places.stats, problem=problem, damaged=False))
+        shared.run.tell(LeftOut(path=places.stats, problem=problem, damaged=False))
         return None
-    _warn_if_stale(run, places)
+    missing = set(shared.options.settings.features) - set(control.names)
+    if missing:
+        names = ",".join(further(shared.options.settings.features))
+        problem = f"{places.stats}: holds no {', '.join(sorted(missing))}."
+        hint = f"Count it first: zfcal analyse {shared.root} --features {names}"
+        shared.run.tell(LeftOut(path=places.stats, problem=problem, hint=hint, damaged=False))
+        return None
+    _warn_if_stale(shared, places)
     return control
 
 
-def _warn_if_stale(run: _Run, places: RoundPlaces) -> None:
+def _warn_if_stale(shared: _Shared, places: RoundPlaces) -> None:
     """Say that tracks have changed since the statistics were taken: analyse comes first."""
     for name, known in read_lineage(places.stats).inputs.items():
-        path = run.root / name
-        if is_regular(path) and set(hash_inputs(run.root, [path]).values()) != {known}:
-            text = f"{places.stats}: {name} has changed since; first: zfcal analyse {run.root}"
-            run.tell(Note(text=text, warning=True))
-
-
-def _reason(run: _Run, places: RoundPlaces, expected: Lineage, *, shaken: bool) -> str | None:
-    """Return why a round is to be made; None if it is up to date, which is told."""
-    paths = [path for path, _ in places.artifacts]
-    ignore = ("generations",) if run.options.budget_s is not None else ()
-    reason = stale_reason(paths, expected, ignore_options=ignore)
-    if reason is None and run.task.force:
-        reason = "forced"
-    if reason is None and shaken:
-        reason = "the round before it is made again"
-    if reason is None:
-        tell_version(paths, expected, run.tell)
-        for path in paths:
-            run.tell(UpToDate(path=path))
-    return reason
+        path = shared.root / name
+        if is_regular(path) and set(hash_inputs(shared.root, [path]).values()) != {known}:
+            text = f"{places.stats}: {name} has changed since; first: zfcal analyse {shared.root}"
+            shared.run.tell(Note(text=text, warning=True))

@@ -5,6 +5,7 @@ For recordings whose behaviour is to be learnt from one half and judged on the o
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.artifacts.atomic import check_free, discard
+from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
-from zfcal.artifacts.settings import read_trial
 from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
 from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics, measure
@@ -39,10 +40,10 @@ from zfcal.stages.calibrate.rounds import (
     summary_of,
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
-from zfcal.stages.events import Made, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task, at_work, reason_to_make
-from zfcal.stages.segments import STEP_S, Segments, segment_path, segment_starts
-from zfcal.stages.settled import settled
+from zfcal.stages.events import Event, Result, Tell
+from zfcal.stages.opening import OpenTrial, Task
+from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.tracks import FISH
 
 Floats = NDArray[np.float64]
@@ -176,9 +177,11 @@ def evaluate_model(
 
 
 def pooled_fish(
-    opened: OpenTrial, segments: Segments, span_s: tuple[int, int]
+    opened: OpenTrial, segments: Segments, span_s: tuple[int, int], further: Sequence[str] = ()
 ) -> tuple[Statistics, list[int]]:
     """Return the statistics of the fish in a stretch, and the starts of its segments.
+
+    Further statistics are counted where they are named.
 
     Raises
     ------
@@ -195,7 +198,7 @@ def pooled_fish(
             hint=f"Import them first: zfcal import SRC {opened.trial.root}",
         )
     points = join([segments.read(opened, start) for start in starts]).between(start_s, end_s)
-    statistics = measure(points.of_kind(FISH), opened.arena)
+    statistics = measure(points.of_kind(FISH), opened.arena, further=further)
     if not statistics.occupation.sum():
         raise InputError(
             f"{opened.trial.root}: no fish was seen inside the arena from {start_s} s to {end_s} s."
@@ -226,55 +229,56 @@ def calibrate_span(
     task
         How to go about it.
     """
-    task = task or Task()
-    # First: where there is no trial no lock is to lie.
-    read_trial(root)
-    with at_work(root, "calibrate", task):
-        settled(lambda: _calibrate_span(root, span, options, tell, task=task), tell)
+    stage = OneThing(name="calibrate", item=lambda run: _model(run, span, options))
+    run(stage, root, tell, task=task)
 
 
-def _calibrate_span(
-    root: Path, span: Span, options: CalibrateOptions, tell: Tell, *, task: Task
-) -> None:
-    segments, output = Segments(), span.output
-    opened = segments.open(root)
-    control, starts = pooled_fish(opened, segments, span.train_s)
+def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
+    """Return the model; the tracks are read first, so that damaged ones are named at once."""
+    segments = Segments()
+    opened = segments.open(run.root)
+    names = further_of(options.settings.features)
+    control, starts = pooled_fish(opened, segments, span.train_s, names)
     if span.held_out_s:
         starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
-    expected = _lineage(opened, options, span, starts)
-    ignore = ("generations",) if options.budget_s is not None else ()
-    reason = reason_to_make(output, expected, task, tell, ignore=ignore)
-    if reason is None:
-        return
-    check_free(output)
-    settings = replace(options.settings, window_s=float(span.train_s[1] - span.train_s[0]))
-    group = make_group(opened, options)
-    estimated = None
-    if options.seed_likelihood:
-        estimated = estimate(opened, group.template, span.train_s, tell)
-    round_task = RoundTask(
-        group=group,
-        control=control,
-        guests=None if estimated is None else estimated.genes,
-        seeds=SeedSource(trial_seed=expected.seed or 0, window_end_s=span.train_s[1]),
+    output = Output(
+        path=span.output,
+        lineage=_lineage(opened, options, span, starts),
+        ignore=options.not_asked,
     )
-    checkpoint = output.with_name(f".{output.name}.checkpoint")
-    result = run_search(
-        round_task,
-        replace(options, settings=settings),
-        checkpoint,
-        tell,
-        key=checkpoint_key(expected),
-    )
-    judged = _judge(opened, span, result.champion, expected.seed or 0, segments)
-    baselines = baseline_scores(round_task, options, result)
-    likelihood = None if estimated is None else estimated.table
-    table = {**result_table(result, baselines, likelihood), **judged}
-    made = replace(expected, options={**expected.options, "generations": result.generations})
-    write_model(output, result.champion, made, table)
-    discard(checkpoint)
-    tell(Made(path=output, reason=reason))
-    tell(Result(value={"path": str(output), **summary_of(result, baselines), **judged}))
+    seed = output.lineage.seed or 0
+
+    def compute() -> Iterator[Draft]:
+        group = make_group(opened, options)
+        estimated = None
+        if options.seed_likelihood:
+            estimated = estimate(opened, group.template, span.train_s, run.tell)
+        round_task = RoundTask(
+            group=group,
+            control=control,
+            guests=None if estimated is None else estimated.genes,
+            seeds=SeedSource(trial_seed=seed, window_end_s=span.train_s[1]),
+        )
+        window_s = float(span.train_s[1] - span.train_s[0])
+        settings = replace(options.settings, window_s=window_s)
+        asked = replace(options, settings=settings)
+        checkpoint = output.path.with_name(f".{output.path.name}.checkpoint")
+        key = checkpoint_key(output.lineage)
+        result = run_search(round_task, asked, checkpoint, run.tell, key=key)
+        judged = _judge(opened, span, result.champion, seed, segments)
+        baselines = baseline_scores(round_task, options, result)
+        likelihood = None if estimated is None else estimated.table
+        table = {**result_table(result, baselines, likelihood), **judged}
+        told = {"path": str(output.path), **summary_of(result, baselines), **judged}
+
+        def write(path: Path, lineage: Lineage) -> list[Event]:
+            write_model(path, result.champion, lineage, table)
+            return [Result(value=told)]
+
+        yield Draft(output=output.with_options(generations=result.generations), write=write)
+        discard(checkpoint)
+
+    return Item(outputs=[output], compute=compute)
 
 
 def _lineage(
@@ -282,8 +286,9 @@ def _lineage(
 ) -> Lineage:
     trial = opened.trial
     files = [segment_path(trial.root, start) for start in starts]
-    files += [trial.root / trial.model, *opened.arena_files]
     said = calibrate_options(opened, options, generations=options.generations_asked)
+    said |= guess_options(files) if options.seed_likelihood else {}
+    files += [trial.root / trial.model, *opened.arena_files]
     stretches: dict[str, JSON] = {
         "fps": trial.fps,
         "window": _text(span.train_s),

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.artifacts.lineage import JSON
-from zfcal.artifacts.tables import read_tracks
-from zfcal.behaviour.sampling import sample
-from zfcal.errors import DamagedError, InputError
+from zfcal.errors import InputError
 from zfcal.model.likelihood import Fit, fit
-from zfcal.model.steps import steps_of
+from zfcal.model.scene import make_scene
 from zfcal.parameters import Parameters, to_genes
-from zfcal.stages.events import LeftOut, Note, Tell
+from zfcal.stages.events import Event, LeftOut, Note, Tell
 from zfcal.stages.opening import OpenTrial
-from zfcal.stages.segments import STEP_S, readable, segment_path, segment_starts
-from zfcal.tracks import FISH, concatenate
-
-CERTAIN = 0.5
-"""Positions of a lower confidence are guesses of the tracker and make no steps."""
+from zfcal.stages.segments import segment_files
+from zfcal.stages.stretch import read_stretch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,13 +66,6 @@ def _values(parameters: Parameters) -> dict[str, float]:
     return values
 
 
-def track_files(root: Path, span_s: tuple[int, int]) -> list[Path]:
-    """Return the segments that a stretch of time touches and that are there."""
-    start_s, end_s = span_s
-    starts = [s for s in segment_starts(root) if start_s - STEP_S < s < end_s]
-    return [segment_path(root, start) for start in starts]
-
-
 def estimate(
     opened: OpenTrial, template: Parameters, span_s: tuple[int, int], tell: Tell
 ) -> Estimate | None:
@@ -106,28 +93,23 @@ def estimate(
         names = ", ".join(template.effects)
         tell(Note(text=f"{trial.root}: no likelihood estimate for a model with {names}."))
         return None
-    files = track_files(trial.root, span_s)
-    start_s, end_s = span_s
-    where = f"{trial.root}, {start_s} s to {end_s} s"
-    if not files:
+    where = f"{trial.root}, {span_s[0]} s to {span_s[1]} s"
+    without = f"{where}: no likelihood estimate joins the search"
+    if not segment_files(trial.root, span_s):
         tell(Note(text=f"{where}: no tracks, so no likelihood estimate joins the search."))
         return None
-    if len(readable(files, tell)) < len(files):
-        return None
+
+    def say(event: Event) -> None:
+        if isinstance(event, LeftOut):
+            event = replace(event, problem=f"{without}: {event.problem}")
+        tell(event)
+
     try:
-        tracks = concatenate([read_tracks(path) for path in files])
-        tracks = tracks.take(~(tracks.confidence < CERTAIN))
-        samples = sample(
-            tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=float(start_s), end_s=float(end_s)
-        )
-        steps = steps_of(samples, opened.arena, fov_rad=template.fov_rad)
-        fish = samples.agent[samples.kind == FISH]
-        found = fit(steps.take(np.isin(steps.agent, fish)), opened.arena, template)
-    except DamagedError as error:
-        problem = f"{where}: no likelihood estimate joins the search: {error}"
-        tell(LeftOut(path=files[0].parent, problem=problem, hint=error.hint))
-        return None
+        stretch = read_stretch(opened, span_s, say)
+        if stretch.n_left_out:
+            return None
+        found = fit(make_scene(stretch.samples, opened.arena), template)
     except InputError as error:
-        tell(Note(text=f"{where}: no likelihood estimate joins the search: {error}"))
+        tell(Note(text=f"{without}: {error}"))
         return None
     return Estimate(found=found) if math.isfinite(found.nats_per_step) else None

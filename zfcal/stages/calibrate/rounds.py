@@ -16,8 +16,9 @@ from zfcal.artifacts.models import write_model
 from zfcal.artifacts.reading.contents import read_limited
 from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
 from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
-from zfcal.behaviour.scores import Scores
+from zfcal.behaviour.scores import NamedScore, Scores
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.checkpoint import from_bytes, to_bytes
 from zfcal.calibrate.rounds import RoundResult
@@ -25,6 +26,8 @@ from zfcal.calibrate.search import Progress
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.parameters import gene_names
+from zfcal.stages.events import Event, Result
+from zfcal.stages.stage import Write
 
 MODEL = "zfcal.model/1"
 POPULATION = "zfcal.population/1"
@@ -106,8 +109,10 @@ def read_control(path: Path, zone_names: tuple[str, ...]) -> Statistics:
     return control
 
 
-def read_previous(path: Path) -> Previous:
+def read_previous(path: Path, features: tuple[str, ...] = SCORED) -> Previous:
     """Return what a round left for the next one.
+
+    Scores of other features than the next one's are no scores to it: NaN.
 
     Raises
     ------
@@ -122,51 +127,73 @@ def read_previous(path: Path) -> Previous:
             f"{path}: does not say which genome was the champion.",
             hint="Make it again: zfcal calibrate TRIAL --force",
         )
+    scores = numbers_of(table.column("S")).copy()
+    if "features" in extra or features != SCORED:
+        same = extra.get("features") == list(features)
+        said = extra.get("score") if same else [None] * len(scores)
+        scores = np.array(said, dtype=np.float64)
     return Previous(
         genes=np.array(table.column("genes").to_pylist(), dtype=np.float64),
-        scores=numbers_of(table.column("S")).copy(),
+        scores=scores,
         champion=np.array(champion, dtype=np.float64),
         noise=float(noise) if isinstance(noise, int | float) else math.nan,
     )
 
 
-def write_round(
-    places: RoundPlaces,
-    result: RoundResult,
-    lineages: dict[str, Lineage],
-    table: dict[str, JSON],
-) -> None:
-    """Write what a round has found, the model last.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What a round has found.
 
     Parameters
     ----------
-    places
-        Where it goes.
     result
-        What was found.
-    lineages
-        The lineage of each file, by its schema.
-    table
-        The model's table ``[result]``, from `result_table`.
+        Of the search.
+    baselines
+        S of what it had to beat.
+    likelihood
+        The window's maximum-likelihood estimate; None without one.
     """
-    _write_population(places.population, result, lineages[POPULATION])
-    rows = scores_to_rows(
-        result.scores,
-        window_end_s=places.end_s,
-        compared="model-vs-control",
-        ceiling=result.ceiling,
-    )
-    write_table(places.scores, make_table(SCORES, rows), lineages[SCORES])
-    write_model(places.model, result.champion, lineages[MODEL], table, parents=False)
+
+    result: RoundResult
+    baselines: dict[str, JSON]
+    likelihood: dict[str, JSON] | None
+
+    def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, Write, Write]:
+        """Return what writes each of the files, in the order of ``places.artifacts``."""
+        result, baselines = self.result, self.baselines
+
+        def population(path: Path, lineage: Lineage) -> None:
+            _write_population(path, result, lineage)
+
+        def scores(path: Path, lineage: Lineage) -> None:
+            rows = scores_to_rows(
+                result.scores,
+                window_end_s=places.end_s,
+                compared="model-vs-control",
+                ceiling=result.ceiling,
+            )
+            write_table(path, make_table(SCORES, rows), lineage)
+
+        def model(path: Path, lineage: Lineage) -> list[Event]:
+            table = result_table(result, baselines, self.likelihood)
+            write_model(path, result.champion, lineage, table, parents=False)
+            value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
+            return [Result(value={**value, **summary_of(result, baselines)})]
+
+        return population, scores, model
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
     state = result.population
-    features = dict(zip(("I_D", "I_W", "I_O", "I_T"), state.features.T, strict=True))
+    named = result.scores.named
+    names = SCORED if named is None else named.features
+    nothing = np.full(len(state.genes), np.nan)
+    found = dict(zip(names, state.features.T, strict=True))
+    features = {f"I_{name}": found.get(name, nothing) for name in SCORED}
     columns = {
         "individual": np.arange(len(state.genes), dtype=np.int32),
         "rank": state.rank.astype(np.int32),
-        "S": state.scores,
+        "S": state.scores if named is None else nothing,
         "genotypic_diversity": state.objectives[:, 1],
         "behavioural_diversity": state.objectives[:, 2],
         **features,
@@ -178,6 +205,13 @@ def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None
         "noise": _number(result.as_previous.noise),
         "generations": result.generations,
     }
+    if named is not None:
+        # A score of these is not S.
+        extra["features"] = list(names)
+        extra["score"] = [_number(value) for value in state.scores.tolist()]
+        extra["similarities"] = {
+            name: [_number(value) for value in values.tolist()] for name, values in found.items()
+        }
     write_table(path, make_table(POPULATION, columns), lineage, extra=extra)
 
 
@@ -200,17 +234,19 @@ def result_table(
     Returns
     -------
     dict
-        S stands with its ceiling; a value that is NaN is None.
+        S stands with its ceiling; a value that is NaN is None. Where other features are named,
+        their score stands under ``score``, and what decided by it is called so.
     """
     last = result.history[-1]
+    score = "S" if result.scores.named is None else "score"
     return {
         "generations": result.generations,
         "evaluations": result.evaluations,
         **score_table(result.scores, result.ceiling),
         "champion": "likely" if result.is_likely else "score",
-        "optimiser_S": _number(result.optimiser_score),
+        f"optimiser_{score}": _number(result.optimiser_score),
         "hypervolume": [_number(line.hypervolume) for line in result.history],
-        "best_S_in_population": _number(last.best_score),
+        f"best_{score}_in_population": _number(last.best_score),
         "world_changed": result.world_changed,
         "n_renewed": result.n_renewed,
         "baselines": baselines or None,
@@ -253,6 +289,29 @@ def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
             if field.name.startswith("I_")
         },
         "n_features": scores.n_features,
+        **_named_table(scores.named, ceiling),
+    }
+
+
+def _named_table(named: NamedScore | None, ceiling: Ceiling) -> dict[str, JSON]:
+    """Return the score of the features that were named, which is not S, and its ceiling."""
+    if named is None:
+        return {}
+    mean, low, high = ceiling.overall
+    return {
+        "score": {
+            "of": list(named.features),
+            "value": _number(named.value),
+            "ceiling": _number(mean),
+            "ceiling_low": _number(low),
+            "ceiling_high": _number(high),
+            "against_ceiling": _number(named.value / mean if mean > 0 else math.nan),
+            "similarities": {
+                name: _number(value)
+                for name, value in zip(named.features, named.similarities, strict=True)
+            },
+            "n_features": named.n_features,
+        }
     }
 
 

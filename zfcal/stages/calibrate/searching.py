@@ -75,6 +75,11 @@ class CalibrateOptions:
         return DEFAULT_GENERATIONS if asked is None else asked
 
     @property
+    def not_asked(self) -> tuple[str, ...]:
+        """Options of a round's lineage that nobody asked for: a budget ends it where it ends."""
+        return ("generations",) if self.budget_s is not None else ()
+
+    @property
     def workers(self) -> int:
         """Threads to use."""
         return self.n_workers or len(os.sched_getaffinity(0))
@@ -139,7 +144,7 @@ def run_search(
 def baseline_scores(
     round_task: RoundTask, options: CalibrateOptions, result: RoundResult
 ) -> dict[str, JSON]:
-    """Return S of what the round has to beat; empty unless baselines are asked for.
+    """Return the score of what the round has to beat; empty unless baselines are asked for.
 
     Parameters
     ----------
@@ -154,10 +159,10 @@ def baseline_scores(
         return {}
     n = result.evaluations
     luck = random_search(round_task, options.settings, n_evaluations=n)
-    scores = {"random_search": luck.scores.S}
+    scores = {"random_search": luck.scores.overall}
     if round_task.previous is not None:
         champion = round_task.previous.champion
         scores["last_window_unchanged"] = unchanged(
             round_task, options.settings, genes=champion
-        ).scores.S
+        ).scores.overall
     return {name: None if math.isnan(value) else value for name, value in scores.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,6 @@ from zfcal.stages.camera.making import CameraTask, Place, Recipe, make_camera
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, check_view
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Tell
-from zfcal.stages.settled import settled
 from zfcal.tracking.robot import LedOptions, RobotFinder
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker, follow
@@ -79,10 +78,11 @@ def align_cameras(root: Path, recording: Recording, tell: Tell, *, task: CameraT
     InputError
         A camera is not calibrated, there are no images, or the robot is not to be found.
     """
-    settled(lambda: _align(root, recording, tell, task=task), tell)
+    place = Place(path=root / "cameras" / ALIGNED, root=root, name=BELOW)
+    make_camera(place, lambda: _align(place, root, recording), tell, task=task)
 
 
-def _align(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) -> None:
+def _align(place: Place, root: Path, recording: Recording) -> Recipe:
     trial = read_trial(root)
     overhead_file, below_file = _camera_file(trial, "overhead"), _camera_file(trial, "below")
     sources = {
@@ -100,14 +100,13 @@ def _align(root: Path, recording: Recording, tell: Tell, *, task: CameraTask) ->
         alignment = align_spots(blobs, leds)
         return _calibration(below, alignment)
 
-    recipe = Recipe(
+    return Recipe(
+        place=replace(place, stated_side=stated_side(below_file)),
         command="camera align",
+        work=work,
         options={"start_s": recording.start_s, "seconds": recording.seconds, "sources": sources},
         inputs=(overhead_file, below_file, *_files(sources.values())),
     )
-    path = root / "cameras" / ALIGNED
-    place = Place(path=path, root=root, name=BELOW, stated_side=stated_side(below_file))
-    make_camera(place, recipe, work, tell, task=task)
 
 
 def overhead_spots(

@@ -26,7 +26,6 @@ from zfcal.cameras.video import encoded
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.making import CameraTask, Found, Place, Recipe, make_camera
 from zfcal.stages.events import LeftOut, Made, Note, Progress, Tell
-from zfcal.stages.settled import settled
 
 PX_PER_M = 10_000.0
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"}
@@ -86,10 +85,10 @@ def make_from_boards(place: Place, given: BoardImages, tell: Tell, *, task: Came
     InputError
         There are too few images with the board in them, or they differ in size.
     """
-    settled(lambda: _from_boards(place, given, tell, task=task), tell)
+    make_camera(place, lambda: _from_boards(place, given, tell), tell, task=task)
 
 
-def _from_boards(place: Place, given: BoardImages, tell: Tell, *, task: CameraTask) -> None:
+def _from_boards(place: Place, given: BoardImages, tell: Tell) -> Recipe:
     files = tuple(_files(given.paths))
     lies = given.lies
     if place.root is not None and lies is None:
@@ -110,10 +109,13 @@ def _from_boards(place: Place, given: BoardImages, tell: Tell, *, task: CameraTa
         "lies_m_rad": None if lies is None else [lies.x_m, lies.y_m, lies.angle_rad],
         "face_down": (lies is not None and lies.face_down) or None,
     }
-    inputs = files if lies is None else (*files, lies.image)
-    recipe = Recipe(command="camera board", options=options, inputs=inputs)
-    work = functools.partial(_work, files, given, tell)
-    make_camera(place, recipe, work, tell, task=task)
+    return Recipe(
+        place=place,
+        command="camera board",
+        work=functools.partial(_work, files, given, tell),
+        options=options,
+        inputs=files if lies is None else (*files, lies.image),
+    )
 
 
 def write_sheet(path: Path, board: Board, tell: Tell) -> None:

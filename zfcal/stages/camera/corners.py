@@ -62,23 +62,28 @@ def make_from_corners(place: Place, corners: Corners, tell: Tell, *, task: Camer
         The corners do not determine a camera or run the wrong way round, or neither arena nor
         size is known.
     """
+    make_camera(place, lambda: _from_corners(place, corners), tell, task=task)
+
+
+def _from_corners(place: Place, corners: Corners) -> Recipe:
     bounds_m = _bounds(place, corners)
     size_px = size_of_images(corners.size_px, corners.image)
-    recipe = Recipe(
-        command="camera corners",
-        options={
-            "corners_px": [list(point) for point in corners.px],
-            "bounds_m": list(bounds_m),
-            "size_px": list(size_px),
-        },
-    )
 
     def work() -> Calibration:
         found = calibrate_corners(corners.px, bounds_m, size_px)
         check_corners(found.camera, corners.px, place.side)
         return found
 
-    make_camera(place, recipe, work, tell, task=task)
+    return Recipe(
+        place=place,
+        command="camera corners",
+        work=work,
+        options={
+            "corners_px": [list(point) for point in corners.px],
+            "bounds_m": list(bounds_m),
+            "size_px": list(size_px),
+        },
+    )
 
 
 def size_of_images(size_px: tuple[int, int] | None, image: Path | None) -> tuple[int, int]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -17,8 +16,9 @@ from zfcal.cameras.calibration_boards import LensCalibration
 from zfcal.cameras.handedness import ABOVE, BELOW, check_side
 from zfcal.errors import InputError
 from zfcal.stages.camera.cameras import SIDE_KEY, write_camera
-from zfcal.stages.events import Made, Note, Result, Tell
-from zfcal.stages.opening import Task, at_work, reason_to_make
+from zfcal.stages.events import Event, Made, Note, Result, Tell
+from zfcal.stages.opening import Task
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, make_alone, run
 from zfcal.trial import CONFIG_NAME
 
 NAMES = ("overhead", "below")
@@ -87,29 +87,35 @@ def usual_side(name: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """What a camera file is made from.
+    """How a camera file is made.
 
     Parameters
     ----------
+    place
+        Where it goes.
     command
         The command, such as ``camera corners``.
+    work
+        Does the calibration.
     options
         Those that bear on the result.
     inputs
         Files that it reads.
     """
 
+    place: Place
     command: str
+    work: Callable[[], Found]
     options: Mapping[str, JSON] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
 
-    def lineage(self, place: Place) -> Lineage:
+    def lineage(self) -> Lineage:
         """Return the lineage of what it makes."""
         return Lineage(
             schema=SCHEMA,
             command=self.command,
-            options={**self.options, SIDE_KEY: place.unusual_side},
-            inputs=hash_inputs(place.base, self.inputs),
+            options={**self.options, SIDE_KEY: self.place.unusual_side},
+            inputs=hash_inputs(self.place.base, self.inputs),
         )
 
 
@@ -142,7 +148,7 @@ def place_for(
 
 
 def make_camera(
-    place: Place, recipe: Recipe, work: Callable[[], Found], tell: Tell, *, task: CameraTask
+    place: Place, prepare: Callable[[], Recipe], tell: Tell, *, task: CameraTask
 ) -> None:
     """Make a camera file, unless it is up to date.
 
@@ -150,28 +156,51 @@ def make_camera(
     ----------
     place
         Where it goes.
-    recipe
-        What it is made from.
-    work
-        Does the calibration.
+    prepare
+        Reads what is given, and returns how the file is made.
     tell
         Hears of the files, the errors and what a person should know.
     task
         Whether to write, whether to do it again, and who draws the errors.
     """
-    lineage = recipe.lineage(place)
-    with nullcontext() if place.root is None else at_work(place.root, "camera", task):
-        reason = reason_to_make(place.path, lineage, task, tell)
-        if reason is not None:
-            found = work()
-            _check_side(place, found)
+    stage = OneThing(name="camera", item=lambda run: _camera_file(run, prepare(), task.draw))
+    if place.root is None:
+        # No trial, no lock: a file of a person's own.
+        make_alone(stage, Run(root=place.base, command=stage.name, tell=tell, task=task))
+    else:
+        run(stage, place.root, tell, task=task)
+
+
+def _camera_file(run: Run, recipe: Recipe, draw: Draw | None) -> Item:
+    place = recipe.place
+    output = Output(path=place.path, lineage=recipe.lineage())
+
+    def compute() -> Iterator[Draft]:
+        found = recipe.work()
+        _check_side(place, found)
+
+        def write(_: Path, lineage: Lineage) -> Iterable[Event]:
             _write(place, found, lineage)
-            tell(Made(path=place.path, reason=reason))
-            if task.draw is not None:
-                tell(Made(path=task.draw(found), reason=reason))
-            _tell_result(found, tell)
-        if place.root is not None and not task.dry_run:
-            _name(place.root, place, tell)
+            return _told(found, draw)
+
+        yield Draft(output=output, write=write)
+
+    def finish() -> None:
+        root = place.root
+        if root is not None and not run.task.dry_run and name_camera(root, place.name, place.path):
+            run.tell(Note(text=f"{root / CONFIG_NAME} names it as the {place.name} camera."))
+
+    return Item(outputs=[output], compute=compute, finish=finish)
+
+
+def _told(found: Found, draw: Draw | None) -> Iterator[Event]:
+    if draw is not None:
+        yield Made(path=draw(found), reason="")
+    result = found.result() if isinstance(found, Calibration) else found.result
+    for note in result.get("notes", ()):
+        yield Note(text=note, warning=True)
+    yield Note(text=in_words(result))
+    yield Result(value=result)
 
 
 def _check_side(place: Place, found: Found) -> None:
@@ -195,19 +224,6 @@ def _write(place: Place, found: Found, lineage: Lineage) -> None:
         write_camera(place.path, found.camera, lineage, result=found.result(), points=points)
     else:
         write_camera(place.path, found.lens, lineage, result=found.result)
-
-
-def _name(root: Path, place: Place, tell: Tell) -> None:
-    if name_camera(root, place.name, place.path):
-        tell(Note(text=f"{root / CONFIG_NAME} names it as the {place.name} camera."))
-
-
-def _tell_result(found: Found, tell: Tell) -> None:
-    result = found.result() if isinstance(found, Calibration) else found.result
-    for note in result.get("notes", ()):
-        tell(Note(text=note, warning=True))
-    tell(Note(text=in_words(result)))
-    tell(Result(value=result))
 
 
 def in_words(result: Mapping[str, Any]) -> str:

@@ -16,7 +16,6 @@ from zfcal.stages.camera.cameras import read_lens
 from zfcal.stages.camera.corners import size_of_images
 from zfcal.stages.camera.making import CameraTask, Place, Recipe, make_camera
 from zfcal.stages.events import Tell
-from zfcal.stages.settled import settled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +54,10 @@ def make_from_points(place: Place, points: Points, tell: Tell, *, task: CameraTa
     InputError
         The points do not determine a camera, or are not of this one.
     """
-    settled(lambda: _from_points(place, points, tell, task=task), tell)
+    make_camera(place, lambda: _from_points(place, points), tell, task=task)
 
 
-def _from_points(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
+def _from_points(place: Place, points: Points) -> Recipe:
     lens = None if points.lens is None else read_lens(points.lens)
     if lens is not None and points.size_px is None and points.image is None:
         size_px = lens.size_px
@@ -75,8 +74,7 @@ def _from_points(place: Place, points: Points, tell: Tell, *, task: CameraTask) 
 
     inputs = (points.path,) if points.lens is None else (points.path, points.lens)
     options = {"size_px": list(size_px), "model": points.model, "robust": points.robust or None}
-    recipe = Recipe(command="camera points", options=options, inputs=inputs)
-    make_camera(place, recipe, work, tell, task=task)
+    return Recipe(place=place, command="camera points", work=work, options=options, inputs=inputs)
 
 
 def make_from_older(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
@@ -89,10 +87,10 @@ def make_from_older(place: Place, points: Points, tell: Tell, *, task: CameraTas
     DamagedError
         It is not XML of OpenCV.
     """
-    settled(lambda: _from_older(place, points, tell, task=task), tell)
+    make_camera(place, lambda: _from_older(place, points), tell, task=task)
 
 
-def _from_older(place: Place, points: Points, tell: Tell, *, task: CameraTask) -> None:
+def _from_older(place: Place, points: Points) -> Recipe:
     found = read_older_camera(points.path)
     lens = None
     if found.matrix is not None:
@@ -111,8 +109,9 @@ def _from_older(place: Place, points: Points, tell: Tell, *, task: CameraTask) -
             raise InputError(f"{points.path}: {error}", hint=error.hint) from error
 
     options = {"model": points.model, "robust": points.robust or None}
-    recipe = Recipe(command="camera import", options=options, inputs=(points.path,))
-    make_camera(place, recipe, work, tell, task=task)
+    return Recipe(
+        place=place, command="camera import", work=work, options=options, inputs=(points.path,)
+    )
 
 
 def calibrate(pairs: Pairs, lens: Lens | None, points: Points) -> Calibration:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from zfcal.artifacts.atomic import check_free
-from zfcal.artifacts.freshness import hash_inputs, relative_to, stale_reason
+from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import newest_model, read_model_for
 from zfcal.diagnose.document import SCHEMA, findings_document
@@ -22,10 +23,11 @@ from zfcal.diagnose.question import Question
 from zfcal.diagnose.question import Tell as Heard
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters
-from zfcal.stages.diagnose.findings import FOLDER, Book, Draw
-from zfcal.stages.events import Made, Planned, Progress, Result, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, tell_version
-from zfcal.stages.settled import settled
+from zfcal.stages.diagnose.findings import FOLDER, Book, Draw, write_findings
+from zfcal.stages.events import Progress, Result, Tell
+from zfcal.stages.opening import OpenTrial, Task, open_trial
+from zfcal.stages.segments import guess_options
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.stretch import Stretch, read_stretch
 
 
@@ -162,35 +164,29 @@ def diagnose(
         The trial, the model or the tracks are wrong, the disk is full, or another
         diagnose is at work on the trial. Damaged segments are left out and told instead.
     """
-    task = task or Task()
-    with at_work(root, "diagnose", task):
-        return settled(lambda: _diagnose(root, options, tell, task=task, draw=draw), tell)
+    stage = OneThing(name="diagnose", item=lambda run: _findings(run, options, draw))
+    there = run(stage, root, tell, task=task)
+    return there[0] if there else None
 
 
-def _diagnose(
-    root: Path, options: DiagnoseOptions, tell: Tell, *, task: Task, draw: Draw | None
-) -> Path | None:
-    case = open_case(root, options)
-    stretch = read_stretch(case.opened, options.window_s, tell)
+def _findings(run: Run, options: DiagnoseOptions, draw: Draw | None) -> Item:
+    """Return the findings; the tracks are read first, since the damaged ones are no inputs."""
+    case = open_case(run.root, options)
+    stretch = read_stretch(case.opened, options.window_s, run.tell)
     book = Book(opened=case.opened, folder=case.folder, draw=draw)
-    expected = lineage_of(case, stretch)
-    reason = stale_reason([book.path], expected) or ("forced" if task.force else None)
-    if reason is not None and task.dry_run:
-        tell(Planned(path=book.path, reason=reason))
-        return None
-    if reason is None:
-        tell_version([book.path], expected, tell)
-        tell(UpToDate(path=book.path))
-    else:
-        check_free(book.path)
+    output = Output(path=book.path, lineage=lineage_of(case, stretch))
+
+    def compute() -> Iterator[Draft]:
         if draw is not None and options.workers > 1:
             draw.prepare()
-        diagnosis = _answer(case, stretch, tell)
-        book.write(_document(case, stretch, diagnosis), expected)
-        tell(Made(path=book.path, reason=reason))
-    book.show(tell, task)
-    tell(Result(value=book.read()[0]))
-    return book.path
+        document = _document(case, stretch, _answer(case, stretch, run.tell))
+        yield Draft(output=output, write=partial(write_findings, document))
+
+    def finish() -> None:
+        book.show(run.tell, run.task)
+        run.tell(Result(value=book.read()[0]))
+
+    return Item(outputs=[output], compute=compute, finish=finish)
 
 
 def lineage_of(case: Case, stretch: Stretch) -> Lineage:
@@ -204,6 +200,7 @@ def lineage_of(case: Case, stretch: Stretch) -> Lineage:
         "quick": options.quick,
         "noise_mm": None if options.noise_m is None else 1e3 * options.noise_m,
         "window": None if window is None else f"{window[0]}:{window[1]}",
+        **guess_options(stretch.files),
     }
     files = [*stretch.files, case.model, *case.opened.arena_files]
     return Lineage(

@@ -70,25 +70,9 @@ class Book:
         """
         return read_findings(self.path)
 
-    def write(self, document: Mapping[str, Any], lineage: Lineage) -> None:
-        """Write findings whole, or not at all.
-
-        Parameters
-        ----------
-        document
-            Without lineage, or with an older one.
-        lineage
-            Where they come from.
-        """
-        origin = lineage.as_dict()
-        # The file's own schema stands at its head, once.
-        del origin["schema"]
-        self.replace({**document, "lineage": origin})
-
     def replace(self, document: Mapping[str, Any]) -> None:
         """Write a document that has its lineage."""
-        check(document, "findings", self.path)
-        write_text_whole(self.path, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+        _write(self.path, document)
 
     def show(self, tell: Tell, task: Task) -> None:
         """See to it that the page shows the findings, and tell of its files."""
@@ -116,6 +100,29 @@ class Book:
             findings=findings,
             provenance={"findings": digest, "lineage": lineage},
         )
+
+
+def write_findings(document: Mapping[str, Any], path: Path, lineage: Lineage) -> None:
+    """Write findings whole, or not at all.
+
+    Parameters
+    ----------
+    document
+        Without lineage.
+    path
+        Where they go.
+    lineage
+        Where they come from.
+    """
+    origin = lineage.as_dict()
+    # The file's own schema stands at its head, once.
+    del origin["schema"]
+    _write(path, {**document, "lineage": origin})
+
+
+def _write(path: Path, document: Mapping[str, Any]) -> None:
+    check(document, "findings", path)
+    write_text_whole(path, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
 
 def read_findings(path: Path) -> tuple[dict[str, Any], Findings]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from zfcal.artifacts.atomic import check_free, discard
+from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model, read_result, write_model
@@ -28,8 +28,8 @@ from zfcal.stages.diagnose.diagnose import Case, DiagnoseOptions, diagnose, open
 from zfcal.stages.diagnose.findings import FILE, FOLDER, Book, Draw
 from zfcal.stages.events import Made, Note, Result, Tell, say_nothing
 from zfcal.stages.extend.extension import Extension, extension_of
-from zfcal.stages.opening import Task, at_work, open_trial, reason_to_make
-from zfcal.stages.settled import settled
+from zfcal.stages.opening import Task, at_work, open_trial
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.stretch import read_stretch
 
 Effects = Mapping[str, Mapping[str, float]]
@@ -96,42 +96,54 @@ def extend(
         The trial or the tracks are wrong, they are too little to say anything, an effect is
         unknown or in the model already, or another extend is at work on the trial.
     """
-    task = task or Task()
-    with at_work(root, "extend", task):
-        return settled(lambda: _extend(root, options, tell, task=task, draw=draw), tell)
+    stage = OneThing(name="extend", item=lambda run: _extended(run, options, draw))
+    there = run(stage, root, tell, task=task)
+    return there[0] if there and not (task and task.dry_run) else None
 
 
-def _extend(
-    root: Path, options: ExtendOptions, tell: Tell, *, task: Task, draw: Draw | None
-) -> Path | None:
-    path = _findings_of(root, options.findings)
-    asked = _question_of(root, path)
-    case = open_case(root, asked)
+def _extended(run: Run, options: ExtendOptions, draw: Draw | None) -> Item | None:
+    """Return the extended model, after a diagnosis where there is none that holds."""
+    path = _findings_of(run.root, options.findings)
+    asked = _question_of(run.root, path)
+    case = open_case(run.root, asked)
     # Before the diagnosis, which takes minutes.
     _check_new(case, options.names)
-    if not _up_to_date(root, asked, tell, task=task, draw=draw):
+    if not _up_to_date(run.root, asked, run.tell, task=run.task, draw=draw):
         return None
     book = Book(opened=case.opened, folder=path.parent, draw=draw)
     document, found = book.read()
-    effects = _chosen(case, options, document, tell)
+    effects = _chosen(case, options, document, run.tell)
     if effects is None:
-        tell(Result(value=document))
+        run.tell(Result(value=document))
         return None
-    output = options.output or _place(root, case.model)
     stretch = read_stretch(case.opened, asked.window_s, say_nothing)
     ties = [tie for effect in found.effects for tie in effect.ties]
-    extension = extension_of(case, stretch, effects, (options.calibration, ties, tell))
-    expected = _lineage(case, extension, list(stretch.files))
-    ignore = ("generations",) if options.calibration.budget_s is not None else ()
-    reason = reason_to_make(output, expected, task, tell, ignore=ignore)
-    if reason is not None:
-        check_free(output)
-        _make(output, extension, expected)
-        tell(Made(path=output, reason=reason))
-    if not task.dry_run:
-        _tell_gap(book, document, output, tell, task=task)
-        tell(Result(value=book.read()[0]))
-    return None if task.dry_run else output
+    extension = extension_of(case, stretch, effects, (options.calibration, ties, run.tell))
+    output = Output(
+        path=options.output or _place(run.root, case.model),
+        lineage=_lineage(case, extension, list(stretch.files)),
+        ignore=options.calibration.not_asked,
+    )
+
+    def finish() -> None:
+        if not run.task.dry_run:
+            _tell_gap(book, document, output.path, run.tell, task=run.task)
+            run.tell(Result(value=book.read()[0]))
+
+    return Item(outputs=[output], compute=lambda: _made(output, extension), finish=finish)
+
+
+def _made(output: Output, extension: Extension) -> Iterator[Draft]:
+    """Fit, calibrate and judge the three models, and yield the one with the effects."""
+    checkpoints = output.path.with_name(f".{output.path.stem}")
+    made = extension.make(checkpoints, key=checkpoint_key(output.lineage))
+    table = {**made.result, "gap": {each.measure: _entry(each) for each in made.gap}}
+    yield Draft(
+        output=output.with_options(generations=made.result["generations"]),
+        write=lambda path, lineage: write_model(path, made.model, lineage, table),
+    )
+    for path in extension.checkpoints(checkpoints):
+        discard(path)
 
 
 def _findings_of(root: Path, named: Path | None) -> Path:
@@ -283,18 +295,6 @@ def _lineage(case: Case, extension: Extension, files: list[Path]) -> Lineage:
         seed=extension.seed,
         inputs=hash_inputs(case.root, [*files, case.model, *case.opened.arena_files]),
     )
-
-
-def _make(output: Path, extension: Extension, expected: Lineage) -> None:
-    """Fit, calibrate and judge the three models, and write the one with the effects."""
-    checkpoints = output.with_name(f".{output.stem}")
-    made = extension.make(checkpoints, key=checkpoint_key(expected))
-    generations = made.result["generations"]
-    lineage = replace(expected, options={**expected.options, "generations": generations})
-    gap = {each.measure: _entry(each) for each in made.gap}
-    write_model(output, made.model, lineage, {**made.result, "gap": gap})
-    for path in extension.checkpoints(checkpoints):
-        discard(path)
 
 
 def _entry(gap: Gap) -> dict[str, JSON]:

@@ -19,12 +19,12 @@ from zfcal.stages.stretch import NOISE_KEY
 from zfcal.stages.track.below import Below
 from zfcal.stages.track.learnt import learnt_by, notes_of
 from zfcal.stages.track.plan import Plan
-from zfcal.stages.track.tracker_noise import GUESS, losses, tracker_noise
+from zfcal.stages.track.tracker_noise import losses, tracker_noise
 from zfcal.tracking.learning import Learnt
 from zfcal.tracking.robot import RobotSeen
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker
-from zfcal.tracks import FISH, FramePoses, Tracks
+from zfcal.tracks import FISH, GUESS, FramePoses, Tracks
 from zfcal.trial import Trial
 
 _SAYS = {

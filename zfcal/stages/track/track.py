@@ -14,7 +14,7 @@ from zfcal.stages.events import Planned, Tell, UpToDate
 from zfcal.stages.opening import Task, at_work, open_trial, reason_to_make, tell_version
 from zfcal.stages.recording import check_same_source, starts_between, stretch_of
 from zfcal.stages.segments import segment_path, segment_starts
-from zfcal.stages.settled import settled
+from zfcal.stages.stage import settled
 from zfcal.stages.track.following import Following
 from zfcal.stages.track.minutes import Origins, pose_files, poses_reason
 from zfcal.stages.track.plan import Plan, TrackOptions, plan_of

@@ -12,9 +12,8 @@ import math
 import numpy as np
 
 from zfcal.diagnose.noise import from_frames
-from zfcal.tracks import Tracks
+from zfcal.tracks import GUESS, Tracks
 
-GUESS = 0.5
 _ALONE = 0.75
 """Confidence from which an animal was alone in its blob, and known for a while."""
 
