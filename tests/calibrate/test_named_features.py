@@ -140,6 +140,8 @@ def test_a_round_optimises_what_was_named(task, short):
     mean, low, high = result.ceiling.overall
     assert low <= mean <= high
     assert result.ceiling.overall != result.ceiling.of("S")
+    score = result.scores.overall
+    assert result.intervals.threshold == (low if score >= low else score - (mean - low))
     assert result.against_ceiling == pytest.approx(result.scores.overall / mean)
     assert result.population.objectives[:, 0] == pytest.approx(result.population.scores)
 
