@@ -24,7 +24,8 @@ DRY, FORCED = Task(dry_run=True), Task(force=True)
 def page(repository):
     """Return the module that the page tells how to write."""
     text = (repository / "docs" / "architecture.md").read_text(encoding="utf-8")
-    (source,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    section = text.partition("\n## Add a stage\n")[2].partition("\n## ")[0]
+    (source,) = re.findall(r"^```python\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
     module = types.ModuleType("thinning")
     exec(compile(source, "docs/architecture.md", "exec"), vars(module))  # noqa: S102 - our own page
     return module
