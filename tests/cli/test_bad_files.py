@@ -23,6 +23,7 @@ from zfcal.report import gather, page
 from zfcal.report.figures import arena as arena_figure
 from zfcal.stages.diagnose.diagnose import KnownNoise
 from zfcal.stages.extend import extend
+from zfcal.stages.stage import Draft
 from zfcal.tracks import FISH, AgentPose, FramePoses
 from zfcal_cli.main import run
 
@@ -221,7 +222,10 @@ def template(tmp_path_factory, write_tracks):
     extended = (root / "models" / "extended.toml").read_bytes()
     with pytest.MonkeyPatch.context() as patch:
         # All is read by then; what is left takes as long as all else together.
-        patch.setattr(extend, "_make", lambda path, *_: write_bytes_whole(path, extended))
+        def made(output, _):
+            yield Draft(output=output, write=lambda path, _: write_bytes_whole(path, extended))
+
+        patch.setattr(extend, "_made", made)
         yield root
 
 
