@@ -21,9 +21,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from zfcal.behaviour.features.statistic import Observed, Points, Statistic, lengths
-
-MIN_STEP_M = 0.002
-"""A shorter step has no direction."""
+from zfcal.units import HEADING_MIN_STEP_M
 
 EDGES_RAD_M = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
@@ -35,7 +33,7 @@ def observe(points: Points) -> Iterator[Observed]:
     length_m = lengths(step_m)
     # Steps stand agent by agent: where one ends at a point the next one starts there.
     follows = np.flatnonzero(end[:-1] == start[1:])
-    long_enough = np.minimum(length_m[follows], length_m[follows + 1]) >= MIN_STEP_M
+    long_enough = np.minimum(length_m[follows], length_m[follows + 1]) >= HEADING_MIN_STEP_M
     before = follows[long_enough]
     (ax, ay), (bx, by) = step_m[before].T, step_m[before + 1].T
     turn_rad = np.abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))

@@ -22,9 +22,7 @@ from numpy.typing import NDArray
 
 from zfcal.behaviour.features.statistic import Observed, Points, Statistic, lengths
 from zfcal.behaviour.histograms import bin_edges
-
-MIN_STEP_M = 0.002
-"""A shorter step has no direction beyond the noise of tracking."""
+from zfcal.units import HEADING_MIN_STEP_M
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -48,7 +46,7 @@ def observe_polarisation(points: Points) -> Iterator[Observed]:
         start, end = points.moves
         step_m = points.located.xy_m[end] - points.located.xy_m[start]
         length_m = lengths(step_m)
-        moving = np.flatnonzero(length_m >= MIN_STEP_M)
+        moving = np.flatnonzero(length_m >= HEADING_MIN_STEP_M)
         at, group, n = _groups(points, start[moving])
         mean = _means(step_m[moving] / length_m[moving, None], group, n)
         yield Observed(at=at[n > 1], value=lengths(mean)[n > 1])
