@@ -328,9 +328,9 @@ class World:
             # What it took for fresh before it learnt how late frames were stays so.
             self.fresh_s = max(self.fresh_s, self.written_s + self.all_late_s)
         frames = [each for each in frames if is_frame(each.time_s, each.frame, FPS)]
-        since_s, self.looked_s = self.now_s - self.looked_s, self.now_s
+        since_s, self.looked_s = self.looked_s, self.now_s
         self.driver.listen()
-        self.driver.take(frames, age_s=STEP_S if frames else None, looked_s=since_s)
+        self.driver.take(frames, age_s=STEP_S if frames else None, since_s=since_s)
         self.driver.tick()
 
     def replace_helper(self):
@@ -611,6 +611,31 @@ HOW = {
     "database": None,
     "suppress_health_check": list(HealthCheck),
 }
+
+
+def test_a_driver_that_is_stopped_while_it_takes_a_pose_knows_that_it_is_old():
+    """By SIGSTOP in the middle of a step: the pose is as old as the look that did not find it."""
+    world = World(free_running=False, pattern="fish")
+    world.pass_s(0.5)
+    see = world.driver.pilot.see
+
+    def stopped(*asked):
+        found = see(*asked)
+        world.now_s += 1.0
+        return found
+
+    world.driver.pilot.see = stopped
+    before_s, seen_s = world.now_s, world.driver._seen_s
+    frame = int((world.now_s - 100.0) * FPS) + 1
+    at = world.robot.pose
+    own = AgentPose(
+        agent=4, kind=ROBOT, x_m=at.x_m, y_m=at.y_m, heading_rad=at.heading_rad, confidence=1.0
+    )
+    poses = FramePoses(time_s=frame / FPS, frame=frame, agents=(own,))
+    world.driver.take([poses], age_s=STEP_S, since_s=before_s)
+    assert world.driver.pilot.pose is not None
+    assert world.driver._seen_s == seen_s
+    assert world.bot._until_s <= before_s + PATIENCE_S
 
 
 def test_the_robot_stops_whatever_happens():

@@ -307,7 +307,8 @@ class _Loop:
             # On the poses' clock each frame has its own ticks; a live one has the newest frame's.
             for frames in [batch] if self._crew.clock.is_live else [[f] for f in batch]:
                 age_s = self._age_s() if frames else None
-                self._driver.take(frames, age_s=age_s, looked_s=self._since_look_s())
+                since_s = self._before_s if self._crew.clock.is_live else None
+                self._driver.take(frames, age_s=age_s, since_s=since_s)
                 self._driver.tick()
                 self._crew.log.flush()
                 self._step_virtual()
@@ -384,10 +385,6 @@ class _Loop:
             # A clock that was set, or another computer's, says nothing.
             return max(0.0, age_s) if -0.1 < age_s < 5.0 else None
         return None
-
-    def _since_look_s(self) -> float:
-        """Return how long ago it was that what has come now was not there."""
-        return time.monotonic() - self._before_s if self._crew.clock.is_live else 0.0
 
     def _step_virtual(self) -> None:
         if self._virtual is not None and not self._crew.clock.is_live:

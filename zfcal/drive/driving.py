@@ -117,7 +117,7 @@ class Driver:
         self._crew.log.warm_up()
 
     def take(
-        self, frames: list[FramePoses], *, age_s: float | None = None, looked_s: float = 0.0
+        self, frames: list[FramePoses], *, age_s: float | None = None, since_s: float | None = None
     ) -> None:
         """Take frames that have come, oldest first.
 
@@ -127,14 +127,15 @@ class Driver:
             All of them: each step of the model that falls on one is done.
         age_s
             Seconds since the last one was written, where that is known.
-        looked_s
-            Seconds since it was not there yet: it may be so old, and no clock has to be right
-            for that.
+        since_s
+            When they were not there yet, by the steady clock: so old they may be, whatever holds
+            the driver up meanwhile, and no other clock has to be right for that. None for now.
         """
+        since_s = self._crew.clock.steady_s() if since_s is None else since_s
         if frames and not self._begun:
             self._begin(frames[0].time_s)
         if self._begun and not self._is_driving and self._crew.clock.is_live:
-            self._catch_up(frames, age_s=age_s)
+            self._catch_up(frames, age_s=age_s, since_s=since_s)
             return
         if self._crew.clock.is_live:
             self._count_late(frames)
@@ -142,11 +143,11 @@ class Driver:
             self._crew.clock.take_frame(poses.time_s)
             # The first ones of several have waited for longer.
             waited_s = max(0.0, frames[-1].time_s - poses.time_s)
-            self._take(poses, old_s=self._old_s(poses.time_s, looked_s + waited_s))
+            self._take(poses, taken_s=self._taken_s(poses.time_s, since_s - waited_s))
             if age_s is not None:
                 self._crew.log.measure(POSE_TO_STATE, age_s + waited_s)
 
-    def _catch_up(self, frames: list[FramePoses], *, age_s: float | None) -> None:
+    def _catch_up(self, frames: list[FramePoses], *, age_s: float | None, since_s: float) -> None:
         """Take what was written before the driver came, and while that was gone through.
 
         It is history: it is seen, and not driven by. Ticks begin with frames so few that none
@@ -156,18 +157,19 @@ class Driver:
         for poses in frames:
             waited_s = max(0.0, frames[-1].time_s - poses.time_s)
             waited_s = math.inf if age_s is None else age_s + waited_s
-            self._take(poses, old_s=self._old_s(poses.time_s, waited_s))
+            self._take(poses, taken_s=self._taken_s(poses.time_s, since_s - waited_s))
         self._n_histories += 1
         if n_due > 1 and self._n_histories < _MOST_HISTORIES:
             return
         self._is_driving = True
         self._crew.clock.take_frame(self._time_of_frame_s or 0.0)
 
-    def _old_s(self, time_s: float, waited_s: float) -> float:
-        """Return how old a frame's image is at least; 0 where time is not that of a clock."""
+    def _taken_s(self, time_s: float, there_s: float) -> float:
+        """Return when a frame's image was taken at the latest; now where time is not a clock's."""
+        now_s = self._crew.clock.steady_s()
         if not self._crew.clock.is_live:
-            return 0.0
-        return max(waited_s, self._lag.of(time_s, self._crew.clock.steady_s()))
+            return now_s
+        return min(there_s, now_s - self._lag.of(time_s, now_s))
 
     def tick(self) -> None:
         """Do the ticks that are due."""
@@ -212,7 +214,7 @@ class Driver:
         self._begun = True
         self._log_model(time_s, self._model, begins=True)
 
-    def _take(self, poses: FramePoses, *, old_s: float) -> None:
+    def _take(self, poses: FramePoses, *, taken_s: float) -> None:
         if self.pilot.is_due(poses.frame):
             self._look_for_model(poses.time_s)
         before, n_missed = self.pilot.pose, self.pilot.n_missed
@@ -221,7 +223,7 @@ class Driver:
         self._tell_missed(poses.time_s, self.pilot.n_missed - n_missed, "no frame came in time")
         seen = pose is not None and pose is not before
         if seen:
-            self._freshen(old_s)
+            self._freshen(taken_s)
         place: dict[str, float | None] = {"x_m": None, "y_m": None, "heading_rad": None}
         if seen and pose is not None:
             place = {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad}
@@ -269,10 +271,9 @@ class Driver:
             values = {"time_s": time_s, "steps": steps, "total": self.n_missed, "because": because}
             self._crew.tell(Note(text=text, warning=True, kind="missed", values=values))
 
-    def _freshen(self, old_s: float) -> None:
-        """Take what is known of the robot as known so many seconds ago."""
-        at_s = self._crew.clock.steady_s() - old_s
-        if not at_s > self._seen_s or old_s > PATIENCE_S:
+    def _freshen(self, at_s: float) -> None:
+        """Take what is known of the robot as known at a time of the steady clock."""
+        if not at_s > self._seen_s or self._crew.clock.steady_s() - at_s > PATIENCE_S:
             return
         watchdog = self._crew.watchdog
         if watchdog is not None:
