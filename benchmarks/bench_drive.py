@@ -28,7 +28,7 @@ from zfcal.artifacts.models import read_model
 from zfcal.artifacts.pose_files import PoseWriter
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.model.simulate import simulate_tracks
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 TARGET_S = 0.020

@@ -26,7 +26,7 @@ from zfcal.model.kernels.perception import Sight, in_vectors, make_sight, see_fi
 from zfcal.model.kernels.random import next_word, seeded, uniform
 from zfcal.model.kernels.run import advance, record_run, start
 from zfcal.model.kernels.staircase import staircase_turn
-from zfcal.model.kernels.world import GRID, LAW_F, STATES, Packed, make_work
+from zfcal.model.kernels.state import GRID, LAW_F, STATES, Packed, make_work
 from zfcal.model.simulate import individuals, pack, simulate_counts, tank_of
 from zfcal.parameters import natural
 

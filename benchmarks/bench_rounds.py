@@ -51,9 +51,9 @@ from zfcal.stages.calibrate.rounds import RoundPlaces, read_control
 from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.events import say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.segments import Segments
 from zfcal.stages.simulate import SimulateOptions, simulate
+from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.stages.windows import window_ends
 
 REAL = ("fish_only_six", "five-zebrafish", "Feedback_Initiative_model_1")
@@ -279,7 +279,7 @@ from pathlib import Path
 from zfcal.artifacts.models import read_model
 from zfcal.stages.events import say_nothing
 from zfcal.stages.calibrate.likelihood import estimate
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 opened = open_trial(Path(sys.argv[1]))
 start = read_model(opened.trial.root / opened.trial.model)
 for end_s in range(120, 601, 60):

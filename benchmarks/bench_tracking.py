@@ -36,7 +36,7 @@ from zfcal.cameras.camera import Homography, Projection
 from zfcal.cameras.frames import Frame
 from zfcal.cameras.rig import overhead_camera
 from zfcal.tracking.fusing import Fuser
-from zfcal.tracking.hindsight import Hindsight
+from zfcal.tracking.identity_revision import IdentityRevision
 from zfcal.tracking.region import region_of
 from zfcal.tracking.seen import METHODS, TrackerOptions
 from zfcal.tracking.tracker import FishTracker, follow
@@ -216,15 +216,15 @@ def tracked(film: Film, method: str) -> tuple[Places, Places, float]:
     tracker = FishTracker(options, film.projection, region=film.region)
     # A break is longer than a step; metres that are pixels have none, so that ids stay as told.
     break_s = 3 / FPS + 1 / FPS if film.unit == "mm" else 0.0
-    fuser, hindsight = Fuser(keeps=True, break_s=break_s), Hindsight(break_s)
+    fuser, revision = Fuser(keeps=True, break_s=break_s), IdentityRevision(break_s)
     begin = time.process_time()
     told = []
     for frame, seen in follow(tracker, film.frames):
-        hindsight.exchange(fuser.named(tracker.take_exchanges()), frame.time_s)
+        revision.exchange(fuser.named(tracker.take_exchanges()), frame.time_s)
         agents = fuser.step(seen, None, frame.time_s)
-        hindsight.note(frame.number, frame.time_s, fuser.agents)
+        revision.note(frame.number, frame.time_s, fuser.agents)
         told.append(FramePoses(time_s=frame.time_s, frame=frame.number, agents=agents))
-    tracks = list(chain.from_iterable(map(hindsight.revise, _minutes(told))))
+    tracks = list(chain.from_iterable(map(revision.revise, _minutes(told))))
     took_s = time.process_time() - begin
     return _places(told), _places(tracks), took_s
 

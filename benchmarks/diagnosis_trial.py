@@ -53,7 +53,7 @@ DIAGNOSIS_CODE = (
     "zfcal/parameters.py",
     "zfcal/tracks.py",
     "zfcal/stages/diagnose/diagnose.py",
-    "zfcal/stages/stretch.py",
+    "zfcal/stages/track_window.py",
     "zfcal/stages/import_.py",
     "zfcal/readers",
 )

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from zfcal.model.kernels.geometry import Tank, zone_exact
-from zfcal.model.kernels.world import Packed
+from zfcal.model.kernels.state import Packed
 
 Floats = NDArray[np.float64]
 

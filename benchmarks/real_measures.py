@@ -34,8 +34,8 @@ from zfcal.stages.calibrate.holdout import evaluate_model
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import score_table
 from zfcal.stages.events import say_nothing
-from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import Segments, segment_path, segment_starts
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.stages.windows import whole_segments
 from zfcal.tracks import FISH, GUESS, ROBOT
 

@@ -64,8 +64,8 @@ def command(
         zfcal import tracks.csv trial --format csv | zfcal analyse -
     """
     from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
-    from zfcal.stages.opening import Task
     from zfcal.stages.segments import Segments
+    from zfcal.stages.trial_context import Task
 
     options = AnalyseOptions(scoring=scoring, control=control, features=features or ())
     if features is not None and not options.further:

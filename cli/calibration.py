@@ -19,8 +19,8 @@ from .streams import STDIN, each_trial, trials_together
 if TYPE_CHECKING:
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.events import Tell
-    from zfcal.stages.opening import Task
     from zfcal.stages.streams import Work
+    from zfcal.stages.trial_context import Task
 
     MakeTask = Callable[[frozenset[int] | None], Task]
 
@@ -98,7 +98,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
     from zfcal.behaviour.features.registry import SCORED, further
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     _check_together(options)
     settings = Settings(

@@ -14,7 +14,7 @@ from .output import Output
 from .report import write_page
 
 if TYPE_CHECKING:
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
 
 @click.command("demo")
@@ -41,7 +41,7 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
         zfcal demo loop --closed-loop --duration 10min
         zfcal demo baseline --closed-loop --no-video --swims random --seed 3
     """
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
     from zfcal.virtual.demo import run_demo
 
     task = Task(force=force)

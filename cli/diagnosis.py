@@ -16,7 +16,7 @@ from .streams import STDIN
 if TYPE_CHECKING:
     from zfcal.stages.diagnose.diagnose import DiagnoseOptions
     from zfcal.stages.events import Event
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
 
 def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[DiagnoseOptions, Task]:
@@ -28,7 +28,7 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[Diagnos
         Two options contradict each other, or one could not take effect.
     """
     from zfcal.stages.diagnose.diagnose import DiagnoseOptions
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     _check_together(options, trials)
     noise_mm = options["noise_mm"]
@@ -55,13 +55,13 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 
 def diagnose_all(out: Output, roots: Iterable[Path], chosen: DiagnoseOptions, task: Task) -> None:
     """Diagnose trials, draw their pages, and say in words what each comes to."""
-    from zfcal.report.diagnosis.easel import Easel
+    from zfcal.report.diagnosis.render_pool import RenderPool
     from zfcal.stages.diagnose.diagnose import diagnose
 
-    with Easel() as easel:
+    with RenderPool() as pool:
         for root in roots:
             tell = functools.partial(tell_and_warn, out, root, in_words=True)
-            work = functools.partial(diagnose, root, chosen, tell, task=task, draw=easel)
+            work = functools.partial(diagnose, root, chosen, tell, task=task, draw=pool)
             out.attempt(work)
 
 

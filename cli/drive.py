@@ -126,7 +126,7 @@ def command(
         raise click.UsageError("--publish-zones is for --publish.")
     from zfcal.drive.drive import DriveOptions, drive
     from zfcal.drive.pilot import Manner
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     from .driving import DriveVoice
 

@@ -15,7 +15,7 @@ from .streams import STDIN
 
 if TYPE_CHECKING:
     from zfcal.stages.extend.extend import ExtendOptions
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
 
 def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[ExtendOptions, Task]:
@@ -29,7 +29,7 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[ExtendO
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.extend.extend import ExtendOptions
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     _check_together(options, trials)
     calibration = CalibrateOptions(
@@ -61,9 +61,9 @@ def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None
 
 def extend_one(out: Output, root: Path, chosen: ExtendOptions, task: Task) -> None:
     """Extend the model of one trial and draw the findings' page anew."""
-    from zfcal.report.diagnosis.easel import Easel
+    from zfcal.report.diagnosis.render_pool import RenderPool
     from zfcal.stages.extend.extend import extend
 
     tell = functools.partial(tell_and_warn, out, root)
-    with Easel(ahead=False) as easel:
-        extend(root, chosen, tell, task=task, draw=easel)
+    with RenderPool(ahead=False) as pool:
+        extend(root, chosen, tell, task=task, draw=pool)

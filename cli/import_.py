@@ -49,7 +49,7 @@ def command(
         zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
     """
     from zfcal.stages.import_ import Source, import_tracks
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     what = Source(
         path=source,

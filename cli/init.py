@@ -66,7 +66,7 @@ def command(
         zfcal init tank --radius-m 0.25 --fish 6 --source "shoal 3, Tuesday"
     """
     from zfcal.stages.init import NewTrial, create_trial
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     if n_fish is None:
         raise click.UsageError("Missing option '--fish'.")

@@ -14,8 +14,8 @@ from .streams import each_trial
 
 if TYPE_CHECKING:
     from zfcal.errors import DamagedError
-    from zfcal.stages.opening import Task
     from zfcal.stages.streams import Work
+    from zfcal.stages.trial_context import Task
 
 _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
 _HINT = "Make it again, or copy it again from where it was made."
@@ -40,7 +40,7 @@ def command(
         zfcal report trial*/
         zfcal report day1 day2 day3 --out together
     """
-    from zfcal.stages.opening import Task
+    from zfcal.stages.trial_context import Task
 
     roots: dict[Path, None] = {}
 
@@ -65,8 +65,8 @@ def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) 
         write_report,
     )
     from zfcal.stages.events import LeftOut, Made, Planned, UpToDate
-    from zfcal.stages.opening import at_work
     from zfcal.stages.stage import settled
+    from zfcal.stages.trial_context import at_work
 
     def work() -> None:
         reason = report_reason(roots, folder) or ("forced" if task.force else None)

@@ -55,8 +55,8 @@ def command(
         zfcal simulate alone --model my.toml --arena two-rooms --fish 5 --duration 600
         zfcal simulate filmed --model trial/models/000120.toml --duration 2min --video
     """
-    from zfcal.stages.opening import Task
     from zfcal.stages.simulate import SimulateOptions, simulate
+    from zfcal.stages.trial_context import Task
 
     def work() -> None:
         options = SimulateOptions(model=model, duration_s=duration_s, seed=seed, **new)

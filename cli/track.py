@@ -40,8 +40,8 @@ def command(
         zfcal track trial --overhead 'images/*.png' --corners '20,480 480,480 480,20 20,20'
         zfcal track trial --overhead 0 --below 1 --record jpeg | zfcal analyse -
     """
-    from zfcal.stages.opening import Task
     from zfcal.stages.track.track import track
+    from zfcal.stages.trial_context import Task
 
     task = Task(dry_run=dry_run, force=force)
 
@@ -56,8 +56,8 @@ def command(
 def _draw(out: Output, trial: Path, path: Path) -> None:
     from zfcal.artifacts.atomic import write_whole
     from zfcal.report.figures.trajectories import draw_trajectories
-    from zfcal.stages.opening import open_trial
-    from zfcal.stages.stretch import read_tracked
+    from zfcal.stages.track_window import read_tracked
+    from zfcal.stages.trial_context import open_trial
 
     arena = open_trial(trial).arena
     write_whole(path, lambda part: draw_trajectories(arena, read_tracked(trial), part))

@@ -18,7 +18,7 @@ from zfcal.report.figures.panels import compose
 from zfcal.report.figures.statistics import statistics_picture
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.events import Made, UpToDate
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 
 
 @pytest.fixture

@@ -76,10 +76,10 @@ def observer():
 
 def _one_step():
     """Draw a heading, move a shoal, and move a robot among fish."""
-    from zfcal.model.among import Among
+    from zfcal.model.fish_simulator import Shoal
     from zfcal.model.onestep import draw_headings
     from zfcal.model.packing import pack
-    from zfcal.model.shoal import Shoal
+    from zfcal.model.robot_agent import Among
 
     tank, fish = tank_and_fish()
     place = np.array([[0.2, 0.77], [0.24, 0.77]])

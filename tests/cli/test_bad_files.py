@@ -256,7 +256,7 @@ def quick(make_diagnosis):
         patch.setattr("zfcal.stages.diagnose.diagnose._estimate", estimate)
         patch.setattr("zfcal.report.diagnosis.drawing.png_of", lambda _: b"drawn")
         patch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
-        patch.setattr("zfcal.report.diagnosis.easel.Easel.prepare", lambda _: None)
+        patch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _: None)
         # Nobody pulls the plug.
         patch.setattr(os, "fsync", lambda _: None)
         yield

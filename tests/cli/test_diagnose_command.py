@@ -29,7 +29,7 @@ def answered(monkeypatch, make_diagnosis):
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
     # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.diagnosis.easel.Easel.prepare", lambda _easel: None)
+    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)
     return questions
 
 

@@ -26,7 +26,7 @@ def answered(monkeypatch, make_diagnosis):
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
     # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.diagnosis.easel.Easel.prepare", lambda _easel: None)
+    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)
 
 
 def test_no_effect_is_nothing_to_do(zfcal, trial, answered):

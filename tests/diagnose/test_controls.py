@@ -6,7 +6,7 @@ import pytest
 from zfcal.diagnose.controls import LATE_S, NAMES, ask_controls
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])

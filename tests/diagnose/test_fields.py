@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.fields import fields_of, is_known, is_within_fields
-from zfcal.model.kernels.world import STATES
+from zfcal.model.kernels.state import STATES
 
 
 def scene_at(tank, points, zone):

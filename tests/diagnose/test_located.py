@@ -20,7 +20,7 @@ from zfcal.diagnose.kernels import (
 from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
 from zfcal.diagnose.standing import standing_of
 from zfcal.diagnose.surroundings import probabilities
-from zfcal.model.kernels.world import HX, HY, SPEED, STATES, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, SPEED, STATES, ZONE, X, Y
 
 CELLS = 64
 

@@ -15,7 +15,7 @@ from zfcal.diagnose.naming import (
     ties_of,
     with_traits,
 )
-from zfcal.model.kernels.world import TRAIT
+from zfcal.model.kernels.state import TRAIT
 from zfcal.model.simulate import individuals
 
 N = 400

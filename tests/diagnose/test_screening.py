@@ -11,7 +11,7 @@ from zfcal.diagnose.scores import by_track, centred, excess_deviate, summed, tam
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.kernels.world import X, Y
+from zfcal.model.kernels.state import X, Y
 
 
 def family(screen, arena):

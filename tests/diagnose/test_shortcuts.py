@@ -11,7 +11,7 @@ from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import with_effect
 from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.scores import factor_score, mixture_score
-from zfcal.model.kernels.world import TRAIT, X, Y
+from zfcal.model.kernels.state import TRAIT, X, Y
 from zfcal.model.packing import pack
 from zfcal.model.scene import thin
 from zfcal.model.simulate import tank_of

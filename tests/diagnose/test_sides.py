@@ -15,7 +15,7 @@ from zfcal.diagnose.selection import Asked, Best, Selector
 from zfcal.diagnose.sides import directions, feigned, one_sided, with_direction
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.world import STATES, X
+from zfcal.model.kernels.state import STATES, X
 
 DRIFT = {"directional-drift": {"strength": 0.4, "direction_rad": 1.2, "by_slowness": 1.0}}
 PLACE = {"place-preference": {"strength": 1.5, "x_m": 0.25, "y_m": 0.75, "reach_m": 0.3}}

@@ -9,7 +9,7 @@ from zfcal.diagnose.naming import refit
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.tracing import trace
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.world import X, Y
+from zfcal.model.kernels.state import X, Y
 from zfcal.model.scene import make_scene
 
 

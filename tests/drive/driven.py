@@ -17,7 +17,7 @@ from zfcal.artifacts.pose_files import PoseWriter
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import from_genes, to_genes
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 from zfcal_cli.main import run
 

@@ -31,7 +31,7 @@ from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import Goal
 from zfcal.stages.events import LeftOut, Made, Note, Result, say_nothing
-from zfcal.stages.opening import Task, at_work, open_trial
+from zfcal.stages.trial_context import Task, at_work, open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))

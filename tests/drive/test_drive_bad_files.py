@@ -12,7 +12,7 @@ import pytest
 from zfcal.drive.models import DriveModels
 from zfcal.drive.pilot import Manner, Pilot
 from zfcal.robot.fishbot import FishBot
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 
 
 def _load(name):

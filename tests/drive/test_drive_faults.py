@@ -22,10 +22,10 @@ from zfcal.drive.replay import replay
 from zfcal.errors import LockedError
 from zfcal.robot.aseba import Decoder
 from zfcal.robot.fishbot import FishBot
-from zfcal.robot.lastword import RESYNC
+from zfcal.robot.stop_guard import RESYNC
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import say_nothing
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 from zfcal_cli.main import run as zfcal
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from zfcal.drive.models import DriveModels
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
 driven = importlib.util.module_from_spec(_spec)

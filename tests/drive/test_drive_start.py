@@ -17,7 +17,7 @@ from zfcal.drive.models import DriveModels
 from zfcal.drive.pilot import Manner, Pilot
 from zfcal.robot.fishbot import FishBot
 from zfcal.stages.events import say_nothing
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
 driven = importlib.util.module_from_spec(_spec)

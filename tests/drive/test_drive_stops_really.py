@@ -23,7 +23,7 @@ from zfcal.drive.models import DriveModels
 from zfcal.drive.pilot import Manner, Pilot
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.virtual_process import VirtualProcess
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 
 _spec = importlib.util.spec_from_file_location("driven", Path(__file__).with_name("driven.py"))
 driven = importlib.util.module_from_spec(_spec)
@@ -85,7 +85,7 @@ class Drive:
             with contextlib.suppress(OSError):
                 parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
                 is_ours = parent == self.driver.pid
-                if is_ours and b"lastword" in (entry / "cmdline").read_bytes():
+                if is_ours and b"stop_guard" in (entry / "cmdline").read_bytes():
                     return int(entry.name)
         return None
 

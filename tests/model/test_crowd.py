@@ -20,7 +20,7 @@ from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.perception import LENGTH_M, make_sight, most_sr, see
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import record_run
-from zfcal.model.kernels.world import HX, HY, STATES, ZONE, X, Y, make_work, settle
+from zfcal.model.kernels.state import HX, HY, STATES, ZONE, X, Y, make_work, settle
 from zfcal.model.packing import pack
 from zfcal.model.simulate import (
     MOST_IN_FULL,

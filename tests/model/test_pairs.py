@@ -10,7 +10,7 @@ import shapely
 
 from zfcal.arena import Bins, make_arena
 from zfcal.model.kernels.pairs import add_pairs, make_pairs, squared_edges
-from zfcal.model.kernels.world import STATES, ZONE, X, Y
+from zfcal.model.kernels.state import STATES, ZONE, X, Y
 from zfcal.model.simulate import tank_of
 
 pytestmark = pytest.mark.plain

@@ -10,7 +10,7 @@ import shapely
 
 from zfcal.arena import make_arena
 from zfcal.model.kernels.rooms import find_rooms
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     LEFT_AT_S,
     LEFT_S,
     MOUTH_M,

@@ -7,7 +7,7 @@ import pytest
 
 from zfcal.errors import InputError
 from zfcal.model.kernels.scene import perceive
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,

@@ -12,9 +12,9 @@ from zfcal.online.watch_stages import AnalyseStage, CalibrateStage, Turn, has_en
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.events import LeftOut, Made, Note, say_nothing
-from zfcal.stages.opening import Task
 from zfcal.stages.recording import STRETCH_KEY
 from zfcal.stages.skipping import skipped_ends, skipped_path
+from zfcal.stages.trial_context import Task
 
 
 @pytest.fixture

@@ -33,7 +33,10 @@ from zfcal.robot import events
 from zfcal.robot.body import WHEEL_LIMIT_M_S, Pose
 from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import FishBot, Watchdog
-from zfcal.robot.lastword import (
+from zfcal.robot.motion import Goal
+from zfcal.robot.plausible import is_frame
+from zfcal.robot.simulated import SimulatedFishBot, Traits
+from zfcal.robot.stop_guard import (
     DRIVER,
     HELPER,
     RESYNC,
@@ -44,10 +47,7 @@ from zfcal.robot.lastword import (
     Output,
     Slate,
 )
-from zfcal.robot.motion import Goal
-from zfcal.robot.plausible import is_frame
-from zfcal.robot.simulated import SimulatedFishBot, Traits
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 

@@ -1,7 +1,7 @@
 """A port in memory that counts what waits, and two writers to it."""
 
 from zfcal.robot.aseba import Decoder
-from zfcal.robot.lastword import DRIVER, HELPER, Output, Slate
+from zfcal.robot.stop_guard import DRIVER, HELPER, Output, Slate
 
 
 class CountedPort:

@@ -21,9 +21,9 @@ from zfcal.robot.body import Pose, Wheels
 from zfcal.robot.events import Said
 from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import FishBot, Watchdog
-from zfcal.robot.lastword import RESYNC
 from zfcal.robot.port import SerialLine
 from zfcal.robot.simulated import SimulatedFishBot, Traits
+from zfcal.robot.stop_guard import RESYNC
 from zfcal.robot.virtual_process import Control
 
 STOP = events.stop().encode().hex()
@@ -182,7 +182,7 @@ def test_a_line_that_says_it_takes_bytes_and_takes_none_is_lost(monkeypatch):
         raise BlockingIOError
 
     with monkeypatch.context() as patch:
-        patch.setattr("zfcal.robot.lastword.os.write", take_none)
+        patch.setattr("zfcal.robot.stop_guard.os.write", take_none)
         assert not line.write(bytes(10))
     assert 1 <= len(tried) <= 10
     assert "timeout" in line.problem
@@ -286,7 +286,7 @@ BEATING = """
 import sys, time
 from zfcal.robot.body import Wheels
 from zfcal.robot.fishbot import FishBot, Watchdog
-from zfcal.robot.lastword import RESYNC
+from zfcal.robot.stop_guard import RESYNC
 from zfcal.robot.port import SerialLine
 line = SerialLine(sys.argv[1])
 line.wait(5)

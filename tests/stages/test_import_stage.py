@@ -9,7 +9,7 @@ from zfcal.errors import InputError
 from zfcal.stages.events import Made, Note, UpToDate, say_nothing
 from zfcal.stages.import_ import Source, import_tracks
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task
+from zfcal.stages.trial_context import Task
 from zfcal.tracks import KINDS, ROBOT
 
 

@@ -12,7 +12,7 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.stages.events import Made, Planned, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task, open_trial
+from zfcal.stages.trial_context import Task, open_trial
 
 TWO_ROOMS = NewTrial(n_fish=4, n_robots=1, fps=15.0, arena="two-rooms", seed=3)
 

@@ -10,7 +10,6 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.errors import InputError
 from zfcal.stages.events import Made, UpToDate
-from zfcal.stages.opening import Task
 from zfcal.stages.recording import (
     Recording,
     check_same_source,
@@ -21,6 +20,7 @@ from zfcal.stages.recording import (
     starts_of_recording,
 )
 from zfcal.stages.stage import OneThing, run
+from zfcal.stages.trial_context import Task
 from zfcal.tracks import Tracks, concatenate
 
 LINEAGE = Lineage(schema="zfcal.tracks/1", command="import", inputs={"a.csv": "0" * 64})

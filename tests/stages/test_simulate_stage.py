@@ -12,8 +12,8 @@ from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Made, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task, open_trial
 from zfcal.stages.simulate import SimulateOptions, between_steps, new_trial, simulate
+from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import ROBOT, concatenate
 
 

@@ -11,8 +11,8 @@ from zfcal.artifacts.validation import check
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.events import Made, Note, say_nothing
-from zfcal.stages.opening import Task
 from zfcal.stages.skipping import skipped_ends, skipped_path, write_skipped
+from zfcal.stages.trial_context import Task
 
 
 @pytest.fixture

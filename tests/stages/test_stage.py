@@ -13,9 +13,9 @@ from zfcal.artifacts.reading.contents import hash_of, read_bytes
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.errors import ChangedError, DamagedError, InputError, LockedError, TakenError
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, UpToDate
-from zfcal.stages.opening import Task
 from zfcal.stages.segments import segment_starts
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Stage, run
+from zfcal.stages.trial_context import Task
 
 DRY, FORCED = Task(dry_run=True), Task(force=True)
 

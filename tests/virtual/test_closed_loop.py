@@ -14,7 +14,7 @@ from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Note, UpToDate
-from zfcal.stages.opening import Task, open_trial
+from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import FISH, ROBOT
 from zfcal.virtual.closed_loop import closed_loop
 from zfcal.virtual.eyes import VirtualEyes

@@ -16,8 +16,8 @@ from zfcal.errors import InputError
 from zfcal.stages.camera.cameras import read_camera, write_camera
 from zfcal.stages.events import Made, Planned, Progress, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task
 from zfcal.stages.simulate import SimulateOptions
+from zfcal.stages.trial_context import Task
 from zfcal.tracks import ROBOT
 from zfcal.virtual.film import FilmOptions, film
 from zfcal.virtual.film_export import export_video, exported_paths

@@ -9,7 +9,7 @@ import pytest
 from zfcal.artifacts.arenas import load_arena
 from zfcal.errors import InputError
 from zfcal.parameters import ALPHA_MAX, natural
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT
 from zfcal.trial import Trial
 from zfcal.virtual.fish import FishOptions, Truth, VirtualFish, varied

@@ -13,7 +13,7 @@ from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.events import Made, Result, say_nothing
-from zfcal.stages.opening import open_trial
+from zfcal.stages.trial_context import open_trial
 from zfcal.virtual.closed_loop import closed_loop
 from zfcal.virtual.rounds import RoundsBeside, Windows, do_rounds, rounds_beside
 from zfcal.virtual.trial import Experiment, LoopOptions

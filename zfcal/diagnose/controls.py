@@ -16,7 +16,7 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import summed
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
-from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY
 from zfcal.model.scene import Scene
 
 LATE_S = 12.0

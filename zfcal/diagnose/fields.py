@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from zfcal.arrays import Ints
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.contexts import N_FIELDS, field_of
-from zfcal.model.kernels.world import X, Y
+from zfcal.model.kernels.state import X, Y
 from zfcal.model.scene import Scene
 
 _BY_PLACE = ("generic:speed:place", "generic:speed:wall")

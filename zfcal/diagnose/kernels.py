@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
-from zfcal.model.kernels.world import HX, HY, KIND, SPEED, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, KIND, SPEED, ZONE, X, Y
 
 _TIE_RAD = 1e-9
 
@@ -32,7 +32,7 @@ def surroundings_of(states: Floats, at: Ints, who: Ints, reach_m: float) -> Floa
     Parameters
     ----------
     states : ndarray, shape (sample, state, agent)
-        Rows as in `zfcal.model.kernels.world`.
+        Rows as in `zfcal.model.kernels.state`.
     at, who : ndarray of int64, shape (step,)
         Sample and agent of each step.
     reach_m

@@ -23,7 +23,7 @@ from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed
 from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free
-from zfcal.model.kernels.world import TRAIT
+from zfcal.model.kernels.state import TRAIT
 from zfcal.model.scene import Moves, Scene, thin
 
 _ROUNDS = 10

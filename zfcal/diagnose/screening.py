@@ -48,7 +48,7 @@ from zfcal.model.kernels.scores import (
     mixture_score,
     social_score,
 )
-from zfcal.model.kernels.world import SPEED, TRAIT, Packed
+from zfcal.model.kernels.state import SPEED, TRAIT, Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.model.views import (

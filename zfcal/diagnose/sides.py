@@ -11,7 +11,7 @@ from zfcal.diagnose.heats import Heat
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.world import X, Y
+from zfcal.model.kernels.state import X, Y
 
 _PLACE, _DIRECTION = "place-preference", "directional-drift"
 

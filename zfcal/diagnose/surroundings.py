@@ -28,7 +28,7 @@ from zfcal.diagnose.kernels import (
     surroundings_of,
 )
 from zfcal.model.fitted import Fitted
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     FOLLOWS,
     HX,
     HY,

@@ -11,7 +11,7 @@ from zfcal.diagnose.findings import Trace
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
-from zfcal.model.kernels.world import SPEED, WALL, ZONE, X, Y
+from zfcal.model.kernels.state import SPEED, WALL, ZONE, X, Y
 from zfcal.model.scene import Moves, Scene
 
 _BINS = 12

@@ -28,9 +28,9 @@ from zfcal.robot.plausible import is_frame
 from zfcal.robot.port import SerialLine, is_pseudo_terminal
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import LeftOut, Note, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
+from zfcal.stages.realtime import ahead_of_others, garbage_left_alone
 from zfcal.stages.stage import settled
-from zfcal.stages.undisturbed import ahead_of_others, garbage_left_alone
+from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial
 from zfcal.tracks import FramePoses
 from zfcal.units import SEGMENT_S
 

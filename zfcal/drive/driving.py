@@ -24,7 +24,7 @@ from zfcal.robot.faults import Complaints
 from zfcal.robot.fishbot import PATIENCE_S, FishBot, Watchdog
 from zfcal.robot.motion import TICK_S
 from zfcal.stages.events import Note, Tell
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import ROBOT, FramePoses
 
 _MOST_HISTORIES = 5

@@ -13,7 +13,7 @@ from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of, one_c
 from zfcal.drive.pilot import InForce
 from zfcal.errors import InputError, ZfcalError
 from zfcal.model.packing import pack
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 
 
 @final

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.errors import InputError
-from zfcal.model.among import Among, Move
-from zfcal.model.kernels.world import Packed
+from zfcal.model.kernels.state import Packed
+from zfcal.model.robot_agent import Among, Move
 from zfcal.parameters import Parameters
 from zfcal.robot.aseba import Frame
 from zfcal.robot.body import RADIUS_M, Pose, Wheels, wheels_for
@@ -24,7 +24,7 @@ from zfcal.robot.confines import Confines
 from zfcal.robot.fishbot import PATIENCE_S, FishBot
 from zfcal.robot.motion import Gains, Goal, bearing, pattern_of
 from zfcal.robot.plausible import Doubt, Plausibility, Reach
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 Floats: TypeAlias = NDArray[np.float64]

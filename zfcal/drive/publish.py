@@ -13,7 +13,7 @@ from zfcal.drive.pilot import InForce
 from zfcal.errors import ZfcalError
 from zfcal.robot.cats import Address, OlderRig
 from zfcal.stages.events import Note, Progress, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
+from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial
 
 _LOOK_S = 0.05
 _FOLDER_S = 0.2

@@ -23,8 +23,8 @@ from zfcal.model.packing import pack
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.motion import Gains
 from zfcal.stages.events import LeftOut, Note, Progress, Result, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial
 from zfcal.stages.track.minutes import pose_files
+from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial
 from zfcal.tracks import FramePoses
 
 _NEAR_S = 120

@@ -14,7 +14,7 @@ from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_gri
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     DT_S,
     GRID,
     HX,

@@ -14,7 +14,7 @@ from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     KAPPA_BASE,
     KAPPA_F,
     LAG_MAX,

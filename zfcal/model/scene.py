@@ -18,7 +18,7 @@ from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.model.kernels.landing import ANGLES, PER_CELL, landing_shares
 from zfcal.model.kernels.scene import fill_states
-from zfcal.model.kernels.world import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, SPEED, TAU_X, TAU_Y, ZONE, X, Y
 from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
 from zfcal.units import HEADING_MIN_STEP_M
@@ -90,7 +90,7 @@ class Scene:
     k : ndarray of int64, shape (sample,)
         Sample numbers.
     states : ndarray, shape (sample, state, column)
-        Rows as in `zfcal.model.kernels.world`. Tracks that do not overlap share a column.
+        Rows as in `zfcal.model.kernels.state`. Tracks that do not overlap share a column.
     tracks : ndarray of int32, shape (sample, column)
         Track ids; -1 where nobody is.
     turns

@@ -13,7 +13,7 @@ from zfcal.arena import Arena
 from zfcal.errors import InputError
 from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
 from zfcal.model.kernels.run import Counts, count_runs, record_run
-from zfcal.model.kernels.world import GRID, Packed
+from zfcal.model.kernels.state import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
 from zfcal.model.tank import tank_of
 from zfcal.parameters import Parameters

@@ -14,7 +14,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.effects import Effect, find_effect
-from zfcal.model.kernels.asking import (
+from zfcal.model.kernels.effect_evaluation import (
     PART,
     ask_components,
     ask_factors,
@@ -27,7 +27,7 @@ from zfcal.model.kernels.extended import harmonic_tilt
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import head_late, perceive
-from zfcal.model.kernels.world import Packed
+from zfcal.model.kernels.state import Packed
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
@@ -283,7 +283,7 @@ def harmonics(
     Returns
     -------
     waves, zones, log_taken
-        As `zfcal.model.kernels.asking.ask_harmonics` has them.
+        As `zfcal.model.kernels.effect_evaluation.ask_harmonics` has them.
     """
     turns, n = scene.turns, len(scene.turns)
     waves, log_taken = np.empty((n, 1 + 2 * form.degree)), np.empty(n)

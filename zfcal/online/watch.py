@@ -40,9 +40,9 @@ from zfcal.online.watch_stages import (
 )
 from zfcal.online.worker import Done, Failure, Worker
 from zfcal.stages import events as of
-from zfcal.stages.opening import open_trial
 from zfcal.stages.segments import segment_starts
 from zfcal.stages.skipping import skipped_ends
+from zfcal.stages.trial_context import open_trial
 from zfcal.stages.windows import window_ends
 from zfcal.units import SEGMENT_S
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from zfcal.online.turns import Overruns, budget_of, choose
+from zfcal.online.scheduling import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, Takes
 from zfcal.online.worker import Job
 from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
-from zfcal.stages.opening import Task, open_trial
 from zfcal.stages.recording import starts_between, stretch_of
 from zfcal.stages.segments import Segments, segment_path, segment_starts
 from zfcal.stages.skipping import write_skipped
+from zfcal.stages.trial_context import Task, open_trial
 
 if TYPE_CHECKING:
     from zfcal.stages.analyse.analyse import AnalyseOptions

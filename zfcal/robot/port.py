@@ -20,8 +20,8 @@ from typing import Protocol, TypeVar, final
 
 import serial
 
-from zfcal.robot import lastword
-from zfcal.robot.lastword import (
+from zfcal.robot import stop_guard
+from zfcal.robot.stop_guard import (
     DRIVER,
     HELPER,
     STATE,
@@ -307,7 +307,7 @@ class Helper:
         slate.alive_s = 0.0
         self._process = subprocess.Popen(  # noqa: S603 - this very Python, on a file of this package
             [
-                *(sys.executable, "-I", "-S", str(Path(lastword.__file__))),
+                *(sys.executable, "-I", "-S", str(Path(stop_guard.__file__))),
                 *(str(port), str(slate.descriptor), str(int(is_lossless))),
             ],
             stdin=subprocess.PIPE,

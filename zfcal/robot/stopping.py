@@ -11,7 +11,7 @@ import tty
 from collections.abc import Callable, Iterator
 
 from zfcal.errors import InputError
-from zfcal.robot.lastword import DRIVER, Descriptor, Output, Slate
+from zfcal.robot.stop_guard import DRIVER, Descriptor, Output, Slate
 
 PATIENCE_S = 0.7
 """After so long it is said that STOP has not gone yet: where the radio link is up it has."""

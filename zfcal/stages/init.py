@@ -25,7 +25,7 @@ from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.errors import InputError, ZfcalError
 from zfcal.parameters import Parameters, natural
 from zfcal.stages.events import Made, Note, Planned, Tell, UpToDate
-from zfcal.stages.opening import Task
+from zfcal.stages.trial_context import Task
 from zfcal.trial import Trial
 from zfcal.units import default_dt_s
 

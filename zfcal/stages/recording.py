@@ -15,10 +15,10 @@ from zfcal.artifacts.reading.contents import hash_of, hold_steady
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Note, Progress
-from zfcal.stages.opening import Task
 from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
 from zfcal.stages.stage import Draft, Item, Output, Run, Write
 from zfcal.stages.taken import unless_taken
+from zfcal.stages.trial_context import Task
 from zfcal.tracks import Tracks
 from zfcal.trial import Trial
 

@@ -30,7 +30,7 @@ from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.stages.events import LeftOut, Tell
-from zfcal.stages.opening import OpenTrial, open_trial
+from zfcal.stages.trial_context import OpenTrial, open_trial
 from zfcal.tracks import GUESS, Samples, Tracks
 from zfcal.units import SEGMENT_S
 

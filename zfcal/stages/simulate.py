@@ -18,10 +18,10 @@ from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
 from zfcal.stages.segments import segment_path
 from zfcal.stages.stage import Item, OneThing, Run, run
+from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 Floats = NDArray[np.float64]

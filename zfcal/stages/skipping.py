@@ -15,7 +15,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.places import is_regular
 from zfcal.stages.events import Note, Tell
-from zfcal.stages.opening import Task
+from zfcal.stages.trial_context import Task
 
 SKIPPED = "zfcal.skipped/1"
 ENDING = ".skipped.json"

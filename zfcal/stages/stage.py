@@ -34,8 +34,8 @@ from zfcal.artifacts.reading.contents import one_content
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import ChangedError, DamagedError
 from zfcal.stages.events import Event, LeftOut, Made, Note, Planned, Progress, Tell, UpToDate
-from zfcal.stages.opening import Task, at_work, tell_version
 from zfcal.stages.taken import unless_taken
+from zfcal.stages.trial_context import Task, at_work, tell_version
 
 K = TypeVar("K")
 S = TypeVar("S")

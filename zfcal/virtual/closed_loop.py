@@ -19,8 +19,8 @@ import numpy as np
 
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import Progress, Tell
-from zfcal.stages.opening import Task
 from zfcal.stages.segments import STEP_S
+from zfcal.stages.trial_context import Task
 from zfcal.virtual.eyes import VirtualEyes
 from zfcal.virtual.fish import VirtualFish
 from zfcal.virtual.lockstep import LockstepDriver

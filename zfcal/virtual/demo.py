@@ -14,11 +14,11 @@ from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, CameraChoice
 from zfcal.stages.events import Made, Note, Tell, UpToDate
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task
 from zfcal.stages.segments import segment_path, segment_starts
 from zfcal.stages.simulate import SimulateOptions, simulate
 from zfcal.stages.track.plan import Pictures, TrackOptions
 from zfcal.stages.track.track import track
+from zfcal.stages.trial_context import Task
 from zfcal.tracks import KINDS, Tracks, concatenate
 from zfcal.virtual.film import FilmOptions, film, frames_folder
 

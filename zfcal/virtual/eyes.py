@@ -13,10 +13,10 @@ from zfcal.cameras.frames import Frame, Image
 from zfcal.cameras.rig import below_camera, overhead_camera
 from zfcal.online.worker import Worker
 from zfcal.stages.events import Tell, say_nothing
-from zfcal.stages.opening import OpenTrial, open_trial
+from zfcal.stages.trial_context import OpenTrial, open_trial
 from zfcal.tracking.background import background_of
 from zfcal.tracking.fusing import Fuser
-from zfcal.tracking.hindsight import Hindsight
+from zfcal.tracking.identity_revision import IdentityRevision
 from zfcal.tracking.region import region_of
 from zfcal.tracking.robot import LedOptions, RobotFinder, RobotSeen
 from zfcal.tracking.seen import TrackerOptions
@@ -162,7 +162,7 @@ class VirtualEyes:
             region=region_of(arena, above),
         )
         self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
-        self._hindsight = Hindsight(trial.longest_step_s)
+        self._revision = IdentityRevision(trial.longest_step_s)
         self._beside.answer(say_nothing)
 
     @property
@@ -176,15 +176,15 @@ class VirtualEyes:
         self._beside.order(moment)
         image = decoded(photo_of(self._above, moment))
         seen = self._tracker.step(Frame(number=truth.frame, time_s=truth.time_s, image=image))
-        self._hindsight.exchange(self._fuser.named(self._tracker.take_exchanges()), truth.time_s)
+        self._revision.exchange(self._fuser.named(self._tracker.take_exchanges()), truth.time_s)
         robot: RobotSeen = self._beside.answer(say_nothing)
         agents = self._fuser.step(seen, robot, truth.time_s)
-        self._hindsight.note(truth.frame, truth.time_s, self._fuser.agents)
+        self._revision.note(truth.frame, truth.time_s, self._fuser.agents)
         return FramePoses(time_s=truth.time_s, frame=truth.frame, agents=agents)
 
     def revise(self, frames: list[FramePoses]) -> list[FramePoses]:
         """Return frames as they are known by now."""
-        return self._hindsight.revise(frames)
+        return self._revision.revise(frames)
 
     def take_bad(self) -> tuple[str, ...]:
         """Return what was wrong with the last frame."""

@@ -31,10 +31,10 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.cameras import read_camera, write_camera
 from zfcal.stages.camera.messages import calibration_of
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
-from zfcal.stages.opening import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.stages.segments import STEP_S, segment_path, segment_starts
 from zfcal.stages.stage import settled
 from zfcal.stages.taken import unless_taken
+from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.tracks import Tracks, concatenate
 from zfcal.trial import second_of
 from zfcal.virtual.images.look import USUAL, Look, look_of

@@ -23,8 +23,8 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.cameras.frames import Image
 from zfcal.errors import DamagedError, InputError, StorageError
 from zfcal.stages.events import Made, Planned, Progress, Tell, UpToDate
-from zfcal.stages.opening import Task
 from zfcal.stages.stage import settled
+from zfcal.stages.trial_context import Task
 from zfcal.virtual.film import BELOW, camera_names, frames_folder
 
 SCHEMA = "zfcal.video/1"

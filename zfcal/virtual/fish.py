@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.errors import InputError
-from zfcal.model.shoal import Shoal
+from zfcal.model.fish_simulator import Shoal
 from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, Parameters, ZoneParameters
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 Floats = NDArray[np.float64]

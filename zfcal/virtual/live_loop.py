@@ -28,7 +28,7 @@ from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.camera.cameras import write_camera
 from zfcal.stages.camera.rig import BELOW, OVERHEAD
 from zfcal.stages.events import Note, Progress, Tell
-from zfcal.stages.opening import OpenTrial, Task
+from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.virtual.camera_server import CameraServer
 from zfcal.virtual.eyes import Drawn
 from zfcal.virtual.trial import (

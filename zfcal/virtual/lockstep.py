@@ -14,7 +14,7 @@ from zfcal.errors import InputError
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.port import SerialLine
 from zfcal.stages.events import Tell
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FramePoses
 
 _OPENING_S = 5.0

@@ -25,11 +25,11 @@ from zfcal.parameters import Parameters, ZoneParameters, natural
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import Tell, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.recording import TRACKS
 from zfcal.stages.segments import STEP_S
 from zfcal.stages.track.minutes import Minutes, Origins, Revise
 from zfcal.stages.track.outcome import measured
+from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FramePoses
 from zfcal.trial import LOOP_NAME
 from zfcal.virtual.fish import FishOptions, VirtualFish

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from zfcal.model.effects import find_effect
-from zfcal.model.kernels import world
+from zfcal.model.kernels import state
 from zfcal.model.simulate import simulate_tracks
 
 MIDDLING = {
     "HX": 1.0, "SPEED": 0.07, "ZONE": 3.0, "WALL": 0.1, "TAU_Y": 1.0, "PAST_HX": 1.0,
-    "MOUTH_M": world.NEVER_S, "LEFT_S": world.NEVER_S, "LEFT_AT_S": -world.NEVER_S, "DT_S": 0.2,
+    "MOUTH_M": state.NEVER_S, "LEFT_S": state.NEVER_S, "LEFT_AT_S": -state.NEVER_S, "DT_S": 0.2,
 }  # fmt: skip
 
 
@@ -28,9 +28,9 @@ class Asked:
     def __init__(self, name, parameters, rows):
         self.effect = find_effect(name)
         n = max([np.size(values) for values in rows.values()], default=1)
-        self.state = np.zeros((world.STATES, n))
+        self.state = np.zeros((state.STATES, n))
         for row, values in (MIDDLING | rows).items():
-            self.state[getattr(world, row)] = values
+            self.state[getattr(state, row)] = values
         self.sight = np.where(np.eye(n, dtype=bool), 0.0, 0.01)
         self.parameters = np.zeros(8)
         values = self.effect.values(parameters)

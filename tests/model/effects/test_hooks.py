@@ -14,7 +14,7 @@ from zfcal.errors import InputError
 from zfcal.model import packing
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, SIGHT, SPEED
-from zfcal.model.kernels.world import HX, TIME, X
+from zfcal.model.kernels.state import HX, TIME, X
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
 

@@ -21,9 +21,9 @@ from zfcal.diagnose.findings import Gap, Note, Screened, Verdict
 from zfcal.parameters import natural
 from zfcal.report.diagnosis import page as diagnosis_page
 from zfcal.report.diagnosis import words as diagnosis_words
-from zfcal.report.diagnosis.easel import Easel
 from zfcal.report.diagnosis.figures import finding_picture, shown_places, slug
 from zfcal.report.diagnosis.overview import gap_picture, screened_picture
+from zfcal.report.diagnosis.render_pool import RenderPool
 from zfcal.report.diagnosis.tables import tables
 from zfcal.report.diagnosis.words import statements, verdict_sentence
 from zfcal.report.figures import theme
@@ -382,13 +382,13 @@ def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
     assert (tmp_path / "mine.png").exists()
 
 
-def test_an_easel_draws_what_is_drawn_without(make_sheet, tmp_path):
+def test_a_pool_draws_what_is_drawn_without(make_sheet, tmp_path):
     """Processes of its own give the same bytes, and are gone afterwards."""
     sheet = make_sheet(names=())
-    with Easel() as easel:
-        easel.prepare()
+    with RenderPool() as pool:
+        pool.prepare()
         hands = multiprocessing.active_children()
-        drawn = {path.name: path.read_bytes() for path in easel.write(tmp_path / "a", sheet)}
+        drawn = {path.name: path.read_bytes() for path in pool.write(tmp_path / "a", sheet)}
     assert len(hands) == 2
     assert not multiprocessing.active_children()
     without = diagnosis_page.write(tmp_path / "b", sheet)
@@ -400,8 +400,8 @@ def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
     hands = {}
 
     def interrupted():
-        with Easel() as easel:
-            easel.prepare()
+        with RenderPool() as pool:
+            pool.prepare()
             for hand in multiprocessing.active_children():
                 status = Path(f"/proc/{hand.pid}/status").read_text()
                 (held,) = re.findall(r"SigBlk:\s*(\w+)", status)
@@ -417,9 +417,9 @@ def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
 
 ALONE = """
 import multiprocessing, os, signal
-from zfcal.report.diagnosis.easel import Easel
-with Easel() as easel:
-    easel.prepare()
+from zfcal.report.diagnosis.render_pool import RenderPool
+with RenderPool() as pool:
+    pool.prepare()
     print(*(hand.pid for hand in multiprocessing.active_children()), flush=True)
     input()
 """
@@ -441,32 +441,32 @@ def test_hands_end_with_a_parent_that_is_killed():
     assert parent.communicate(timeout=60)[0] == ""
 
 
-def test_an_easel_that_can_have_no_processes(make_sheet, tmp_path, undrawn, monkeypatch):
+def test_a_pool_that_can_have_no_processes(make_sheet, tmp_path, undrawn, monkeypatch):
     """Where they are not allowed, the page is drawn without."""
 
     def refused(*_, **__):
         raise OSError(30, "Read-only file system")
 
-    monkeypatch.setattr("zfcal.report.diagnosis.easel.ProcessPoolExecutor", refused)
-    with Easel() as easel:
-        easel.prepare()
-        easel.prepare()
-        written = easel.write(tmp_path, make_sheet())
+    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.ProcessPoolExecutor", refused)
+    with RenderPool() as pool:
+        pool.prepare()
+        pool.prepare()
+        written = pool.write(tmp_path, make_sheet())
     assert written[0].name == "report.html"
 
 
-def test_an_easel_whose_process_was_killed(make_sheet, tmp_path, undrawn):
+def test_a_pool_whose_process_was_killed(make_sheet, tmp_path, undrawn):
     """The page is drawn all the same."""
-    with Easel() as easel:
-        easel.prepare()
+    with RenderPool() as pool:
+        pool.prepare()
         for hand in multiprocessing.active_children():
             hand.kill()
-        written = easel.write(tmp_path, make_sheet())
+        written = pool.write(tmp_path, make_sheet())
     assert [path.name for path in written] == ["report.html", "1-alignment.png", "screened.png"]
     # Drawn here, where drawing is replaced by a line.
     assert not written[1].read_bytes().startswith(b"\x89PNG")
-    assert easel.reason(tmp_path, "f" * 64) is None
-    assert easel.files(tmp_path) == written
+    assert pool.reason(tmp_path, "f" * 64) is None
+    assert pool.files(tmp_path) == written
 
 
 @pytest.mark.slow

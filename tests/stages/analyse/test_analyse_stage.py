@@ -17,8 +17,8 @@ from zfcal.errors import InputError
 from zfcal.stages.analyse import analyse as stage
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Result, UpToDate
-from zfcal.stages.opening import Task, open_trial
 from zfcal.stages.segments import Segments
+from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import FISH
 
 PAPER = AnalyseOptions()

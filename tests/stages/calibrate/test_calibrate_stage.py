@@ -29,7 +29,7 @@ from zfcal.stages.events import (
     UpToDate,
     say_nothing,
 )
-from zfcal.stages.opening import Task
+from zfcal.stages.trial_context import Task
 
 
 class Killed(BaseException):

@@ -19,9 +19,9 @@ from zfcal.stages.calibrate.holdout import (
     pooled_fish,
 )
 from zfcal.stages.events import Made, UpToDate, say_nothing
-from zfcal.stages.opening import open_trial
 from zfcal.stages.segments import Segments
 from zfcal.stages.simulate import SimulateOptions, simulate
+from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import FISH
 
 

@@ -18,8 +18,8 @@ from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.events import LeftOut, Note, say_nothing
-from zfcal.stages.opening import open_trial
-from zfcal.stages.stretch import read_stretch
+from zfcal.stages.track_window import read_stretch
+from zfcal.stages.trial_context import open_trial
 
 
 def swim(root, seed=5):

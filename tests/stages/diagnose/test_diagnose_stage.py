@@ -15,7 +15,7 @@ from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError, LockedError
 from zfcal.stages.diagnose.diagnose import DiagnoseOptions, KnownNoise, diagnose
 from zfcal.stages.events import LeftOut, Made, Planned, Progress, Result, UpToDate
-from zfcal.stages.opening import Task, open_trial
+from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import FISH, ROBOT
 
 

@@ -17,7 +17,7 @@ from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.diagnose.diagnose import DiagnoseOptions, KnownNoise, diagnose
 from zfcal.stages.events import Made, Note, Planned, Progress, Result, UpToDate, say_nothing
 from zfcal.stages.extend.extend import ExtendOptions, extend
-from zfcal.stages.opening import Task
+from zfcal.stages.trial_context import Task
 
 MEASURES = ["nats_per_step", "S_over_ceiling", "D", "W", "O", "T", "effect"]
 

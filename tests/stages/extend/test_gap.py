@@ -16,8 +16,8 @@ from zfcal.stages.extend.gap import (
     shares,
 )
 from zfcal.stages.extend.halves import split
-from zfcal.stages.opening import open_trial
-from zfcal.stages.stretch import read_stretch
+from zfcal.stages.track_window import read_stretch
+from zfcal.stages.trial_context import open_trial
 
 
 def column(*values):

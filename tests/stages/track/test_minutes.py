@@ -10,8 +10,8 @@ from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.tables import TRACKS, read_extra, read_tracks
 from zfcal.stages.events import LeftOut, Made, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task, open_trial
 from zfcal.stages.track.minutes import NEXT_KEY, Minutes, Origins, unfinished
+from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import FISH, AgentPose, FramePoses
 
 FPS = 5.0

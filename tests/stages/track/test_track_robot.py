@@ -20,10 +20,10 @@ from zfcal.stages.camera.cameras import write_camera
 from zfcal.stages.camera.rig import CameraChoice
 from zfcal.stages.events import Note, Result, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task
 from zfcal.stages.track.below import Below
 from zfcal.stages.track.plan import TrackOptions
 from zfcal.stages.track.track import track
+from zfcal.stages.trial_context import Task
 from zfcal.tracking.robot import LedOptions
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker

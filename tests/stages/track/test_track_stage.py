@@ -25,9 +25,9 @@ from zfcal.stages.camera.cameras import write_camera
 from zfcal.stages.camera.rig import CameraChoice
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Result, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.opening import Task
 from zfcal.stages.track.plan import Pictures, TrackOptions
 from zfcal.stages.track.track import track
+from zfcal.stages.trial_context import Task
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracks import concatenate, tracks_of
 

@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
-from zfcal.model.kernels.world import FOLLOWS, HX, HY, ZONE
+from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
 
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""

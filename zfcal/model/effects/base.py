@@ -18,7 +18,7 @@ An effect adds to a step, by compiled C functions, any of:
     the name of a parameter in seconds: others are seen where they were then.
 
 Each gets the agents' state as numbers in rows of n, one row for each name in
-`zfcal.model.kernels.world` (``state[X * n + i]``), the solid angles that agent
+`zfcal.model.kernels.state` (``state[X * n + i]``), the solid angles that agent
 i sees as ``sight[i * n + j]``, and its parameters in their order. An agent
 that is not there has zone 0; nobody sees it.
 

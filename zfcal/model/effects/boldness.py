@@ -8,7 +8,7 @@ from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms
-from zfcal.model.kernels.world import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
+from zfcal.model.kernels.state import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
 
 
 @hook(FACTOR)

@@ -6,7 +6,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, log_speed, times_faster
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
-from zfcal.model.kernels.world import SPEED
+from zfcal.model.kernels.state import SPEED
 
 
 @hook(SPEED_HOOK)

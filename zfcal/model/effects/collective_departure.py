@@ -6,7 +6,7 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import LEFT_S, ROOM
+from zfcal.model.kernels.state import LEFT_S, ROOM
 
 
 @hook(FACTOR)

@@ -6,7 +6,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
-from zfcal.model.kernels.world import ZONE
+from zfcal.model.kernels.state import ZONE
 
 
 @hook(SPEED_HOOK)

@@ -7,7 +7,7 @@ import math
 from zfcal.model.effects.base import EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, beyond, cut, quickness
 from zfcal.model.kernels.compiled import inlined
-from zfcal.model.kernels.world import TIME, X, Y
+from zfcal.model.kernels.state import TIME, X, Y
 
 REFERENCE = "Fortin et al. 2005, Ecology 86: 1320-1330"
 """Step selection: a habitat's cue weighs the steps that an animal could have taken."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from zfcal.model.effects.base import Company
 from zfcal.model.kernels.compiled import inlined
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     EXIT,
     FOLLOWS,
     HX,

@@ -7,7 +7,7 @@ import math
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
-from zfcal.model.kernels.world import DT_S, SPEED
+from zfcal.model.kernels.state import DT_S, SPEED
 
 
 @hook(SPEED_HOOK)

@@ -9,7 +9,7 @@ from zfcal.model.effects.cues import REFERENCE, bearing, number, too_far
 from zfcal.model.effects.forms import apart, needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.world import HX, HY
+from zfcal.model.kernels.state import HX, HY
 
 
 @hook(SIGHT)

@@ -26,7 +26,7 @@ from zfcal.model.effects.forms import apart, beyond, nearest_seen, needs_neighbo
 from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     FOLLOWS,
     HX,
     HY,

@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, needs_neighbour, tilt
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
-from zfcal.model.kernels.world import ZONE, X, Y
+from zfcal.model.kernels.state import ZONE, X, Y
 
 
 @inlined

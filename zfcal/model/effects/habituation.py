@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import cut, needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.world import TIME
+from zfcal.model.kernels.state import TIME
 
 _MOST = 3.0
 

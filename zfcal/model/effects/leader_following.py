@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour, quickness
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.world import SPEED
+from zfcal.model.kernels.state import SPEED
 
 
 @hook(SIGHT)

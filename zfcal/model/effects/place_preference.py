@@ -9,7 +9,7 @@ from zfcal.model.effects.forms import tilt
 from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import X, Y
+from zfcal.model.kernels.state import X, Y
 
 _AT_IT_M = 0.02
 

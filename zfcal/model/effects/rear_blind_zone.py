@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.world import HX, HY, X, Y
+from zfcal.model.kernels.state import HX, HY, X, Y
 
 _SOFT_RAD = 0.06
 

@@ -8,7 +8,7 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import apart, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
-from zfcal.model.kernels.world import KIND, X, Y
+from zfcal.model.kernels.state import KIND, X, Y
 
 _NEAR_M = 0.1
 

@@ -10,7 +10,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import HX, HY
+from zfcal.model.kernels.state import HX, HY
 
 
 @hook(FACTOR)

@@ -6,7 +6,7 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import HX, HY, PAST_HX, PAST_HY
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY
 
 
 @hook(FACTOR)

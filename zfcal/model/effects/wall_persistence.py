@@ -9,7 +9,7 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import sense_along, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.world import FOLLOWS, HX, HY, TAU_X, TAU_Y
+from zfcal.model.kernels.state import FOLLOWS, HX, HY, TAU_X, TAU_Y
 
 
 @hook(FACTOR)

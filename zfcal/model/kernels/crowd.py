@@ -31,7 +31,7 @@ from zfcal.model.kernels.perception import in_vectors, most_sr, see_first
 from zfcal.model.kernels.random import State as Random
 from zfcal.model.kernels.random import next_word, uniform
 from zfcal.model.kernels.staircase import staircase_turn
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     ALPHA,
     CLEAR,
     HX,

@@ -25,7 +25,7 @@ from zfcal.model.kernels.perception import (
     most_sr,
     see_first,
 )
-from zfcal.model.kernels.world import HX, HY, X, Y
+from zfcal.model.kernels.state import HX, HY, X, Y
 
 _PER_CELL = 1.5
 """Agents in a cell if they were spread evenly; from 1 to 3 the cost is about the same."""

@@ -15,7 +15,7 @@ from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.pairs import Pairs, add_pairs, bin_of, make_pairs
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import Counts, Random, count_step, start
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     GRID,
     HX,
     HY,

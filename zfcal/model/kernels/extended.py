@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.bells import exponential, one_over_integral
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.landing import PER_CELL
+from zfcal.model.kernels.von_mises import exponential, one_over_integral
 
 # Columns of the sums at the taken heading and over the landing zones.
 BASE, BASE_SLOPE, SOCIAL, SOCIAL_SLOPE, EXTRA, COLUMNS = range(6)
@@ -274,7 +274,7 @@ def harmonic_tilt(waves: Floats, zones: Floats, share: NDArray[np.uint8], tilt: 
     Parameters
     ----------
     waves, zones
-        From `zfcal.model.kernels.asking.ask_harmonics`.
+        From `zfcal.model.kernels.effect_evaluation.ask_harmonics`.
     share : ndarray of uint8, shape (step, cell, zone)
         A cell that several zones share counts as in the one with most of it.
     tilt : ndarray, shape (step, cell)

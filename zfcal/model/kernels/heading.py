@@ -16,7 +16,7 @@ from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import next_word, uniform, vonmises_turn
 from zfcal.model.kernels.sectors import draw_in_sectors, open_sectors
 from zfcal.model.kernels.staircase import staircase_turn
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     CLEAR,
     HX,
     HY,

@@ -9,7 +9,7 @@ from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import vonmises_r
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     ALPHA,
     KAPPA_F,
     LATE_SHARE,

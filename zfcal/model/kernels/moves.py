@@ -13,7 +13,7 @@ from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.heading import draw_move
 from zfcal.model.kernels.perception import Sight
-from zfcal.model.kernels.world import Packed, Work
+from zfcal.model.kernels.state import Packed, Work
 
 
 @kernel

@@ -15,7 +15,7 @@ import numpy as np
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank
-from zfcal.model.kernels.world import ZONE, X, Y
+from zfcal.model.kernels.state import ZONE, X, Y
 
 _BINS = 10
 _PER_STRIP = 8

@@ -15,7 +15,7 @@ from zfcal.model.kernels.heading import apply_move, draw_move
 from zfcal.model.kernels.pairs import bin_of
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
 from zfcal.model.kernels.random import seeded
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     DT_S,
     GRID,
     HX,

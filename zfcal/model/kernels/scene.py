@@ -10,7 +10,7 @@ from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import make_sight, see
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     DT_S,
     HX,
     HY,
@@ -52,7 +52,7 @@ def fill_states(
     Returns
     -------
     ndarray, shape (sample, state, agent)
-        Rows as in `zfcal.model.kernels.world`. Zone 0 and the last known place for who
+        Rows as in `zfcal.model.kernels.state`. Zone 0 and the last known place for who
         is not seen; a heading of (0, 0) and a speed of NaN while they are unknown.
     """
     n = xy_m.shape[1]

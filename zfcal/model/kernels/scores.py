@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.bells import one_over_integral
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.extended import bell, make_cells
+from zfcal.model.kernels.von_mises import one_over_integral
 
 
 @kernel

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.bells import LEAST, exponential, one_over_integral
 from zfcal.model.kernels.compiled import inlined, lean
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.random import sine, uniform
 from zfcal.model.kernels.staircase import SCALE_AT, TAKE
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     HX,
     HY,
     KAPPA_BASE,
@@ -39,6 +38,7 @@ from zfcal.model.kernels.world import (
     X,
     Y,
 )
+from zfcal.model.kernels.von_mises import LEAST, exponential, one_over_integral
 
 _AX, _AY, _CEILING = range(SECTOR_ROWS)
 _HALF_RAD = math.pi / SECTORS

@@ -24,7 +24,6 @@ from zfcal.errors import InputError
 from zfcal.stages.analyse.control import ControlGroup
 from zfcal.stages.analyse.scoring import SCORINGS, Window, scores_of
 from zfcal.stages.events import Event, LeftOut, Note, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task
 from zfcal.stages.segments import (
     Pooled,
     Segments,
@@ -34,6 +33,7 @@ from zfcal.stages.segments import (
     segment_path,
 )
 from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
+from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.stages.windows import starts_of, whole_segments, window_ends
 
 STATS = "zfcal.stats/1"

@@ -20,8 +20,8 @@ from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.errors import InputError
 from zfcal.stages.events import Tell
-from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import STEP_S, Segments, segment_hashes, segment_path
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.stages.windows import whole_segments
 
 

@@ -35,10 +35,10 @@ from zfcal.stages.calibrate.rounds import (
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
-from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.skipping import skipped_path, without_skipped
 from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
+from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.stages.windows import LENGTH_S
 
 _INSTANT_S = 0.001

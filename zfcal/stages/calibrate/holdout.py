@@ -41,9 +41,9 @@ from zfcal.stages.calibrate.rounds import (
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.stages.events import Event, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task
 from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
+from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
 
 Floats = NDArray[np.float64]

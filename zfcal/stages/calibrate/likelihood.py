@@ -14,9 +14,9 @@ from zfcal.model.likelihood import Fit, fit
 from zfcal.model.scene import make_scene
 from zfcal.parameters import Parameters, to_genes
 from zfcal.stages.events import Event, LeftOut, Note, Tell
-from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import segment_files
-from zfcal.stages.stretch import read_stretch
+from zfcal.stages.track_window import read_stretch
+from zfcal.stages.trial_context import OpenTrial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

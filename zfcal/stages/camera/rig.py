@@ -21,7 +21,7 @@ from zfcal.errors import InputError
 from zfcal.stages.camera.cameras import read_camera, stated_side
 from zfcal.stages.camera.making import usual_side
 from zfcal.stages.camera.sources import files_of, source_of
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 
 OVERHEAD, BELOW = "overhead", "below"
 

@@ -25,10 +25,10 @@ from zfcal.errors import InputError
 from zfcal.parameters import Parameters
 from zfcal.stages.diagnose.findings import FOLDER, Book, Draw, write_findings
 from zfcal.stages.events import Progress, Result, Tell
-from zfcal.stages.opening import OpenTrial, Task, open_trial
 from zfcal.stages.segments import guess_options
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
-from zfcal.stages.stretch import Stretch, read_stretch
+from zfcal.stages.track_window import Stretch, read_stretch
+from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from zfcal.artifacts.validation import check, read_json
 from zfcal.diagnose.document import Findings, Sheet, read_document
 from zfcal.errors import InputError
 from zfcal.stages.events import Made, Planned, Tell, UpToDate
-from zfcal.stages.opening import OpenTrial, Task
+from zfcal.stages.trial_context import OpenTrial, Task
 
 FOLDER = "diagnosis"
 FILE = "findings.json"

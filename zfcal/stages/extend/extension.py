@@ -50,7 +50,7 @@ from zfcal.stages.events import Progress, Tell
 from zfcal.stages.extend.extended_group import SpanGroup
 from zfcal.stages.extend.gap import Judged, draw_blocks, effect_gap, feature_gaps, likelihood_gap
 from zfcal.stages.extend.halves import Halves, split
-from zfcal.stages.stretch import Stretch
+from zfcal.stages.track_window import Stretch
 
 WITHOUT, WITH, PLACEBO = "without", "with", "placebo"
 

@@ -15,8 +15,8 @@ from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.diagnose.heldout import scene_of
 from zfcal.errors import InputError
 from zfcal.model.scene import Scene, make_scene
-from zfcal.stages.opening import OpenTrial
-from zfcal.stages.stretch import Stretch
+from zfcal.stages.track_window import Stretch
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH
 from zfcal.units import SEGMENT_S
 

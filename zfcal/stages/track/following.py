@@ -22,7 +22,7 @@ from zfcal.errors import InputError
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, Feed, open_feed
 from zfcal.stages.camera.sources import Recorder
 from zfcal.stages.events import Made, Progress, Tell
-from zfcal.stages.opening import Task
+from zfcal.stages.realtime import garbage_left_alone
 from zfcal.stages.track.below import Below
 from zfcal.stages.track.drawing import Drawing
 from zfcal.stages.track.learnt import LEARNT_KEY, as_before
@@ -30,11 +30,11 @@ from zfcal.stages.track.minutes import Minutes, Origins
 from zfcal.stages.track.outcome import Outcome, measured
 from zfcal.stages.track.plan import Plan
 from zfcal.stages.track.resuming import STARTED, Resumed, take_up
-from zfcal.stages.undisturbed import garbage_left_alone
+from zfcal.stages.trial_context import Task
 from zfcal.tracking.background import Background, background_of
 from zfcal.tracking.fitting import prepare
 from zfcal.tracking.fusing import Fuser
-from zfcal.tracking.hindsight import Hindsight
+from zfcal.tracking.identity_revision import IdentityRevision
 from zfcal.tracking.overlay import Scene
 from zfcal.tracking.region import region_of
 from zfcal.tracking.robot import RobotSeen
@@ -88,7 +88,7 @@ class Following:
             keeps=plan.options.tracker.n_agents is not None,
             break_s=plan.opened.trial.longest_step_s,
         )
-        self._hindsight = Hindsight(plan.opened.trial.longest_step_s)
+        self._revision = IdentityRevision(plan.opened.trial.longest_step_s)
         self._outcome = Outcome(plan, self._numbers.tally, tell)
         if origins.is_live:
             origins = dataclasses.replace(origins, clock=self._said_clock)
@@ -101,7 +101,7 @@ class Following:
             },
             tell,
             task=task,
-            revise=self._hindsight.revise,
+            revise=self._revision.revise,
         )
         self._origins = origins
         self._recorders: dict[str, Recorder] = {}
@@ -146,7 +146,7 @@ class Following:
                 self._look_below(below, frame)
                 self._outcome.hear(tracker, asked=plan.options.tracker)
                 bad: list[str] = [each.reason for each in tracker.take_bad_frames()]
-                self._hindsight.exchange(self._fuser.named(tracker.take_exchanges()), frame.time_s)
+                self._revision.exchange(self._fuser.named(tracker.take_exchanges()), frame.time_s)
                 self._take(frame, seen, bad, drawing)
         except BaseException:
             self._minutes.interrupt(self._end_s)
@@ -187,7 +187,7 @@ class Following:
             frame=frame.number,
             agents=self._fuser.step(seen, robot, frame.time_s),
         )
-        self._hindsight.note(frame.number, frame.time_s, self._fuser.agents)
+        self._revision.note(frame.number, frame.time_s, self._fuser.agents)
         words = self._outcome.judge(frame, poses, bad, robot)
         self._minutes.add(
             poses,

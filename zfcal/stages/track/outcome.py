@@ -15,11 +15,11 @@ from zfcal.cameras.frames import Frame, Image
 from zfcal.cameras.stamps import Tally
 from zfcal.stages.camera.rig import Feed
 from zfcal.stages.events import LeftOut, Note, Result, Tell
-from zfcal.stages.stretch import NOISE_KEY
 from zfcal.stages.track.below import Below
 from zfcal.stages.track.learnt import learnt_by, notes_of
 from zfcal.stages.track.plan import Plan
 from zfcal.stages.track.tracker_noise import losses, tracker_noise
+from zfcal.stages.track_window import NOISE_KEY
 from zfcal.tracking.learning import Learnt
 from zfcal.tracking.robot import RobotSeen
 from zfcal.tracking.seen import TrackerOptions

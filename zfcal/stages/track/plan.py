@@ -14,7 +14,7 @@ from zfcal.cameras.handedness import ABOVE
 from zfcal.cameras.handedness import BELOW as SEEN_FROM_BELOW
 from zfcal.errors import InputError
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, CameraChoice, View, view_of
-from zfcal.stages.opening import OpenTrial
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracking.robot import LedOptions
 from zfcal.tracking.seen import TrackerOptions
 

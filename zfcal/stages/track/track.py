@@ -11,7 +11,6 @@ from zfcal.artifacts.reading.contents import Contents, one_content
 from zfcal.cameras.live import ArrivalClock
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Planned, Tell, UpToDate
-from zfcal.stages.opening import Task, at_work, open_trial, reason_to_make, tell_version
 from zfcal.stages.recording import check_same_source, starts_between, stretch_of
 from zfcal.stages.segments import segment_path, segment_starts
 from zfcal.stages.stage import settled
@@ -19,6 +18,7 @@ from zfcal.stages.track.following import Following
 from zfcal.stages.track.minutes import Origins, pose_files, poses_reason
 from zfcal.stages.track.plan import Plan, TrackOptions, plan_of
 from zfcal.stages.track.resuming import Resumed, begin_anew, resume
+from zfcal.stages.trial_context import Task, at_work, open_trial, reason_to_make, tell_version
 
 
 def track(root: Path, options: TrackOptions, tell: Tell, *, task: Task | None = None) -> None:

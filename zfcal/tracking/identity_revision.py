@@ -18,7 +18,7 @@ from zfcal.tracks import FISH, FramePoses
 
 
 @final
-class Hindsight:
+class IdentityRevision:
     """Keeps who was where until it is asked, and puts right what is learnt meanwhile.
 
     Parameters

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zfcal.online import turns
-from zfcal.online.turns import LEAST_S, SPARE_S, Choice, Overruns, budget_of, choose
+from zfcal.online import scheduling
+from zfcal.online.scheduling import LEAST_S, SPARE_S, Choice, Overruns, budget_of, choose
 
 
 def test_examples_of_the_module_hold():
     """Those in the docstrings."""
-    assert doctest.testmod(turns).failed == 0
+    assert doctest.testmod(scheduling).failed == 0
 
 
 def test_nothing_waits():

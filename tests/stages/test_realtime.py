@@ -5,7 +5,7 @@ import gc
 import os
 import threading
 
-from zfcal.stages.undisturbed import ahead_of_others, garbage_left_alone
+from zfcal.stages.realtime import ahead_of_others, garbage_left_alone
 
 
 def niceness_of(thread=0):

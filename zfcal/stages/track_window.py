@@ -15,8 +15,8 @@ from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.sampling import sample_range
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import LeftOut, Tell
-from zfcal.stages.opening import OpenTrial
 from zfcal.stages.segments import STEP_S, read_segment, segment_files
+from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import Samples, Tracks, concatenate, joined
 
 NOISE_KEY = "noise_m"

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zfcal.tracking.fusing import Named
-from zfcal.tracking.hindsight import Hindsight
+from zfcal.tracking.identity_revision import IdentityRevision
 from zfcal.tracking.seen import Exchange
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
@@ -27,7 +27,7 @@ class Minute:
     """Frames that are told one by one, and what is made of them at the end."""
 
     def __init__(self, break_s=STEP_S):
-        self.hindsight = Hindsight(break_s)
+        self.revision = IdentityRevision(break_s)
         self.frames = []
         self.n = 0
 
@@ -35,7 +35,7 @@ class Minute:
         """Tell a frame."""
         for _ in range(times):
             time_s = self.n / FPS
-            self.hindsight.note(self.n, time_s, agents)
+            self.revision.note(self.n, time_s, agents)
             told = tuple(agent.pose for agent in agents)
             self.frames.append(FramePoses(time_s=time_s, frame=self.n, agents=told))
             self.n += 1
@@ -44,11 +44,11 @@ class Minute:
         """Exchange two ids since so many frames before the next one."""
         since_s = (self.n - frames_ago) / FPS
         told = Exchange(one=one, other=other, since_s=since_s)
-        self.hindsight.exchange([told], self.n / FPS)
+        self.revision.exchange([told], self.n / FPS)
 
     def end(self):
         """Return where everybody is in each frame, by id, and begin anew."""
-        revised, self.frames = self.hindsight.revise(self.frames), []
+        revised, self.frames = self.revision.revise(self.frames), []
         return [{pose.agent: pose.x_m for pose in poses.agents} for poses in revised]
 
 
@@ -90,7 +90,7 @@ def test_two_exchanges_are_applied_one_after_the_other():
     minute = Minute(break_s=0.0)
     for _ in range(3):
         minute.tell(named(0, 5, 0.1), named(1, 6, 0.2), named(2, 7, 0.3))
-    minute.hindsight.exchange(
+    minute.revision.exchange(
         [
             Exchange(one=0, other=1, since_s=1 / FPS),
             Exchange(one=1, other=2, since_s=2 / FPS),
@@ -162,4 +162,4 @@ def test_what_was_revised_is_forgotten(minutes):
         minute.exchange(0, 1, 10)
         minute.tell(named(1, 5, 0.1))
         minute.end()
-    assert len(minute.hindsight._kept) == len(minute.hindsight._learnt) == 0
+    assert len(minute.revision._kept) == len(minute.revision._learnt) == 0

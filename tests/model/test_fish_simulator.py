@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from zfcal.errors import InputError
-from zfcal.model.shoal import Shoal
+from zfcal.model.fish_simulator import Shoal
 from zfcal.model.simulate import simulate_tracks
 
 NOBODY = np.empty((0, 3))

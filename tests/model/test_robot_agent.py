@@ -8,9 +8,9 @@ import pytest
 from scipy import stats
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.among import Among
 from zfcal.model.onestep import draw_headings
 from zfcal.model.packing import pack
+from zfcal.model.robot_agent import Among
 from zfcal.parameters import Parameters, natural
 
 ARENA = load_arena("two-rooms", Path())

@@ -16,7 +16,7 @@ from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
-from zfcal.model.kernels.world import (
+from zfcal.model.kernels.state import (
     DT_S,
     GRID,
     HX,

@@ -20,7 +20,7 @@ _HANDS = 2
 """One for the PNGs, one for the page."""
 
 
-class Easel:
+class RenderPool:
     """Draws pages of findings; a context, at whose end its processes are gone.
 
     Parameters

@@ -16,7 +16,7 @@ from zfcal.model.kernels.hooks import (
     call_sight,
     call_speed,
 )
-from zfcal.model.kernels.world import Packed
+from zfcal.model.kernels.state import Packed
 
 _HARDLY = 1e-6
 

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zfcal.robot import events, lastword
+from zfcal.robot import events, stop_guard
 from zfcal.robot.aseba import Decoder, Frame
-from zfcal.robot.lastword import (
+from zfcal.robot.stop_guard import (
     CUT,
     DONE,
     DRIVER,
@@ -289,7 +289,7 @@ def test_the_helper_stops_at_the_expiry_and_again_each_tick_until_it_is_fresh():
     slate, driver, helper = counted.writers(port)
     guard = Guard(helper, slate)
     slate.until_s = 10.5
-    assert guard.look(10.0) == lastword.LOOK_S
+    assert guard.look(10.0) == stop_guard.LOOK_S
     assert guard.look(10.495) == pytest.approx(0.005)
     assert port.queue == b""
     guard.look(10.5)
@@ -406,7 +406,7 @@ def test_an_output_that_was_held_up_is_let_go():
     assert driver.send(GO)
     resumed = []
     port.resume = lambda: resumed.append(1)
-    slate.put(DRIVER, STATE, lastword.UNKNOWN)
+    slate.put(DRIVER, STATE, stop_guard.UNKNOWN)
     assert helper.stop()
     assert resumed
 
@@ -417,7 +417,7 @@ def test_an_unfinished_resynchronisation_is_not_taken_for_a_whole_frame():
     assert driver.send(GO)
     port.room = 200
     assert driver.stop()
-    assert slate.number(DRIVER, STATE) == lastword.UNKNOWN
+    assert slate.number(DRIVER, STATE) == stop_guard.UNKNOWN
     port.drain()
     port.room = 4096
     assert not driver.finish()

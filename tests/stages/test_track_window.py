@@ -11,10 +11,10 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join, locate
 from zfcal.stages.events import LeftOut, say_nothing
-from zfcal.stages.opening import open_trial
 from zfcal.stages.recording import cut
 from zfcal.stages.segments import Segments, segment_path
-from zfcal.stages.stretch import read_stretch
+from zfcal.stages.track_window import read_stretch
+from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import concatenate
 
 STARTS = (0, 60, 120)
