@@ -28,7 +28,7 @@ from regressions import Ratio, conclude, parser
 from synthetic import two_rooms
 
 from zfcal.calibrate.evolve import Evaluate
-from zfcal.calibrate.objective import Group, SeedSource, as_statistics, pool_runs
+from zfcal.calibrate.group import Group, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.search import advance, begin
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.simulate import pack, tank_of

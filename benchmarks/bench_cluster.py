@@ -25,7 +25,7 @@ from regressions import Ratio, conclude, parser
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.calibrate.cluster import ClusterGroup
-from zfcal.calibrate.objective import Group, SeedSource, Simulator, as_statistics, pool_runs
+from zfcal.calibrate.group import Group, SeedSource, Simulator, as_statistics, pool_runs
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.scheduler import connect
 from zfcal.calibrate.task import Settings, Task

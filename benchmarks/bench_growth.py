@@ -27,7 +27,8 @@ from regressions import Ratio, conclude, parser, places, written
 from zfcal.arena import Arena, make_arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.calibrate import evolve
-from zfcal.calibrate.objective import Group, Objective, as_statistics, pool_runs
+from zfcal.calibrate.group import Group, as_statistics, pool_runs
+from zfcal.calibrate.objective import Objective
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.kernels.run import count_runs
 from zfcal.model.simulate import (

@@ -25,7 +25,7 @@ from regressions import Ratio, conclude, parser, written
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import measure
-from zfcal.calibrate.objective import Group, SeedSource, express
+from zfcal.calibrate.group import Group, SeedSource, express
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.likelihood import fit

@@ -32,7 +32,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import read_model, write_model
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.objective import (
+from zfcal.calibrate.group import (
     Purpose,
     SeedSource,
     as_statistics,

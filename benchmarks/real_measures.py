@@ -26,7 +26,7 @@ from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import Statistics, measure, measure_robot
-from zfcal.calibrate.objective import with_measured_speeds
+from zfcal.calibrate.group import with_measured_speeds
 from zfcal.parameters import Parameters
 from zfcal.report.figures.statistics import histogram_mean
 from zfcal.stages.analyse.analyse import POOLED_FROM_S

@@ -14,7 +14,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.statistics import Statistics, measure
-from zfcal.calibrate.objective import Group, SeedSource
+from zfcal.calibrate.group import Group, SeedSource
 from zfcal.calibrate.task import Task
 from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import Parameters, from_genes, n_genes, natural

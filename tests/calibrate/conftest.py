@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from zfcal.calibrate.objective import SeedSource, as_statistics, pool_runs, scale_gamma
+from zfcal.calibrate.group import SeedSource, as_statistics, pool_runs, scale_gamma
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.simulate import Counts
 from zfcal.parameters import Parameters, natural, to_genes

@@ -7,15 +7,8 @@ import pytest
 import shapely
 
 from zfcal.arena import Zone, make_arena
-from zfcal.calibrate.objective import (
-    Group,
-    Objective,
-    SeedSource,
-    as_statistics,
-    express,
-    pool_runs,
-    scale_gamma,
-)
+from zfcal.calibrate.group import Group, SeedSource, as_statistics, express, pool_runs, scale_gamma
+from zfcal.calibrate.objective import Objective
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.search import first_population
 from zfcal.calibrate.task import Task

@@ -26,7 +26,7 @@ from zfcal.calibrate.cluster import (
     pieces,
 )
 from zfcal.calibrate.fingerprint import fingerprint, refuse_other_bits, refuse_unlike
-from zfcal.calibrate.objective import Group, SeedSource, as_statistics, pool_runs
+from zfcal.calibrate.group import Group, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.scheduler import connect
 from zfcal.calibrate.task import Settings, Task

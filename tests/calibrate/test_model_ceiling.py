@@ -6,7 +6,7 @@ import pytest
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.scores import compare, score_keys
 from zfcal.calibrate.ceiling import measure_ceiling, window_noise
-from zfcal.calibrate.objective import as_statistics, pool_runs, runs_of
+from zfcal.calibrate.group import as_statistics, pool_runs, runs_of
 from zfcal.errors import InputError
 
 NAMES = ("corridor", "walls", "centre")

@@ -10,13 +10,8 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.scores import compare, named_scores, similarities
 from zfcal.calibrate.confirm import confirm
-from zfcal.calibrate.objective import (
-    Group,
-    Objective,
-    SeedSource,
-    score_each,
-    simulate_named,
-)
+from zfcal.calibrate.group import Group, SeedSource
+from zfcal.calibrate.objective import Objective, score_each, simulate_named
 from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.task import Settings, Task
 from zfcal.errors import InputError

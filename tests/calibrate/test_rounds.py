@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from zfcal.calibrate.ceiling import window_noise
-from zfcal.calibrate.objective import scale_gamma
+from zfcal.calibrate.group import scale_gamma
 from zfcal.calibrate.rounds import calibrate_window, conclude
 from zfcal.calibrate.search import search
 from zfcal.parameters import to_genes

@@ -7,7 +7,7 @@ import pytest
 
 from zfcal.calibrate import evolve, search
 from zfcal.calibrate.evolve import overall_score
-from zfcal.calibrate.objective import Purpose
+from zfcal.calibrate.group import Purpose
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.search import advance, begin, first_population, world_changed
 from zfcal.calibrate.task import Previous

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from zfcal.calibrate.evolve import begin, score_and_diversities, step
+from zfcal.calibrate.group import scale_gamma
 from zfcal.calibrate.nsga2 import (
     crossover,
     crowding_distances,
@@ -14,7 +15,6 @@ from zfcal.calibrate.nsga2 import (
     mutate,
     survivors,
 )
-from zfcal.calibrate.objective import scale_gamma
 
 unit = st.floats(0.0, 1.0, allow_subnormal=False)
 coarse = st.sampled_from([0.0, 0.25, 0.5, 1.0])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from zfcal.behaviour.statistics import measure
-from zfcal.calibrate.objective import Group, SeedSource, express
+from zfcal.calibrate.group import Group, SeedSource, express
 from zfcal.calibrate.task import Settings, Task
 from zfcal.parameters import to_genes
 from zfcal.report.simulated import long_run

@@ -12,7 +12,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import SCHEMA, write_model
 from zfcal.artifacts.tables import read_tracks
 from zfcal.behaviour.sampling import sample
-from zfcal.calibrate.objective import Group
+from zfcal.calibrate.group import Group
 from zfcal.model.effects import all_effects, generic_effects
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
 from zfcal.parameters import natural, to_genes

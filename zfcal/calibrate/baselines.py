@@ -6,16 +6,14 @@ Both are confirmed as the champion is, with the same long simulations and seeds.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import overall_score
-from zfcal.calibrate.objective import Purpose, check_genome_length
+from zfcal.calibrate.group import Purpose, check_genome_length
 from zfcal.calibrate.task import Settings, Task
 from zfcal.errors import InputError
 from zfcal.parameters import n_genes
-
-Floats = NDArray[np.float64]
 
 
 def random_search(task: Task, settings: Settings, *, n_evaluations: int) -> Confirmed:

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from statistics import NormalDist
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats, Seeds
 from zfcal.behaviour.ceilings import Ceiling, summarise
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.objective import Seeds, Simulator, score_each, simulate_named
+from zfcal.calibrate.group import Simulator
+from zfcal.calibrate.objective import score_each, simulate_named
 from zfcal.errors import InputError
 
 _SDS = 2 * NormalDist().inv_cdf(0.975)
 """Standard deviations from the 2.5 to the 97.5 % quantile of a normal distribution."""
-
-Floats = NDArray[np.float64]
 
 
 def measure_ceiling(  # noqa: PLR0913 - what is simulated, and what it is held against

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from zfcal.calibrate.objective import Group, check_genome_length
+from zfcal.arrays import Floats, Seeds
+from zfcal.calibrate.group import Group, check_genome_length
 from zfcal.calibrate.scheduler import Cluster
 from zfcal.model.simulate import Counts, burn_in_steps
 from zfcal.parameters import Parameters
@@ -27,8 +27,7 @@ to some tenths of a second, so that little is lost with a worker."""
 
 _PIECES_PER_THREAD = 4
 
-Floats = NDArray[np.float64]
-Seeds = NDArray[np.uint64]
+
 Piece = tuple[slice, slice]
 """Genomes and runs that are simulated together."""
 

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats, Ints
 from zfcal.behaviour.scores import geometric_mean
 from zfcal.calibrate.nsga2 import (
     crossover,
@@ -31,8 +32,6 @@ from zfcal.calibrate.nsga2 import (
 )
 from zfcal.errors import InputError
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Evaluate = Callable[[Floats], Floats]
 """From genes, shape (individual, gene), to similarities, shape (individual, feature)."""
 Objectives = Callable[[Floats, Floats], Floats]

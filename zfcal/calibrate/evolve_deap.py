@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 from deap import base, tools
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.calibrate import evolve
 from zfcal.calibrate.evolve import Evaluate, Objectives, State, score_and_diversities
 from zfcal.calibrate.nsga2 import CROSSOVER_PROBABILITY, ETA, front_ranks
-
-Floats = NDArray[np.float64]
 
 
 class _Individual(list[float]):

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import moocore
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.calibrate.evolve import State
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
-from zfcal.calibrate.objective import scale_gamma
+from zfcal.calibrate.group import scale_gamma
 from zfcal.parameters import gene_names, gene_scales
 
 QUANTILES = (0.025, 0.975)
@@ -22,8 +22,6 @@ COVERED_MAX = 0.7
 
 MIN_COMPATIBLE = 20
 """With fewer compatible genomes no parameter counts as identified."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

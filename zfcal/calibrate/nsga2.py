@@ -14,8 +14,8 @@ which DEAP follows too.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 
 ETA = 20.0
@@ -25,11 +25,8 @@ GENE_SWAP_PROBABILITY = 0.5
 _SAME = 1e-14
 """Genes closer than this are one value: there is nothing to cross."""
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-
-def dominance(objectives: Floats) -> NDArray[np.bool_]:
+def dominance(objectives: Floats) -> Bools:
     """Return which individual dominates which.
 
     Parameters

@@ -11,9 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints, Seeds
 from zfcal.behaviour.features.registry import named
 from zfcal.behaviour.features.statistic import Points, count
 from zfcal.behaviour.located import locate
@@ -22,9 +22,6 @@ from zfcal.model.kernels.run import record_run
 from zfcal.model.simulate import Packed, burn_in_steps, individuals, is_crowd
 from zfcal.model.tank import tank_of
 from zfcal.tracks import FISH, Samples
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 class Runs(NamedTuple):
@@ -47,7 +44,7 @@ class Runs(NamedTuple):
     n_counted: int
     n_robots: int
     n_steps: int
-    seeds: NDArray[np.uint64]
+    seeds: Seeds
     n_threads: int = 1
 
 

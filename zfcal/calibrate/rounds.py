@@ -10,22 +10,20 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.scores import Scores
 from zfcal.calibrate.ceiling import measure_ceiling, window_noise
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import State
+from zfcal.calibrate.group import Purpose, express
 from zfcal.calibrate.history import Generation
 from zfcal.calibrate.intervals import Intervals, parameter_intervals
-from zfcal.calibrate.objective import Purpose, express
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.search import Progress, Watch, search
 from zfcal.calibrate.task import Previous, Settings, Task
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

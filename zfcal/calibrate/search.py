@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.calibrate import evolve, evolve_deap
 from zfcal.calibrate.evolve import Evaluate, State, overall_score
+from zfcal.calibrate.group import Purpose, SeedSource, Simulator
 from zfcal.calibrate.history import Generation, describe
-from zfcal.calibrate.objective import Purpose, SeedSource, Simulator, simulate_named
+from zfcal.calibrate.objective import simulate_named
 from zfcal.calibrate.pace import Deadline, Pace
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Previous, Settings, Task
 from zfcal.errors import InputError
@@ -28,8 +29,6 @@ RENEWED_SHARE = 0.2
 """As dynamic NSGA-II (Deb, Rao and Karthik 2007) with random newcomers."""
 
 _OPTIMISERS: dict[str, ModuleType] = {"zfcal": evolve, "deap": evolve_deap}
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

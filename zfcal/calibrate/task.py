@@ -9,26 +9,22 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats
 from zfcal.behaviour.features.registry import SCORED, ordered
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.evolve import GROUP
-from zfcal.calibrate.objective import (
-    Objective,
+from zfcal.calibrate.group import (
     Purpose,
     SeedSource,
     Simulator,
     check_genome_length,
     with_measured_speeds,
 )
+from zfcal.calibrate.objective import Objective
 from zfcal.errors import InputError
 from zfcal.units import BURN_IN_S, WINDOW_S
 
 DEFAULT_GENERATIONS = 15
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from zfcal.arena import Arena
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.objective import Purpose, SeedSource, as_statistics, pool_runs
+from zfcal.calibrate.group import Purpose, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.recorded import Runs, count_recorded
 from zfcal.calibrate.task import Settings
 from zfcal.model.simulate import pack, simulate_counts

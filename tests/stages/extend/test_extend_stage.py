@@ -301,7 +301,7 @@ def test_a_model_with_an_effect_on_speed_keeps_its_own_speeds(trial, found, quic
     lineage = read_lineage(path)
     start = trial / "models" / "000000.toml"
     write_model(start, own, dataclasses.replace(lineage, command="init"))
-    from zfcal.calibrate.objective import with_measured_speeds
+    from zfcal.calibrate.group import with_measured_speeds
     from zfcal.stages.calibrate.holdout import pooled_fish
     from zfcal.stages.segments import Segments
 

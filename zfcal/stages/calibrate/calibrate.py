@@ -21,7 +21,7 @@ from zfcal.artifacts.reading.places import is_regular
 from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
-from zfcal.calibrate.objective import Group, SeedSource, Simulator
+from zfcal.calibrate.group import Group, SeedSource, Simulator
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.calibrate.likelihood import estimate

@@ -9,10 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Seeds
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
@@ -24,7 +22,8 @@ from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.calibrate.ceiling import measure_ceiling
 from zfcal.calibrate.confirm import confirm
-from zfcal.calibrate.objective import Objective, Purpose, SeedSource
+from zfcal.calibrate.group import Purpose, SeedSource
+from zfcal.calibrate.objective import Objective
 from zfcal.calibrate.task import Settings
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import InputError
@@ -45,8 +44,6 @@ from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path,
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,9 +105,7 @@ class FixedModel:
         """Return itself: the model is what is judged, speeds and all."""
         return self
 
-    def simulate(
-        self, genes: Floats, *, n_counted: int, n_steps: int, seeds: NDArray[np.uint64]
-    ) -> Counts:
+    def simulate(self, genes: Floats, *, n_counted: int, n_steps: int, seeds: Seeds) -> Counts:
         """Return counts with leading axes (genome, run); all genomes are the model."""
         return simulate_counts(
             pack([self.template] * len(genes), self.arena),

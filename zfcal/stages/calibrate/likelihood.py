@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zfcal.arrays import Floats
 from zfcal.artifacts.lineage import JSON
 from zfcal.errors import InputError
 from zfcal.model.likelihood import Fit, fit
@@ -32,7 +30,7 @@ class Estimate:
     found: Fit
 
     @property
-    def genes(self) -> NDArray[np.float64]:
+    def genes(self) -> Floats:
         """The estimate as a population of one, shape (1, gene)."""
         return to_genes(self.found.parameters)[None, :]
 

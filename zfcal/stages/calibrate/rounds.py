@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
@@ -33,8 +32,6 @@ MODEL = "zfcal.model/1"
 POPULATION = "zfcal.population/1"
 SCORES = "zfcal.scores/1"
 STATS = "zfcal.stats/1"
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

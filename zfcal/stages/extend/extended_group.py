@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.calibrate.objective import check_genome_length
+from zfcal.calibrate.group import check_genome_length
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
 from zfcal.parameters import Parameters
 
@@ -25,7 +25,7 @@ class SpanGroup:
     Parameters
     ----------
     arena, template, n_fish, n_robots, n_workers
-        As of `zfcal.calibrate.objective.Group`.
+        As of `zfcal.calibrate.group.Group`.
     span_s
         From and to of the recording, in seconds of the trial.
     """

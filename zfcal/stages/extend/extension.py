@@ -14,13 +14,8 @@ from zfcal.behaviour.ceilings import Ceiling, summarise
 from zfcal.behaviour.scores import population_scores
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.confirm import confirm
-from zfcal.calibrate.objective import (
-    Objective,
-    Purpose,
-    SeedSource,
-    runs_of,
-    with_measured_speeds,
-)
+from zfcal.calibrate.group import Purpose, SeedSource, runs_of, with_measured_speeds
+from zfcal.calibrate.objective import Objective
 from zfcal.calibrate.rounds import RoundResult
 from zfcal.calibrate.task import Settings
 from zfcal.calibrate.task import Task as RoundTask
