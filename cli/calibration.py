@@ -1,25 +1,18 @@
-"""What the options of `zfcal calibrate` come to; its command is in ``calibrate``."""
+"""How rounds are done: options of `zfcal calibrate` and `zfcal watch`, and what they come to."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .durations import seconds
 from .options import Command, Fours, seed_option
-from .output import Output
-from .streams import STDIN, each_trial, trials_together
 
 if TYPE_CHECKING:
     from zfcal.stages.calibrate.searching import CalibrateOptions
-    from zfcal.stages.events import Tell
-    from zfcal.stages.streams import Work
     from zfcal.stages.trial_context import Task
 
     MakeTask = Callable[[frozenset[int] | None], Task]
@@ -143,51 +136,3 @@ def _check_together(options: Mapping[str, Any]) -> None:
         raise click.UsageError("--window needs -o FILE: its model is none of the trial's rounds.")
     if options["cluster"] is not None and options["workers"] is not None:
         raise click.UsageError("--workers are threads of this machine: with --cluster it has none.")
-
-
-@contextmanager
-def on_cluster(
-    out: Output, options: Mapping[str, Any], chosen: CalibrateOptions
-) -> Iterator[CalibrateOptions]:
-    """Give the options the cluster that is asked for; a dry run needs none."""
-    if options["cluster"] is None or options["dry_run"]:
-        yield chosen
-        return
-    from zfcal.calibrate.scheduler import connect
-
-    with connect(options["cluster"]) as cluster:
-        size = f"workers {cluster.n_workers}, threads {cluster.n_threads}"
-        out.note(f"Cluster {cluster.address}: {size}.")
-        yield dataclasses.replace(chosen, cluster=cluster)
-
-
-def each_round(
-    out: Output, trials: tuple[str, ...], chosen: CalibrateOptions, task: MakeTask
-) -> None:
-    """Calibrate trials round by round; on a cluster, several trials at the same time."""
-    from zfcal.stages.calibrate.calibrate import calibrate
-
-    def work(found: Work, tell: Tell) -> None:
-        calibrate(found.root, chosen, tell, task=task(found.ends_s))
-
-    if chosen.cluster is None or STDIN in trials:
-        each_trial(out, trials, functools.partial(work, tell=out.tell))
-    else:
-        trials_together(out, trials, work, n_threads=chosen.cluster.n_threads)
-
-
-def span_task(
-    out: Output,
-    trials: tuple[str, ...],
-    options: Mapping[str, Any],
-    chosen: tuple[CalibrateOptions, MakeTask],
-) -> None:
-    """Calibrate one pooled window of one trial."""
-    from zfcal.stages.calibrate.holdout import Span, calibrate_span
-
-    if len(trials) != 1 or trials[0] == "-":
-        raise click.UsageError("--window takes one trial, since -o names one file.")
-    span = Span(train_s=options["window"], held_out_s=options["held_out"], output=options["output"])
-    calibration, task = chosen
-    work = functools.partial(calibrate_span, Path(trials[0]), span, calibration, out.tell)
-    out.attempt(lambda: work(task=task(None)))
