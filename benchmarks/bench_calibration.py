@@ -32,7 +32,7 @@ from zfcal.calibrate.group import Group, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.search import advance, begin
 from zfcal.calibrate.task import Settings, Task
 from zfcal.model.simulate import pack, tank_of
-from zfcal.stages.calibrate.rounds import Checkpoint
+from zfcal.stages.calibrate.searching import Checkpoint
 
 ZFCAL = [sys.executable, "-m", "zfcal_cli.main"]
 SCHEDULES = {"default, 1 x 3000 steps": (1, 3000), "authors', 10 x 1800 steps": (10, 1800)}

@@ -29,11 +29,15 @@ from zfcal.stages.calibrate.rounds import (
     MODEL,
     Found,
     RoundPlaces,
-    checkpoint_key,
     read_control,
     read_previous,
 )
-from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
+from zfcal.stages.calibrate.searching import (
+    CalibrateOptions,
+    baseline_scores,
+    checkpoint_key,
+    run_search,
+)
 from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
 from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.skipping import skipped_path, without_skipped

@@ -33,12 +33,16 @@ from zfcal.stages.calibrate.calibrate import calibrate_options, make_group
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import (
     MODEL,
-    checkpoint_key,
     result_table,
     score_table,
     summary_of,
 )
-from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
+from zfcal.stages.calibrate.searching import (
+    CalibrateOptions,
+    baseline_scores,
+    checkpoint_key,
+    run_search,
+)
 from zfcal.stages.events import Event, Result, Tell
 from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run

@@ -1,4 +1,4 @@
-"""The files of a calibration round: what it starts from, what it leaves, and its checkpoint."""
+"""The files of a calibration round: where they are, what it starts from and what it leaves."""
 
 from __future__ import annotations
 
@@ -9,19 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from zfcal.artifacts.arrays import numbers_of
-from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
-from zfcal.artifacts.lineage import JSON, Lineage, to_json
+from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import write_model
-from zfcal.artifacts.reading.contents import read_limited
 from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
 from zfcal.behaviour.scores import NamedScore, Scores
 from zfcal.behaviour.statistics import Statistics
-from zfcal.calibrate.checkpoint import from_bytes, to_bytes
 from zfcal.calibrate.rounds import RoundResult
-from zfcal.calibrate.search import Progress
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.parameters import gene_names
@@ -310,67 +306,6 @@ def _named_table(named: NamedScore | None, ceiling: Ceiling) -> dict[str, JSON]:
             "n_features": named.n_features,
         }
     }
-
-
-class Checkpoint:
-    """The file that keeps a search: whole at first, then a block for each generation.
-
-    Parameters
-    ----------
-    path
-        Where it lies.
-    key
-        Of the round; a file with another one is of no use.
-    """
-
-    def __init__(self, path: Path, key: str) -> None:
-        self._path = path
-        self._key = key
-        self._kept: Progress | None = None
-
-    def save(self, progress: Progress) -> None:
-        """Keep where the search is.
-
-        Raises
-        ------
-        StorageError
-            The disk is full, or the place cannot be written.
-        """
-        data = to_bytes(progress, key=self._key, since=self._kept)
-        if self._kept is None:
-            write_bytes_whole(self._path, data, parents=False)
-        else:
-            append_bytes(self._path, data)
-        self._kept = progress
-
-    def load(self, *, at_most: int | None) -> Progress | None:
-        """Return where a killed round was; None to start anew.
-
-        Parameters
-        ----------
-        at_most
-            Generations that are asked for: one that is farther is of no use.
-        """
-        try:
-            progress = from_bytes(read_limited(self._path), key=self._key)
-        except (OSError, DamagedError):
-            # Starting anew ends in the same result, and the first save replaces the file.
-            return None
-        if progress is None or (at_most is not None and progress.state.generation > at_most):
-            return None
-        return progress
-
-
-def checkpoint_key(lineage: Lineage) -> str:
-    """Return what a checkpoint must agree in to be of use: all but the generations."""
-    said = lineage.as_dict()
-    del said["schema"]
-    said["options"] = {
-        name: value
-        for name, value in said["options"].items()
-        if name not in {"generations", "baselines"}
-    }
-    return to_json(said)
 
 
 def _number(value: float) -> float | None:

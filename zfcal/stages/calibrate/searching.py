@@ -11,17 +11,18 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from zfcal.artifacts.atomic import check_free
-from zfcal.artifacts.lineage import JSON
+from zfcal.artifacts.atomic import append_bytes, check_free, write_bytes_whole
+from zfcal.artifacts.lineage import JSON, Lineage, to_json
+from zfcal.artifacts.reading.contents import read_limited
 from zfcal.calibrate.baselines import random_search, unchanged
+from zfcal.calibrate.checkpoint import from_bytes, to_bytes
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.rounds import RoundResult, calibrate_window
 from zfcal.calibrate.scheduler import Cluster
 from zfcal.calibrate.search import Progress as Search
 from zfcal.calibrate.task import DEFAULT_GENERATIONS, Settings
 from zfcal.calibrate.task import Task as RoundTask
-from zfcal.errors import InputError
-from zfcal.stages.calibrate.rounds import Checkpoint
+from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Progress, Tell
 from zfcal.stages.taken import unless_taken
 
@@ -89,6 +90,67 @@ class CalibrateOptions:
         if self.budget_s is None:
             return None
         return Deadline(ends_s=time.monotonic() + self.budget_s, clock=time.monotonic)
+
+
+class Checkpoint:
+    """The file that keeps a search: whole at first, then a block for each generation.
+
+    Parameters
+    ----------
+    path
+        Where it lies.
+    key
+        Of the round; a file with another one is of no use.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path = path
+        self._key = key
+        self._kept: Search | None = None
+
+    def save(self, progress: Search) -> None:
+        """Keep where the search is.
+
+        Raises
+        ------
+        StorageError
+            The disk is full, or the place cannot be written.
+        """
+        data = to_bytes(progress, key=self._key, since=self._kept)
+        if self._kept is None:
+            write_bytes_whole(self._path, data, parents=False)
+        else:
+            append_bytes(self._path, data)
+        self._kept = progress
+
+    def load(self, *, at_most: int | None) -> Search | None:
+        """Return where a killed round was; None to start anew.
+
+        Parameters
+        ----------
+        at_most
+            Generations that are asked for: one that is farther is of no use.
+        """
+        try:
+            progress = from_bytes(read_limited(self._path), key=self._key)
+        except (OSError, DamagedError):
+            # Starting anew ends in the same result, and the first save replaces the file.
+            return None
+        if progress is None or (at_most is not None and progress.state.generation > at_most):
+            return None
+        return progress
+
+
+def checkpoint_key(lineage: Lineage) -> str:
+    """Return what a checkpoint must agree in to be of use: all but the generations."""
+    said = lineage.as_dict()
+    del said["schema"]
+    said["options"] = {
+        name: value
+        for name, value in said["options"].items()
+        if name not in {"generations", "baselines"}
+    }
+    return to_json(said)
 
 
 def run_search(

@@ -22,8 +22,8 @@ from zfcal.diagnose.document import gap_document
 from zfcal.diagnose.findings import Gap, Verdict
 from zfcal.errors import DamagedError, InputError
 from zfcal.model.effects import find_effect
-from zfcal.stages.calibrate.rounds import MODEL, checkpoint_key
-from zfcal.stages.calibrate.searching import CalibrateOptions
+from zfcal.stages.calibrate.rounds import MODEL
+from zfcal.stages.calibrate.searching import CalibrateOptions, checkpoint_key
 from zfcal.stages.diagnose.diagnose import Case, DiagnoseOptions, diagnose, open_case
 from zfcal.stages.diagnose.findings import FILE, FOLDER, Book, Draw
 from zfcal.stages.events import Made, Note, Result, Tell, say_nothing
