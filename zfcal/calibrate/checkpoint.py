@@ -26,7 +26,7 @@ from zfcal.calibrate.history import Generation
 from zfcal.calibrate.search import Progress
 from zfcal.errors import DamagedError
 
-FORMAT = "zfcal.checkpoint/2"
+_FORMAT = "zfcal.checkpoint/2"
 
 _STATE_ARRAYS = ("genes", "features", "objectives", "rank", "crowding")
 _STATE_PLAIN = ("generation", "evaluations", "rng")
@@ -57,7 +57,7 @@ def to_bytes(progress: Progress, *, key: str, since: Progress | None = None) -> 
     n_parts, n_lines = (0, 0) if since is None else (len(since.parts), len(since.history))
     new = progress.parts[n_parts:]
     plain = {
-        "format": FORMAT,
+        "format": _FORMAT,
         "key": key,
         "lines_before": n_lines,
         "state": {name: getattr(state, name) for name in _STATE_PLAIN},
@@ -104,7 +104,7 @@ def from_bytes(data: bytes, *, key: str) -> Progress | None:
     bodies = _whole_bodies(data)
     try:
         blocks = [_opened(body) for body in bodies]
-        if any((plain["format"], plain["key"]) != (FORMAT, key) for plain, _ in blocks):
+        if any((plain["format"], plain["key"]) != (_FORMAT, key) for plain, _ in blocks):
             return None
         return _progress(blocks)
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:

@@ -72,7 +72,7 @@ class ClusterGroup:
         return ClusterGroup(group=self.group.with_template(template), cluster=self.cluster)
 
     @cached_property
-    def parcel(self) -> bytes:
+    def _parcel(self) -> bytes:
         """The group as it travels, packed once for all generations.
 
         Each piece brings it, two kilobytes: what is scattered over workers is lost
@@ -94,16 +94,16 @@ class ClusterGroup:
         steps = self.n_agents * (n_steps + burn_in_steps(self.template.dt_s))
         blocks = pieces(len(table), len(words), steps_each=steps, n_workers=self.n_workers)
         parts = self.cluster.work(
-            simulate_piece,
+            _simulate_piece,
             [
-                (self.parcel, table[rows], words[runs], (n_counted, n_steps))
+                (self._parcel, table[rows], words[runs], (n_counted, n_steps))
                 for rows, runs in blocks
             ],
         )
         return assemble(parts, blocks)
 
 
-def simulate_piece(parcel: bytes, genes: Floats, seeds: Seeds, sizes: tuple[int, int]) -> Counts:
+def _simulate_piece(parcel: bytes, genes: Floats, seeds: Seeds, sizes: tuple[int, int]) -> Counts:
     """Simulate one piece, on a worker.
 
     Parameters

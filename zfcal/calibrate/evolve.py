@@ -160,7 +160,7 @@ def begin(
     """
     table = np.array(genes, dtype=np.float64)
     _check_genes(table)
-    return rank_population(
+    return _rank_population(
         table,
         _checked_features(features, len(table)),
         n=len(table),
@@ -191,7 +191,7 @@ def _checked_features(features: ArrayLike, n: int) -> Floats:
     return values
 
 
-def rank_population(
+def _rank_population(
     genes: Floats,
     features: Floats,
     *,
@@ -250,7 +250,7 @@ def step(state: State, evaluate: Evaluate, objectives: Objectives = score_and_di
     parents = state.genes[tournament(state.objectives, state.crowding, rng)]
     offspring = mutate(crossover(parents, rng), rng)
     features = _checked_features(evaluate(offspring), len(offspring))
-    return rank_population(
+    return _rank_population(
         np.concatenate([state.genes, offspring]),
         np.concatenate([state.features, features]),
         n=len(state.genes),

@@ -19,9 +19,9 @@ import shapely
 from numba.core.registry import cpu_target
 
 import zfcal.model.simulate as simulation
-from zfcal.arena import make_arena
+from zfcal.arena import Arena, make_arena
 from zfcal.errors import InputError
-from zfcal.parameters import natural
+from zfcal.parameters import Parameters, natural
 
 _PACKAGES = ("zfcal", "numpy", "numba", "llvmlite", "shapely")
 _SOURCES = ("model", "arena.py", "parameters.py", "units.py")
@@ -92,21 +92,23 @@ def trace() -> str:
 
     The first call of a new installation compiles for some twenty seconds.
     """
-    arena = make_arena(name="trace", outline=shapely.box(0.0, 0.0, 0.4, 0.4), wall_zone_m=0.05)
-    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
-    path_m, heading_rad = simulation.simulate_tracks(
-        natural(zones, dt_s=0.2), arena, n_agents=5, n_steps=200, seed=1
-    )
+    model, arena = _square()
+    path_m, heading_rad = simulation.simulate_tracks(model, arena, n_agents=5, n_steps=200, seed=1)
     return _digest(path_m.tobytes() + heading_rad.tobytes())
 
 
 def warm_up() -> None:
     """Have this process compile, or load, what counts simulations."""
-    arena = make_arena(name="warm-up", outline=shapely.box(0.0, 0.0, 0.4, 0.4), wall_zone_m=0.05)
-    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
-    packed = simulation.pack([natural(zones, dt_s=0.2)], arena)
-    seeds = np.zeros(1, dtype=np.uint64)
+    model, arena = _square()
+    packed, seeds = simulation.pack([model], arena), np.zeros(1, dtype=np.uint64)
     simulation.simulate_counts(packed, arena, n_agents=2, n_steps=1, seeds=seeds, n_threads=1)
+
+
+def _square() -> tuple[Parameters, Arena]:
+    """Return a model and the tank that it swims in, for simulations of no other use."""
+    arena = make_arena(name="square", outline=shapely.box(0.0, 0.0, 0.4, 0.4), wall_zone_m=0.05)
+    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
+    return natural(zones, dt_s=0.2), arena
 
 
 def _version(name: str) -> str:

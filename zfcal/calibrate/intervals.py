@@ -15,12 +15,12 @@ from zfcal.behaviour.ceilings import Ceiling
 from zfcal.calibrate.group import scale_gamma
 from zfcal.parameters import gene_names, gene_scales
 
-QUANTILES = (0.025, 0.975)
+_QUANTILES = (0.025, 0.975)
 
-COVERED_MAX = 0.7
+_COVERED_MAX = 0.7
 """An interval wider than this share of the range identifies nothing."""
 
-MIN_COMPATIBLE = 20
+_MIN_COMPATIBLE = 20
 """With fewer compatible genomes no parameter counts as identified."""
 
 
@@ -141,9 +141,9 @@ def parameter_intervals(
     scales = gene_scales(n_zones)
     value = scale_gamma(champion, n_zones) * scales
     values = np.vstack([value, scale_gamma(compatible, n_zones) * scales])
-    low, high = np.quantile(values, QUANTILES, axis=0)
+    low, high = np.quantile(values, _QUANTILES, axis=0)
     low, high = np.minimum(low, value), np.maximum(high, value)
-    known = (high - low <= COVERED_MAX * scales) & (len(compatible) >= MIN_COMPATIBLE)
+    known = (high - low <= _COVERED_MAX * scales) & (len(compatible) >= _MIN_COMPATIBLE)
     columns = zip(gene_names(zone_names), value, low, high, known, strict=True)
     return Intervals(
         parameters=tuple(

@@ -20,7 +20,7 @@ from zfcal.errors import InputError
 
 ETA = 20.0
 CROSSOVER_PROBABILITY = 0.9
-GENE_SWAP_PROBABILITY = 0.5
+_GENE_SWAP_PROBABILITY = 0.5
 
 _SAME = 1e-14
 """Genes closer than this are one value: there is nothing to cross."""
@@ -186,7 +186,7 @@ def crossover(parents: Floats, rng: np.random.Generator, *, eta: float = ETA) ->
     """
     first, second = parents[0::2], parents[1::2]
     mates = rng.random((len(first), 1)) <= CROSSOVER_PROBABILITY
-    crossed = mates & (rng.random(first.shape) <= GENE_SWAP_PROBABILITY)
+    crossed = mates & (rng.random(first.shape) <= _GENE_SWAP_PROBABILITY)
     u = rng.random(first.shape)
     swap = rng.random(first.shape) <= 0.5
 

@@ -30,7 +30,7 @@ from zfcal.errors import InputError, ZfcalError
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-PATIENCE_S = 10.0
+_PATIENCE_S = 10.0
 """So long a cluster may take to answer, and may be without any worker."""
 
 _LOOK_S = 1.0
@@ -42,7 +42,7 @@ _START = "Start one with: dask scheduler, and on each computer: dask worker tcp:
 T = TypeVar("T")
 
 
-class UnknownMachineError(Exception):
+class _UnknownMachineError(Exception):
     """A worker came late whose processor has not been compared yet; never leaves `Cluster`."""
 
 
@@ -64,7 +64,7 @@ class Cluster:
 
     address: str
     client: Client
-    patience_s: float = PATIENCE_S
+    patience_s: float = _PATIENCE_S
     _machines: set[str] = field(default_factory=set, init=False, repr=False)
 
     @property
@@ -151,7 +151,7 @@ class Cluster:
         )
 
     def _submit(self, function: Callable[..., T], piece: tuple[Any, ...]) -> Future:
-        call = Call(fingerprint(), frozenset(self._machines), function, *piece)
+        call = _Call(fingerprint(), frozenset(self._machines), function, *piece)
         return self.client.submit(pickle.loads, pickle.dumps(call), pure=False, retries=_RETRIES)
 
     def _gather(self, futures: Sequence[Future]) -> tuple[bool, list[Any]]:
@@ -169,7 +169,7 @@ class Cluster:
         except KilledWorker:
             # Dask gives up on what was under way when a worker died for the fourth time.
             return False, []
-        except UnknownMachineError:
+        except _UnknownMachineError:
             self.check()
             return False, []
         except ZfcalError:
@@ -214,7 +214,7 @@ class Cluster:
 
 
 @final
-class Call:
+class _Call:
     """A piece of work that is done by unpickling it.
 
     So a worker without zfcal fails in that one task. Where it cannot unpickle the
@@ -226,10 +226,10 @@ class Call:
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Return what unpickling calls, and with what."""
-        return on_worker, self._arguments
+        return _on_worker, self._arguments
 
 
-def on_worker(
+def _on_worker(
     here: Fingerprint, machines: frozenset[str], function: Callable[..., T], *piece: Any
 ) -> T:
     """Do a piece of work, on a worker that computes as whoever asks does.
@@ -248,12 +248,12 @@ def on_worker(
     there = fingerprint()
     refuse_unlike(here, there, get_worker().address)
     if there.machine not in machines:
-        raise UnknownMachineError(there.machine)
+        raise _UnknownMachineError(there.machine)
     return function(*piece)
 
 
 @contextmanager
-def connect(address: str, *, patience_s: float = PATIENCE_S) -> Iterator[Cluster]:
+def connect(address: str, *, patience_s: float = _PATIENCE_S) -> Iterator[Cluster]:
     """Connect to a cluster for the length of a block.
 
     Parameters

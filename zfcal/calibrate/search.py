@@ -24,8 +24,8 @@ from zfcal.calibrate.task import DEFAULT_GENERATIONS, Previous, Settings, Task
 from zfcal.errors import InputError
 from zfcal.parameters import n_genes
 
-PROBE_SHARE = 0.1
-RENEWED_SHARE = 0.2
+_PROBE_SHARE = 0.1
+_RENEWED_SHARE = 0.2
 """As dynamic NSGA-II (Deb, Rao and Karthik 2007) with random newcomers."""
 
 _OPTIMISERS: dict[str, ModuleType] = {"zfcal": evolve, "deap": evolve_deap}
@@ -193,7 +193,7 @@ def begin(task: Task, settings: Settings, evaluate: Evaluate) -> Progress:
         overall_score(features),
         rng=task.seeds.generator(Purpose.PROBE),
     )
-    n_renewed = round(RENEWED_SHARE * len(genes)) if changed else 0
+    n_renewed = round(_RENEWED_SHARE * len(genes)) if changed else 0
     if n_renewed:
         newcomers = task.seeds.generator(Purpose.RENEWAL).random((n_renewed, genes.shape[1]))
         fresh = evaluate(newcomers)
@@ -261,7 +261,7 @@ def world_changed(previous: Previous, scores: Floats, *, rng: np.random.Generato
     n = min(len(previous.genes), len(scores))
     if n == 0:
         return False
-    probe = rng.choice(n, size=math.ceil(PROBE_SHARE * n), replace=False)
+    probe = rng.choice(n, size=math.ceil(_PROBE_SHARE * n), replace=False)
     before, after = (np.nan_to_num(s[probe], nan=0.0).mean() for s in (previous.scores, scores))
     noise = 0.0 if math.isnan(previous.noise) else previous.noise
     return bool(before - after > noise)

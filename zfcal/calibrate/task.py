@@ -94,7 +94,7 @@ class Settings:
             raise InputError(f"champion must be 'score' or 'likely', got {self.champion!r}.")
 
     @property
-    def is_scored(self) -> bool:
+    def _is_scored(self) -> bool:
         """Whether the score is S: of D, W, O and T and nothing else."""
         return self.features == SCORED
 
@@ -102,7 +102,7 @@ class Settings:
     def said(self) -> dict[str, Any]:
         """Return what a lineage says of them; what is usual goes without saying."""
         options = asdict(self)
-        if self.is_scored:
+        if self._is_scored:
             del options["features"]
         else:
             options["features"] = list(self.features)
