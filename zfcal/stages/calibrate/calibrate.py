@@ -79,8 +79,7 @@ class _Shared:
 
     @property
     def seed(self) -> int:
-        asked = self.options.seed
-        return self.opened.trial.seed if asked is None else asked
+        return self.options.seed_of(self.opened.trial)
 
 
 def calibrate_options(
@@ -185,7 +184,7 @@ def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
     return group if options.cluster is None else ClusterGroup(group=group, cluster=options.cluster)
 
 
-def window_span(end_s: int) -> tuple[int, int]:
+def _window_span(end_s: int) -> tuple[int, int]:
     """Return from and to of the window that ends at a second, in seconds."""
     return end_s - LENGTH_S, end_s
 
@@ -240,7 +239,7 @@ def _lineage(shared: _Shared, places: RoundPlaces, previous: Path | None) -> Lin
     said = calibrate_options(opened, options, generations=options.generations_asked)
     if options.seed_likelihood:
         # One that is no file is no input: it is told where the estimate is made.
-        tracks = readable(segment_files(shared.root, window_span(places.end_s)), say_nothing)
+        tracks = readable(segment_files(shared.root, _window_span(places.end_s)), say_nothing)
         said |= guess_options(tracks)
         files += tracks
     return shared.run.lineage(MODEL, files, options=said, seed=shared.seed)
@@ -260,7 +259,7 @@ def _search(
     estimated = None
     if options.seed_likelihood:
         template = shared.group.template
-        estimated = estimate(shared.opened, template, window_span(places.end_s), tell)
+        estimated = estimate(shared.opened, template, _window_span(places.end_s), tell)
     round_task = RoundTask(
         group=shared.group,
         control=control,

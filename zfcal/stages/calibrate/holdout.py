@@ -12,7 +12,6 @@ from pathlib import Path
 from zfcal.arena import Arena
 from zfcal.arrays import Floats, Seeds
 from zfcal.artifacts.atomic import discard
-from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
 from zfcal.behaviour.ceilings import Ceiling
@@ -20,10 +19,9 @@ from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
 from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics, measure
-from zfcal.calibrate.ceiling import measure_ceiling
 from zfcal.calibrate.confirm import confirm
-from zfcal.calibrate.group import Purpose, SeedSource
-from zfcal.calibrate.objective import Objective
+from zfcal.calibrate.group import SeedSource
+from zfcal.calibrate.rounds import ceiling_of
 from zfcal.calibrate.task import Settings
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import InputError
@@ -33,9 +31,8 @@ from zfcal.stages.calibrate.calibrate import calibrate_options, make_group
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import (
     MODEL,
-    result_table,
+    Found,
     score_table,
-    summary_of,
 )
 from zfcal.stages.calibrate.searching import (
     CalibrateOptions,
@@ -162,17 +159,8 @@ def evaluate_model(
         control=control,
         seeds=SeedSource(trial_seed=seed, window_end_s=span_s[1]),
     )
-    genome = to_genes(parameters)
-    judge: Objective = task.confirmation(settings)
-    confirmed = confirm(judge, genome[None, :])
-    ceiling = measure_ceiling(
-        group,
-        genome,
-        long_run=confirmed.long_run,
-        n_steps=task.steps_of(settings.window_s),
-        seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
-    )
-    return Evaluation(scores=confirmed.scores, ceiling=ceiling)
+    confirmed = confirm(task.confirmation(settings), to_genes(parameters)[None, :])
+    return Evaluation(scores=confirmed.scores, ceiling=ceiling_of(task, settings, confirmed))
 
 
 def pooled_fish(
@@ -242,10 +230,10 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
     output = Output(
         path=span.output,
-        lineage=_lineage(opened, options, span, starts),
+        lineage=_lineage(run, opened, options, span, starts),
         ignore=options.not_asked,
     )
-    seed = output.lineage.seed or 0
+    seed = options.seed_of(opened.trial)
 
     def compute() -> Iterator[Draft]:
         group = make_group(opened, options)
@@ -265,14 +253,15 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         key = checkpoint_key(output.lineage)
         result = run_search(round_task, asked, checkpoint, run.tell, key=key)
         judged = _judge(opened, span, result.champion, seed, segments)
-        baselines = baseline_scores(round_task, options, result)
-        likelihood = None if estimated is None else estimated.table
-        table = {**result_table(result, baselines, likelihood), **judged}
-        told = {"path": str(output.path), **summary_of(result, baselines), **judged}
+        found = Found(
+            result=result,
+            baselines=baseline_scores(round_task, options, result),
+            likelihood=None if estimated is None else estimated.table,
+        )
 
         def write(path: Path, lineage: Lineage) -> list[Event]:
-            write_model(path, result.champion, lineage, table)
-            return [Result(value=told)]
+            write_model(path, result.champion, lineage, {**found.table, **judged})
+            return [Result(value={"path": str(output.path), **found.summary, **judged})]
 
         yield Draft(output=output.with_options(generations=result.generations), write=write)
         discard(checkpoint)
@@ -281,7 +270,7 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
 
 
 def _lineage(
-    opened: OpenTrial, options: CalibrateOptions, span: Span, starts: list[int]
+    run: Run, opened: OpenTrial, options: CalibrateOptions, span: Span, starts: list[int]
 ) -> Lineage:
     trial = opened.trial
     files = [segment_path(trial.root, start) for start in starts]
@@ -293,13 +282,8 @@ def _lineage(
         "window": _text(span.train_s),
         "held_out": _text(span.held_out_s) if span.held_out_s else None,
     }
-    return Lineage(
-        schema=MODEL,
-        command="calibrate",
-        options={**said, **stretches},
-        seed=trial.seed if options.seed is None else options.seed,
-        inputs=hash_inputs(trial.root, files),
-    )
+    seed = options.seed_of(trial)
+    return run.lineage(MODEL, files, options={**said, **stretches}, seed=seed)
 
 
 def _judge(

@@ -151,9 +151,24 @@ class Found:
     baselines: dict[str, JSON]
     likelihood: dict[str, JSON] | None
 
+    @property
+    def table(self) -> dict[str, JSON]:
+        """The table ``[result]`` of the model's file."""
+        return result_table(self.result, self.baselines, self.likelihood)
+
+    @property
+    def summary(self) -> dict[str, JSON]:
+        """The numbers of a round that people ask for first."""
+        result = self.result
+        return {
+            "generations": result.generations,
+            **score_table(result.scores, result.ceiling),
+            "baselines": self.baselines,
+        }
+
     def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, Write, Write]:
         """Return what writes each of the files, in the order of ``places.artifacts``."""
-        result, baselines = self.result, self.baselines
+        result = self.result
 
         def population(path: Path, lineage: Lineage) -> None:
             _write_population(path, result, lineage)
@@ -168,10 +183,9 @@ class Found:
             write_table(path, make_table(SCORES, rows), lineage)
 
         def model(path: Path, lineage: Lineage) -> list[Event]:
-            table = result_table(result, baselines, self.likelihood)
-            write_model(path, result.champion, lineage, table, parents=False)
+            write_model(path, result.champion, lineage, self.table, parents=False)
             value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
-            return [Result(value={**value, **summary_of(result, baselines)})]
+            return [Result(value={**value, **self.summary})]
 
         return population, scores, model
 
@@ -257,15 +271,6 @@ def result_table(
     }  # fmt: skip
 
 
-def summary_of(result: RoundResult, baselines: dict[str, JSON]) -> dict[str, JSON]:
-    """Return the numbers of a round that people ask for first."""
-    return {
-        "generations": result.generations,
-        **score_table(result.scores, result.ceiling),
-        "baselines": baselines,
-    }
-
-
 def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
     """Return S, its features and its ceiling as the entries of a table."""
     mean, low, high = ceiling.of("S")
@@ -275,7 +280,7 @@ def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
         "ceiling_low": _number(low),
         "ceiling_high": _number(high),
         "n_windows": ceiling.n_windows,
-        "against_ceiling": _number(scores.S / mean if mean > 0 else math.nan),
+        "against_ceiling": _share(scores.S, mean),
         "features": {
             field.name: _number(getattr(scores, field.name))
             for field in fields(scores)
@@ -298,7 +303,7 @@ def _named_table(named: NamedScore | None, ceiling: Ceiling) -> dict[str, JSON]:
             "ceiling": _number(mean),
             "ceiling_low": _number(low),
             "ceiling_high": _number(high),
-            "against_ceiling": _number(named.value / mean if mean > 0 else math.nan),
+            "against_ceiling": _share(named.value, mean),
             "similarities": {
                 name: _number(value)
                 for name, value in zip(named.features, named.similarities, strict=True)
@@ -306,6 +311,11 @@ def _named_table(named: NamedScore | None, ceiling: Ceiling) -> dict[str, JSON]:
             "n_features": named.n_features,
         }
     }
+
+
+def _share(value: float, mean: float) -> float | None:
+    """Return a score over its ceiling; None without a ceiling."""
+    return _number(value / mean if mean > 0 else math.nan)
 
 
 def _number(value: float) -> float | None:

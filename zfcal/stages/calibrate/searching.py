@@ -25,6 +25,7 @@ from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Progress, Tell
 from zfcal.stages.taken import unless_taken
+from zfcal.trial import Trial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +75,10 @@ class CalibrateOptions:
         """Generations of a round that has no budget."""
         asked = self.settings.generations
         return DEFAULT_GENERATIONS if asked is None else asked
+
+    def seed_of(self, trial: Trial) -> int:
+        """Return the seed of all random numbers of a calibration on a trial."""
+        return trial.seed if self.seed is None else self.seed
 
     @property
     def not_asked(self) -> tuple[str, ...]:
