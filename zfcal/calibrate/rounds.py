@@ -166,25 +166,33 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
 
 
 def _best(task: Task, settings: Settings, progress: Progress) -> tuple[Confirmed, Ceiling]:
-    best = best_distinct(progress.genes, progress.scores, settings.n_confirmed)
-    confirmed = confirm(task.confirmation(settings), best)
-    return confirmed, ceiling_of(task, settings, confirmed)
+    return judge(
+        task, settings, best_distinct(progress.genes, progress.scores, settings.n_confirmed)
+    )
 
 
 def _likely(task: Task, settings: Settings) -> tuple[Confirmed, Ceiling] | None:
     """Return the estimate; None where it is not asked for, or its score speaks against it."""
     if settings.champion != "likely" or task.guests is None:
         return None
-    confirmed = confirm(task.confirmation(settings), np.atleast_2d(task.guests)[:1])
-    ceiling = ceiling_of(task, settings, confirmed)
+    confirmed, ceiling = judge(task, settings, np.atleast_2d(task.guests)[:1])
     mean, _, _ = ceiling.overall
     falls_short = mean - confirmed.scores.overall
     return (confirmed, ceiling) if falls_short <= window_noise(ceiling) else None
 
 
-def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
-    """Return what a confirmed model reaches against its own long run."""
-    return measure_ceiling(
+def judge(task: Task, settings: Settings, genes: Floats) -> tuple[Confirmed, Ceiling]:
+    """Return the best of some genomes by long runs, and what it reaches against its own.
+
+    Parameters
+    ----------
+    task, settings
+        What they are held against, and how long is simulated.
+    genes : ndarray, shape (genome, gene)
+        At least one.
+    """
+    confirmed = confirm(task.confirmation(settings), genes)
+    ceiling = measure_ceiling(
         task.simulator,
         confirmed.genes,
         long_run=confirmed.long_run,
@@ -192,3 +200,4 @@ def ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
         seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
         features=settings.features,
     )
+    return confirmed, ceiling

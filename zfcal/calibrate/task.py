@@ -9,7 +9,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Floats, Seeds
 from zfcal.behaviour.features.registry import SCORED, ordered
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.evolve import GROUP
@@ -184,21 +184,20 @@ class Task:
 
     def evaluation(self, settings: Settings) -> Objective:
         """Return what the search maximises: short runs, one seed set for the round."""
-        return Objective(
-            group=self.simulator,
-            control=self.control,
-            n_steps=settings.steps,
-            seeds=self.seeds.seeds(Purpose.EVALUATION, settings.runs),
-            features=settings.features,
-        )
+        seeds = self.seeds.seeds(Purpose.EVALUATION, settings.runs)
+        return self._objective(settings, seeds, n_steps=settings.steps)
 
     def confirmation(self, settings: Settings) -> Objective:
         """Return what decides in the end: long runs with seeds of their own."""
+        seeds = self.seeds.seeds(Purpose.CONFIRMATION, settings.long_runs)
+        return self._objective(settings, seeds, n_steps=self.steps_of(settings.long_s))
+
+    def _objective(self, settings: Settings, seeds: Seeds, *, n_steps: int) -> Objective:
         return Objective(
             group=self.simulator,
             control=self.control,
-            n_steps=self.steps_of(settings.long_s),
-            seeds=self.seeds.seeds(Purpose.CONFIRMATION, settings.long_runs),
+            n_steps=n_steps,
+            seeds=seeds,
             features=settings.features,
         )
 

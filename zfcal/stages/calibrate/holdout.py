@@ -19,9 +19,8 @@ from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
 from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics, measure
-from zfcal.calibrate.confirm import confirm
 from zfcal.calibrate.group import SeedSource
-from zfcal.calibrate.rounds import ceiling_of
+from zfcal.calibrate.rounds import judge
 from zfcal.calibrate.task import Settings
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import InputError
@@ -159,8 +158,8 @@ def evaluate_model(
         control=control,
         seeds=SeedSource(trial_seed=seed, window_end_s=span_s[1]),
     )
-    confirmed = confirm(task.confirmation(settings), to_genes(parameters)[None, :])
-    return Evaluation(scores=confirmed.scores, ceiling=ceiling_of(task, settings, confirmed))
+    confirmed, ceiling = judge(task, settings, to_genes(parameters)[None, :])
+    return Evaluation(scores=confirmed.scores, ceiling=ceiling)
 
 
 def pooled_fish(
