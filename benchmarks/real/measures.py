@@ -22,7 +22,7 @@ from zfcal.arena import VOID
 from zfcal.artifacts.models import read_model
 from zfcal.artifacts.tables import read_table, read_tracks
 from zfcal.behaviour.ceilings import halves_ceiling, robot_ceiling, summarise
-from zfcal.behaviour.histograms import frequencies
+from zfcal.behaviour.histograms import bin_edges, frequencies
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import Statistics, measure, measure_robot
@@ -104,7 +104,7 @@ def statistics_table(found: Statistics, points: Located) -> dict[str, Any]:
         table[letter] = {
             "range": list(limits),
             "n": counts.sum(axis=1).tolist(),
-            "mean": [number(histogram_mean(row, limits)) for row in counts],
+            "mean": [number(histogram_mean(row, bin_edges(limits))) for row in counts],
             "frequency": _numbers(frequencies(counts)),
         }
     table["O"] = {

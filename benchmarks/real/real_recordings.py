@@ -165,8 +165,8 @@ def against_the_alone(work: Path, found: dict[str, dict[str, Any]]) -> None:
                 table["robot_in_file"] = measures.robot_if_table(work / name, named)
 
 
-def draw(recording: Recording, places: Places) -> Path:
-    """Draw the statistics of the held-out half beside those of the calibrated model."""
+def draw(recording: Recording, places: Places, folder: Path) -> Path:
+    """Draw the statistics of the held-out half beside those of the calibrated model, as PNG."""
     opened = SEGMENTS.open(places.trial)
     start_s, end_s = recording.held_out_s
     points = measures.located(places.trial).between(start_s, end_s)
@@ -185,7 +185,7 @@ def draw(recording: Recording, places: Places) -> Path:
     if not any(stats.distance.any() for stats in cases.values()):
         # A lone fish has no distances to others: the first row would be empty.
         picture = replace(picture, panels=picture.panels[len(opened.arena.zones) :])
-    path = PICTURES / f"real-{recording.name}.png"
+    path = folder / f"real-{recording.name}.png"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_picture(picture, path)
     shrink(path)
@@ -204,13 +204,14 @@ def main() -> int:
     options = _options()
     effort = Effort(generations=options.generations, workers=options.workers)
     options.work.mkdir(parents=True, exist_ok=True)
+    pictures, told = (options.work, sys.stderr) if options.only else (PICTURES, sys.stdout)
     found: dict[str, dict[str, Any]] = {}
     for prepare_source in (SOURCES[name] for name in options.only or SOURCES):
         recording = prepare_source(options.data, options.work)
         places, lines = prepare(recording, options.work)
         lines += run(recording, places, effort)
         found[recording.name] = gather(recording, places, lines)
-        print(draw(recording, places), flush=True)
+        print(draw(recording, places, pictures), file=told, flush=True)
     against_the_alone(options.work, found)
     results = {
         "command": f"make bench-real (--generations {effort.generations}, seed {SEED})",
@@ -242,7 +243,7 @@ def _options() -> argparse.Namespace:
         "--only",
         choices=SOURCES,
         nargs="+",
-        help="these alone; numbers go to standard output",
+        help="numbers of these on standard output, pictures in --work",
     )
     options = parser.parse_args()
     if not options.data.is_dir():

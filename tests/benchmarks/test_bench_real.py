@@ -12,6 +12,21 @@ from zfcal.artifacts.arenas import arena_of, load_arena
 from zfcal.errors import ZfcalError
 
 
+@pytest.mark.slow
+def test_a_recording_goes_the_whole_way(command, shared_data, repository, tmp_path):
+    """One fish in two rooms: figures on standard output, a picture in the folder of trials."""
+    words = ("--data", shared_data, "--work", tmp_path, "--workers", "2")
+    one = ("--only", "two-rooms-one-fish", "--generations", "1")
+    done = command("real/real_recordings.py", *words, *one)
+
+    (found,) = json.loads(done.stdout)["recordings"].values()
+    assert 0 < found["held_out"]["after"]["S"] <= 1
+    statistics = found["statistics"]["first_half"]
+    assert statistics["zones"] == ["corridor", "walls", "centre"]
+    assert all(mean > 0 for mean in statistics["V"]["mean"])
+    assert (tmp_path / "real-two-rooms-one-fish.png").stat().st_size > 5000
+
+
 @pytest.fixture
 def results(repository):
     """Return what gives the numbers that the documentation states."""
