@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks.shared.measuring import ROOT, load, machine, table
 from benchmarks.shared.regressions import Ratio, conclude, parser
 
-PLACE = ROOT / "build" / "closed-loop"
+BUILD = ROOT / "build" / "closed-loop"
 WORDS = {
     "calibrated": ("--swims", "calibrated"),
     "by score": ("--swims", "calibrated", "--champion", "score"),
@@ -46,16 +46,16 @@ PUBLISHED = {180: 0.610, 300: 0.827, 360: 0.850}
 """S of the model against the fish at the ends of windows (Cazenille et al., 10 trials)."""
 
 
-def run_one(kind: str, seed: int, minutes: int, *, video: bool) -> dict[str, Any]:
+def run_one(kind: str, seed: int, options: argparse.Namespace) -> dict[str, Any]:
     """Run a trial unless it is there, and return what came of it."""
-    folder = _folder(kind, seed, minutes, video=video)
+    folder, minutes = _folder(kind, seed, options), options.minutes
     kept = folder / KEPT
     if kept.exists():
         found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
         return found
     begin = time.monotonic()
     words = ["--closed-loop", "--duration", f"{minutes}min", *WORDS[kind], "--seed", str(seed)]
-    words += [] if video else ["--no-video"]
+    words += [] if options.video else ["--no-video"]
     try:
         _zfcal("demo", str(folder), *words)
     except subprocess.CalledProcessError:
@@ -68,7 +68,7 @@ def run_one(kind: str, seed: int, minutes: int, *, video: bool) -> dict[str, Any
         "kind": kind,
         "seed": seed,
         "minutes": minutes,
-        "video": video,
+        "video": options.video,
         "times_real_time": 60 * minutes / took_s,
         "robot_vs_fish": robot["features"] if robot else {},
         "rounds": _rounds(folder / "trial"),
@@ -77,9 +77,10 @@ def run_one(kind: str, seed: int, minutes: int, *, video: bool) -> dict[str, Any
     return found
 
 
-def _folder(kind: str, seed: int, minutes: int, *, video: bool) -> Path:
-    name = f"{kind.replace(' ', '-')}-{seed}-{minutes}min"
-    return PLACE / (f"{name}-video" if video else name)
+def _folder(kind: str, seed: int, options: argparse.Namespace) -> Path:
+    name = f"{kind.replace(' ', '-')}-{seed}-{options.minutes}min"
+    folder: Path = options.build / (f"{name}-video" if options.video else name)
+    return folder
 
 
 def _zfcal(*words: str) -> None:
@@ -109,17 +110,13 @@ def _rounds(trial: Path) -> list[dict[str, Any]]:
 
 def measure_all(options: argparse.Namespace) -> dict[str, Any]:
     """Run all trials, two at a time."""
-    PLACE.mkdir(parents=True, exist_ok=True)
+    options.build.mkdir(parents=True, exist_ok=True)
     jobs = [(kind, SEEDS + k) for k in range(options.trials) for kind in options.kinds.split(",")]
     if options.report:
-        jobs = [
-            job
-            for job in jobs
-            if (_folder(*job, options.minutes, video=options.video) / KEPT).exists()
-        ]
+        jobs = [job for job in jobs if (_folder(*job, options) / KEPT).exists()]
     found: dict[str, Any] = {"machine": machine(), "load_before": load(), "trials": []}
     with ThreadPoolExecutor(options.workers) as pool:
-        todo = [pool.submit(run_one, *job, options.minutes, video=options.video) for job in jobs]
+        todo = [pool.submit(run_one, *job, options) for job in jobs]
         for each in todo:
             found["trials"].append(each.result())
             last = found["trials"][-1]
@@ -276,6 +273,7 @@ def main() -> None:
     made.add_argument("--workers", type=int, default=2, help="Trials at a time.")
     made.add_argument("--report", action="store_true", help="Take the trials that are done.")
     made.add_argument("--video", action="store_true", help="Draw and track the cameras' images.")
+    made.add_argument("--build", type=Path, default=BUILD, help="Where finished trials are kept.")
     options = made.parse_args()
     if options.tiny:
         options.trials, options.minutes, options.kinds = 1, 3, "fixed"
