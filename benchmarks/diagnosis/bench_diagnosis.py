@@ -114,11 +114,7 @@ def missing(jobs: Sequence[Job], desk: Desk, sections: Sequence[str]) -> list[Jo
         if row["verdict"] != "error"
     }
     return [
-        job
-        for job in jobs
-        if job.section in sections
-        and trial.lacks(job.section) is None
-        and ledger.key_of(job.said()) not in done
+        job for job in jobs if job.section in sections and ledger.key_of(job.said()) not in done
     ]
 
 
@@ -200,8 +196,7 @@ def summary(desk: Desk, jobs: Sequence[Job]) -> dict[str, Any]:
     marks = {mode: desk.marks_of(quick=mode == "quick") for mode in MODES}
     rows = told(desk)
     planned = {section: sum(job.section == section for job in jobs) for section in SECTIONS}
-    lacking = {section: what for section in SECTIONS if (what := trial.lacks(section))}
-    made = summarise(rows, planned=planned, lacking=lacking)
+    made = summarise(rows, planned=planned)
     return {
         "machine": machine(),
         "code": {

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.diagnosis.plan import EXTEND, SECTIONS, VIDEO
+from benchmarks.diagnosis.plan import SECTIONS, VIDEO
 from benchmarks.diagnosis.summary import DESCRIBES, NAMELESS, NOTHING
 from benchmarks.shared.measuring import table
 
@@ -77,8 +77,7 @@ def _head(found: Mapping[str, Any]) -> list[str]:
     rows: list[list[object]] = []
     for section in SECTIONS:
         done = [str(modes[mode]["n"].get(section, 0)) if mode in modes else "0" for mode in MODES]
-        lacking = found["lacking"].get(section, "")
-        rows.append([section, _SAYS[section], found["planned"][section], *done, lacking])
+        rows.append([section, _SAYS[section], found["planned"][section], *done])
     return [
         "# Does the diagnosis find what was hidden?\n",
         _prose(
@@ -94,7 +93,7 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
-        table(("section", "trials", "planned", *MODES.values(), ""), rows),
+        table(("section", "trials", "planned", *MODES.values()), rows),
     ]
 
 
@@ -112,10 +111,10 @@ def _codes(found: Mapping[str, Any]) -> str:
 
 def _completeness(found: Mapping[str, Any]) -> str:
     """Say whether all that was planned was done in one of the modes."""
-    planned = {s: n for s, n in found["planned"].items() if s not in found["lacking"]}
+    planned = found["planned"]
     full = dict(_modes(found)).get("full", {"n": {}})
     short = [section for section, n in planned.items() if full["n"].get(section, 0) < n]
-    if not short and not found["lacking"]:
+    if not short:
         return "A complete run with 39 replicates.\n"
     of_mode = [
         f"{sum(told['n'].get(section, 0) for section in planned)} with {MODES[mode]}"
@@ -124,7 +123,7 @@ def _completeness(found: Mapping[str, Any]) -> str:
     done = " and ".join(of_mode) or "none"
     quick = dict(_modes(found)).get("quick", {"n": {}})
     whole = all(quick["n"].get(section, 0) >= n for section, n in planned.items())
-    if whole and not found["lacking"]:
+    if whole:
         return _prose(
             f"""**Complete with `--quick`**, {sum(planned.values())} trials. With 39 replicates,
             which take six times as long, {sum(full["n"].values())} of them were run."""
@@ -264,7 +263,7 @@ def _gap(found: Mapping[str, Any]) -> list[str]:
         made.append(table(("findings by", "measure", "share closed", "placebo"), rows))
         made.append("Medians and quartiles; targets: 80 % closed, the placebo at most 5 %.\n")
     else:
-        made.append(f"Not run: {found['lacking'].get(EXTEND, 'no trial was extended yet')}.\n")
+        made.append("Not run: no trial was extended yet.\n")
     return made
 
 
@@ -281,7 +280,7 @@ def _through_video(found: Mapping[str, Any]) -> list[str]:
     if rows:
         told = table(("hidden", "oracle nats", "said"), rows)
     else:
-        told = f"Not run: {found['lacking'].get(VIDEO, 'no trial was rendered yet')}.\n"
+        told = "Not run: no trial was rendered yet.\n"
     return ["## Through video\n", told]
 
 

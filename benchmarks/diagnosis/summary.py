@@ -352,9 +352,7 @@ def of_mode(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def summarise(
-    rows: Sequence[Row], *, planned: Mapping[str, int], lacking: Mapping[str, str]
-) -> dict[str, Any]:
+def summarise(rows: Sequence[Row], *, planned: Mapping[str, int]) -> dict[str, Any]:
     """Return all numbers of a benchmark.
 
     Parameters
@@ -363,8 +361,6 @@ def summarise(
         Of the finished trials.
     planned
         Trials of each section in a complete run of one mode.
-    lacking
-        Sections that cannot be run, and why.
     """
     ordered = sorted(rows, key=lambda r: (r["section"], r["scenario"]["seed"], r["quick"]))
     modes = {
@@ -373,7 +369,6 @@ def summarise(
     }
     return {
         "planned": dict(planned),
-        "lacking": dict(lacking),
         "modes": {mode: of_mode(part) for mode, part in modes.items() if part},
         "trials": [brief(row) for row in ordered],
     }

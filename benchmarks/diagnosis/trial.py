@@ -6,8 +6,6 @@ way of the commands, from `zfcal init` to `zfcal extend`.
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import json
 import resource
 import subprocess
@@ -20,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.diagnosis.ledger import Row, fingerprint, key_of
-from benchmarks.diagnosis.plan import EXTEND, NULLS, TIME, VIDEO, Job, scenario
+from benchmarks.diagnosis.plan import EXTEND, NULLS, TIME, Job, scenario
 from benchmarks.shared.measuring import ROOT
 from zfcal.errors import ZfcalError
 
@@ -64,19 +62,6 @@ def marks(sections: tuple[str, ...]) -> dict[str, str]:
     diagnosis, extension = fingerprint(ROOT, DIAGNOSIS_CODE), fingerprint(ROOT, _EXTENSION)
     made = {section: extension if section == EXTEND else diagnosis for section in sections}
     return {**made, ORACLE: fingerprint(ROOT, _HIDDEN)}
-
-
-def lacks(section: str) -> str | None:
-    """Return what a section cannot do without and zfcal does not have; None where it is there."""
-    if section == EXTEND and not _has("zfcal.stages.extend.extend"):
-        return "needs zfcal extend"
-    if section == VIDEO and not _has("zfcal.stages.track.track"):
-        return "needs zfcal track"
-    return None
-
-
-def _has(module: str) -> bool:
-    return importlib.util.find_spec(module) is not None
 
 
 def oracle_said(asked: dict[str, Any]) -> dict[str, Any]:
@@ -249,11 +234,11 @@ def _extended(root: Path) -> Row:
     """Return what ``zfcal extend`` says of a trial that was diagnosed, and what that took."""
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
+    from zfcal.stages.extend.extend import ExtendOptions, extend
 
-    extend = importlib.import_module("zfcal.stages.extend.extend")
     settings = Settings(generations=GENERATIONS)
-    options = extend.ExtendOptions(calibration=CalibrateOptions(settings=settings, n_workers=1))
-    path, wall_s, cpu_s = _timed(lambda: extend.extend(root, options, silent))
+    options = ExtendOptions(calibration=CalibrateOptions(settings=settings, n_workers=1))
+    path, wall_s, cpu_s = _timed(lambda: extend(root, options, silent))
     findings = json.loads((root / "diagnosis" / "findings.json").read_text(encoding="utf-8"))
     return {
         "extended": path is not None,

@@ -93,11 +93,6 @@ class RingRun:
         inside = (radius_m >= RADII_M[1]) & (radius_m < RADII_M[2])
         return inside.sum(axis=0) / (~np.isnan(radius_m)).sum(axis=0)
 
-    def first(self, seconds: float) -> RingRun:
-        """Return the beginning of the run."""
-        n = round(seconds * FPS)
-        return RingRun(xy_px=self.xy_px[:n], guessed=self.guessed[:n], robot=self.robot)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RingFit:

@@ -250,10 +250,10 @@ def test_a_run_says_whether_it_is_complete(script, summary, row):
     """With all that was planned in the mode with replicates, and with --quick."""
     document = script("diagnosis.document")
     rows = [{**row(("alignment",), ("alignment",), nats=150.0), "quick": False}]
-    found = summary.summarise(rows, planned={"listed": 1}, lacking={})
+    found = summary.summarise(rows, planned={"listed": 1})
     assert document._completeness(found) == "A complete run with 39 replicates.\n"
-    more = summary.summarise(rows, planned={"listed": 2}, lacking={})
+    more = summary.summarise(rows, planned={"listed": 2})
     assert "partial" in document._completeness(more)
-    short = summary.summarise([{**rows[0], "quick": True}], planned={"listed": 1}, lacking={})
+    short = summary.summarise([{**rows[0], "quick": True}], planned={"listed": 1})
     assert "Complete with `--quick`**, 1 trial" in document._completeness(short)
     assert "0 of them" in document._completeness(short)
