@@ -63,21 +63,20 @@ def row(planned):
 
 
 @pytest.mark.slow
-def test_a_trial_is_hidden_diagnosed_kept_and_told(command, repository, ledger, tmp_path):
-    """One is begun within three seconds; the document counts it, and not those of other code."""
+def test_a_trial_is_hidden_diagnosed_kept_and_told(command, ledger, tmp_path):
+    """The document counts what is begun in six seconds, and no trial of other code beside it."""
     build, out = tmp_path / "build", tmp_path / "out"
-    least = ("--quick", "--sections", "lengths", "--few", "1", "--minutes", "0.05")
-    command(
-        "diagnosis/bench_diagnosis.py", *least, "--workers", "1", "--build", build, "--out", out
-    )
+    least = ("--quick", "--sections", "lengths", "--few", "1", "--minutes", "0.1")
+    places = ("--build", build, "--out", out)
+    command("diagnosis/bench_diagnosis.py", *least, "--workers", "1", *places)
 
-    (made,) = ledger.read(build / "lengths.jsonl")
-    assert made["verdict"] != "error", made.get("error")
+    rows = ledger.read(build / "lengths.jsonl")
+    assert rows
+    assert [row["error"] for row in rows if row["verdict"] == "error"] == []
     found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-    assert found["code"]["quick"]["diagnosis"] == made["code"]
-    assert [trial["seed"] for trial in found["trials"] if trial["quick"]] == [
-        made["scenario"]["seed"]
-    ]
+    assert {found["code"]["quick"]["diagnosis"]} == {row["code"] for row in rows}
+    told = [trial["seed"] for trial in found["trials"] if trial["quick"]]
+    assert told == sorted(row["scenario"]["seed"] for row in rows)
     text = (out / "benchmarks-diagnosis.md").read_text(encoding="utf-8")
     assert "**A partial run.**" in text
     assert (out / "pictures" / "diagnosis-confusion-quick.png").stat().st_size > 5000

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from zfcal.tracking.seen import METHODS
+
 
 @pytest.mark.slow
 def test_the_benchmark_of_tracking_runs(tiny):
     """Both methods on drawn film, with scores beside those of the truth."""
     found, text = tiny("tracking/bench_tracking.py")
-    assert {row["method"] for row in found["rows"]} == {"published", "default"}
+    assert {row["method"] for row in found["rows"]} == set(METHODS)
     for row in found["rows"]:
         assert row["recall"] > 0.9
         assert f"- {row['film']}, {row['method']}: S " in text
