@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Bools, Floats
 from zfcal.errors import InputError
 
 VOID = 0
@@ -174,7 +174,7 @@ class Arena:
         return self._fill_cracks(ids, inside, points)
 
     def _fill_cracks(
-        self, ids: NDArray[np.int8], inside: NDArray[np.bool_], points: NDArray[np.object_]
+        self, ids: NDArray[np.int8], inside: Bools, points: NDArray[np.object_]
     ) -> NDArray[np.int8]:
         """Give points between two zones that should touch to the nearest one.
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 FOV_RAD = math.radians(135.0)
@@ -125,7 +126,7 @@ class Parameters:
         """Names of the zones, in the arena's order."""
         return tuple(zone.name for zone in self.zones)
 
-    def gamma_matrix(self) -> NDArray[np.float64]:
+    def gamma_matrix(self) -> Floats:
         """Return the attraction from zone (row) to zone (column), shape (zone, zone)."""
         names = self.zone_names
         return np.array([[zone.gamma[name] for name in names] for zone in self.zones])
@@ -144,14 +145,14 @@ def gene_names(zone_names: tuple[str, ...]) -> tuple[str, ...]:
     )
 
 
-def gene_scales(n_zones: int) -> NDArray[np.float64]:
+def gene_scales(n_zones: int) -> Floats:
     """Return the value of each parameter at gene 1, shape (gene,)."""
     return np.concatenate(
         [np.tile([KAPPA_0_MAX, KAPPA_F_MAX, ALPHA_MAX], n_zones), np.ones(n_zones**2)]
     )
 
 
-def to_genes(parameters: Parameters) -> NDArray[np.float64]:
+def to_genes(parameters: Parameters) -> Floats:
     """Return the genes in [0, 1] of a model, shape (gene,); beyond the bounds they are cut off.
 
     The order is that of `gene_names`: three per zone, then the rows of gamma.

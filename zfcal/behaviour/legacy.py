@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
+from zfcal.arrays import Bools, Floats, Indices, Ints
 from zfcal.behaviour.histograms import bin_edges, count_cells
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.behaviour.scores import NAN, Scores, from_zones
@@ -37,10 +37,6 @@ EXTENT_M = 0.89
 
 DISTANCE_SHARE = 0.25
 """D is binned from 0 to this share of the extent."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,7 +106,7 @@ def measure_legacy(
     )
 
 
-def _mean_distances(located: Located) -> tuple[NDArray[np.intp], Floats]:
+def _mean_distances(located: Located) -> tuple[Indices, Floats]:
     """Return zone index and mean distance of every sample's group of two or more in a zone."""
     points = located.take(located.zone > 0)
     order = np.lexsort((points.zone, points.k))

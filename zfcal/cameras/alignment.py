@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from zfcal.cameras.lens import Floats
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 
 LONGEST_OFFSET_S = 2.0
@@ -151,7 +150,7 @@ def align_spots(overhead: Spots, below: Spots) -> Alignment:
     return found
 
 
-def time_blocks(time_s: Floats) -> NDArray[np.bool_]:
+def time_blocks(time_s: Floats) -> Bools:
     """Return every other block of five seconds: what one half foretells of the other."""
     return np.asarray((time_s // _BLOCK_S).astype(np.int64) % 2 == 0)
 
@@ -174,7 +173,7 @@ class _Frames:
     """The blobs overhead by frame: times of frames, and for each blob its frame's number."""
 
     time_s: Floats
-    number: NDArray[np.int64]
+    number: Ints
     blobs_m: Floats
 
     @classmethod
@@ -182,7 +181,7 @@ class _Frames:
         time_s, number = np.unique(spots.time_s, return_inverse=True)
         return cls(time_s=time_s, number=number.astype(np.int64), blobs_m=spots.xy_m)
 
-    def nearest(self, places_m: Floats) -> tuple[NDArray[np.int64], Floats]:
+    def nearest(self, places_m: Floats) -> tuple[Ints, Floats]:
         """Return for each frame the row of the blob nearest to a place, and its distance."""
         away = np.hypot(*(self.blobs_m - places_m[self.number]).T)
         away = np.where(np.isnan(away), np.inf, away)
@@ -242,7 +241,7 @@ def _refined(frames: _Frames, below: Spots, start: Floats, gate_m: float) -> Flo
 
 def _partners(
     frames: _Frames, below: Spots, values: Floats, gate_m: float
-) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+) -> tuple[Ints, Floats, Bools]:
     places = _moved(_at(below, frames.time_s - values[0]), values[1], values[2:])
     rows, away = frames.nearest(places)
     return rows, places, away <= gate_m

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.frames import Image
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.poses import View
 from zfcal.errors import InputError
 

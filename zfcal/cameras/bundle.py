@@ -14,8 +14,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.optimize import least_squares
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Camera
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens
 from zfcal.cameras.poses import (
     NOISE_PX,
     View,

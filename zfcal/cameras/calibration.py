@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Camera, Homography
 from zfcal.cameras.handedness import seen_from
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.pairs import Pairs
 from zfcal.errors import InputError
 

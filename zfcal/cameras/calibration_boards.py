@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.cameras.calibration import summary
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError
 

@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.cameras.calibration import (
     Calibration,
@@ -23,7 +24,7 @@ from zfcal.cameras.calibration import (
     outlier_notes,
 )
 from zfcal.cameras.camera import Camera, Homography
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens, shown_size
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens, shown_size
 from zfcal.cameras.pairs import Pairs
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError

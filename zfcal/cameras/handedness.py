@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
-from zfcal.cameras.lens import Floats
 from zfcal.errors import InputError
 
 ABOVE, BELOW = "above", "below"

@@ -13,11 +13,10 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats
 from zfcal.errors import InputError
 
-Floats = NDArray[np.float64]
 Matrix = tuple[tuple[float, ...], ...]
 
 PINHOLE = "pinhole"
@@ -191,12 +190,12 @@ class Lens:
         rays[self._misses(rays, wanted)] = np.nan
         return rays
 
-    def _misses(self, rays: Floats, wanted: Floats) -> NDArray[np.bool_]:
+    def _misses(self, rays: Floats, wanted: Floats) -> Bools:
         inside = np.hypot(*rays.T) <= self.widest_ray
         off = np.abs(self._project(np.where(inside[:, None], rays, 0.0)) - wanted).max(axis=1)
         return ~(inside & (off < 10 * _EXACT_PX))
 
-    def _radial_start(self, wanted: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def _radial_start(self, wanted: Floats) -> tuple[Floats, Bools]:
         (fx, skew, cx), (_, fy, cy), _ = self.matrix
         down = (wanted[:, 1] - cy) / fy
         across = (wanted[:, 0] - cx - skew * down) / fx

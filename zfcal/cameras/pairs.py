@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zfcal.cameras.lens import Floats, check_size, shown_size
+from zfcal.arrays import Floats
+from zfcal.cameras.lens import check_size, shown_size
 from zfcal.errors import InputError
 
 SMALLEST_M = 0.01

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.alignment import Alignment, time_blocks
 from zfcal.cameras.camera import Camera, Homography
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.pairs import Pairs
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
-from zfcal.readers.raw import Floats, Ints
 
 RATE_TOLERANCE = 0.02
 """Share by which a clock may be off before it is another frame rate."""
@@ -55,7 +54,7 @@ def check_rate(path: Path, time_s: Floats, *, fps: float, frame: Ints | None = N
 
 
 def _rate(steps: Floats, counts: Floats, *, told: bool) -> float:
-    regular: NDArray[np.bool_] = np.ones(len(steps), dtype=np.bool_)
+    regular: Bools = np.ones(len(steps), dtype=np.bool_)
     if not told:
         # The lower median is a step that occurs: half way between two would suit neither.
         usual = np.partition(steps, (len(steps) - 1) // 2)[(len(steps) - 1) // 2]

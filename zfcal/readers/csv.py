@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import EXTENT_LIMIT_M, Imported, assemble
 from zfcal.readers.clock import check_rate
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Ints, Rows
+from zfcal.readers.raw import Rows
 from zfcal.readers.text import (
     Layout,
     TextTable,

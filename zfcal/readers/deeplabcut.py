@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import load_plain
 from zfcal.readers.poses import Poses, choose
-from zfcal.readers.raw import Floats, Ints
 from zfcal.readers.text import (
     Layout,
     first_lines,

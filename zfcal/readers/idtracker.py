@@ -22,13 +22,14 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import read_npy
-from zfcal.readers.raw import Floats, Grid, Rows
+from zfcal.readers.raw import Grid, Rows
 from zfcal.readers.text import (
     Layout,
     header_of,

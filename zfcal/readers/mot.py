@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Ints, Rows
+from zfcal.readers.raw import Rows
 from zfcal.readers.text import (
     Layout,
     TextTable,

@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import METRES_PER, Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
-from zfcal.readers.raw import Floats, Ints
 
 LEGACY = {"keypoints": "keypoint", "individuals": "individual"}
 """Names of dimensions before version 0.17, and since."""

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Grid, Ints
+from zfcal.readers.raw import Grid
 
 MEAN = "mean"
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.extras import dataset, open_hdf5, texts
@@ -78,7 +79,7 @@ def _order(path: Path, file: Any) -> tuple[str, ...]:
     return words
 
 
-def _arranged(path: Path, stored: NDArray[Any], order: tuple[str, ...]) -> NDArray[np.float64]:
+def _arranged(path: Path, stored: NDArray[Any], order: tuple[str, ...]) -> Floats:
     """Return an array with its axes in the order frame, track, node, xy."""
     if stored.ndim != len(order):
         raise InputError(

@@ -19,12 +19,11 @@ from typing import Any, TextIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.artifacts.arrays import array_of, numbers_of
 from zfcal.artifacts.reading.limits import TABLE_BYTES, largest, too_large
 from zfcal.errors import InputError
-from zfcal.readers.raw import Floats, Ints
 
 MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
 """Cells that stand for a missing value."""
@@ -202,7 +201,7 @@ def whole_numbers(table: TextTable, name: str) -> Ints:
     return values.astype(np.int64)
 
 
-def labels(table: TextTable, name: str) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+def labels(table: TextTable, name: str) -> tuple[Ints, tuple[str, ...]]:
     """Return for each row the place of its text in the list of texts that occur.
 
     An empty cell is the text ''.

@@ -8,16 +8,14 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from zfcal.arrays import Bools, Floats
 from zfcal.tracking.blobs import Blob, Shape, shape_of
 from zfcal.tracking.fitting import fit
 from zfcal.tracking.splitting import by_clusters, by_darkness
 from zfcal.tracking.trail import Detection, Trail
 from zfcal.tracking.usual import Body
-
-Floats = NDArray[np.float64]
 
 _SEVERAL = 1.5
 """Areas of one body vary by a fifth with its bend; from this many areas on there are two."""
@@ -126,7 +124,7 @@ def _parts(
 
 
 def _fitted(
-    blob: Blob, parts: list[NDArray[np.bool_]], trails: list[Trail], usual: Body, time_s: float
+    blob: Blob, parts: list[Bools], trails: list[Trail], usual: Body, time_s: float
 ) -> Iterator[Detection]:
     """Yield the bodies of tracks that lie across each other, moved until they explain the blob.
 

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Grey = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
+from zfcal.arrays import Bools, Floats32, Grey
 
 SURROUNDINGS_PX = 3
 _SQUARE = np.ones((3, 3), np.uint8)
@@ -38,16 +37,16 @@ class Piece(NamedTuple):
     """
 
     crop: tuple[slice, slice]
-    inside: Mask
-    around: Mask
+    inside: Bools
+    around: Bools
     number: int
 
-    def within(self, where: Mask) -> Piece:
+    def within(self, where: Bools) -> Piece:
         """Return it with those surroundings alone that lie somewhere."""
         return self._replace(around=self.around & where[self.crop])
 
 
-def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Mask) -> Iterator[Piece]:
+def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Bools) -> Iterator[Piece]:
     """Yield the pieces of a labelled mask that are asked for and have surroundings.
 
     Parameters
@@ -86,7 +85,7 @@ def step_across(image: Grey, piece: Piece) -> float:
     return abs(float(steps.mean())) if len(steps) else 0.0
 
 
-def _mean_near(image: NDArray[np.float32], mask: Mask) -> NDArray[np.float32]:
+def _mean_near(image: Floats32, mask: Bools) -> Floats32:
     """Return the mean of the pixels of a mask about each pixel; NaN where there are none."""
     weight = mask.astype(np.float32)
     plain = cv2.BORDER_CONSTANT
@@ -96,8 +95,8 @@ def _mean_near(image: NDArray[np.float32], mask: Mask) -> NDArray[np.float32]:
 
 
 def without_step(
-    mask: Grey, right: Grey, wrong: Grey, *, core: Grey | None = None, where: Mask | None = None
-) -> Mask:
+    mask: Grey, right: Grey, wrong: Grey, *, core: Grey | None = None, where: Bools | None = None
+) -> Bools:
     """Return the pieces of a mask at whose border one image steps less than another.
 
     Parameters

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from zfcal.tracking.background import DARK, EITHER, LIGHT, Background, Grey
+from zfcal.arrays import Bools, Floats, Grey
+from zfcal.tracking.background import DARK, EITHER, LIGHT, Background
 from zfcal.tracking.ghosts import Piece, pieces_of
 
 USUAL_MIN_BLOB_PX = 12.0
@@ -118,7 +118,7 @@ def learn(
     tank: Background,
     *,
     n_agents: int | None,
-    region: NDArray[np.bool_] | None = None,
+    region: Bools | None = None,
 ) -> Learnt:
     """Return what frames tell.
 
@@ -151,9 +151,7 @@ def learn(
     )
 
 
-def standing_out(
-    frame: Grey, tank: Background, region: NDArray[np.bool_] | None = None
-) -> list[Standing]:
+def standing_out(frame: Grey, tank: Background, region: Bools | None = None) -> list[Standing]:
     """Return what differs from the tank in a frame, and which sign of animal it speaks for."""
     gain = tank.gain(frame)
     if abs(gain - 1) > 0:
@@ -202,7 +200,7 @@ def _step(image: Grey, piece: Piece) -> float:
     return float(part[piece.inside].mean() - np.median(part[piece.around]))
 
 
-def _ranked(values: Sequence[Sequence[float]], n: int) -> NDArray[np.float64]:
+def _ranked(values: Sequence[Sequence[float]], n: int) -> Floats:
     """Return the largest n of a frame, as they are in half of the frames; 0 for nothing.
 
     A hand is in some of the frames, and one of many pieces in those.

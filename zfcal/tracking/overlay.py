@@ -16,12 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Frame, Image
 from zfcal.errors import StorageError
 from zfcal.tracks import GUESS, ROBOT, AgentPose, FramePoses
-
-Floats = NDArray[np.float64]
 
 # Okabe and Ito's colours, which most people can tell apart; blue, green, red.
 _FISH_BGR = ((178, 114, 0), (233, 180, 86), (115, 158, 0), (66, 228, 240), (167, 121, 204))

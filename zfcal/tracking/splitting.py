@@ -10,12 +10,10 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats
 from zfcal.tracking._kernels import clusters, nearest_squared
 from zfcal.tracking.blobs import Blob
-
-Floats = NDArray[np.float64]
 
 _ITERATIONS = 12
 
@@ -26,7 +24,7 @@ _PIECE = 0.3
 """Share of an animal's area that a piece must have at least, to be one."""
 
 
-def by_darkness(blob: Blob, n: int, *, area_px: float) -> list[NDArray[np.bool_]]:
+def by_darkness(blob: Blob, n: int, *, area_px: float) -> list[Bools]:
     """Return which pixels of a blob belong to each of n animals that only their edges join.
 
     The blob is cut at rising darkness until n pieces of some size are left; every other pixel
@@ -60,7 +58,7 @@ def by_darkness(blob: Blob, n: int, *, area_px: float) -> list[NDArray[np.bool_]
     return []
 
 
-def by_clusters(blob: Blob, n: int, seeds: Floats | None = None) -> list[NDArray[np.bool_]]:
+def by_clusters(blob: Blob, n: int, seeds: Floats | None = None) -> list[Bools]:
     """Return which pixels of a blob belong to each of n animals, by k-means.
 
     Parameters

@@ -12,14 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from zfcal.arena import Arena, Zone
+from zfcal.arrays import Floats
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture, write_picture
 
-Field = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Field = tuple[Floats, Floats, Floats]
 
 WIDTH_IN = 5.4
 _TALLEST_IN = 6.4

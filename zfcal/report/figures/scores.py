@@ -15,8 +15,8 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture
 from zfcal.report.views import (
@@ -30,8 +30,6 @@ from zfcal.report.views import (
     CourseKey,
     TrialView,
 )
-
-Floats = NDArray[np.float64]
 
 COLOURS = MappingProxyType({MODEL: theme.MODEL, SOCIAL: theme.GROUP, ROBOT: theme.ROBOT})
 NAMES = MappingProxyType(
@@ -73,12 +71,12 @@ class Line:
         How many trials have a value for the window.
     """
 
-    end_s: NDArray[np.int64]
+    end_s: Ints
     value: Floats
     low: Floats
     high: Floats
     ceiling: Floats
-    n_trials: NDArray[np.int64]
+    n_trials: Ints
 
 
 def scores_picture(
@@ -162,7 +160,7 @@ def pool(courses: Sequence[Course]) -> Line:
     )
 
 
-def _spread(courses: Sequence[Course], end_s: NDArray[np.int64], part: str) -> Floats:
+def _spread(courses: Sequence[Course], end_s: Ints, part: str) -> Floats:
     """Return one column of all courses on common windows, shape (trial, window)."""
     table = np.full((len(courses), len(end_s)), np.nan)
     for row, course in zip(table, courses, strict=True):
@@ -170,7 +168,7 @@ def _spread(courses: Sequence[Course], end_s: NDArray[np.int64], part: str) -> F
     return table
 
 
-def _mean(table: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _mean(table: Floats) -> tuple[Floats, Ints]:
     known = ~np.isnan(table)
     n = known.sum(axis=0)
     total = np.where(known, table, 0.0).sum(axis=0)
@@ -222,7 +220,7 @@ def _draw_line(axes: Axes, line: Line, colour: str, *, own_band: bool) -> None:
     axes.plot(minute, line.value, color=colour, marker=marker)
 
 
-def _draw_published(axes: Axes, ends_s: NDArray[np.int64]) -> None:
+def _draw_published(axes: Axes, ends_s: Ints) -> None:
     last_s = max(int(ends_s.max(initial=0)), PUBLISHED_S[-1][0])
     seconds, values = zip(*PUBLISHED_S, strict=True)
     minutes = [second / _S_PER_MIN for second in seconds]

@@ -11,17 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.features.statistic import Statistic
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
-
-Floats = NDArray[np.float64]
 
 FISH_CASE = "fish"
 MODEL_CASE = "model"
@@ -52,7 +50,7 @@ class _Histogram:
         What is counted; says how two cases are compared.
     """
 
-    counts: Mapping[str, NDArray[np.int64]]
+    counts: Mapping[str, Ints]
     edges: Floats
     axis: str
     statistic: Statistic
@@ -102,9 +100,7 @@ def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena)
         yield from _histograms(statistic, counts, arena)
 
 
-def _histograms(
-    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], arena: Arena
-) -> Iterator[Panel]:
+def _histograms(statistic: Statistic, counts: Mapping[str, Ints], arena: Arena) -> Iterator[Panel]:
     colours = theme.zone_colours(arena.zone_names)
     edges = statistic.edges_in(arena)
     unit = f" ({statistic.unit})" if statistic.unit else ""
@@ -163,7 +159,7 @@ def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
     )
 
 
-def histogram_mean(counts: NDArray[np.int64], edges: Floats) -> float:
+def histogram_mean(counts: Ints, edges: Floats) -> float:
     """Return the mean that a histogram tells, from the centres of its bins.
 
     Parameters
@@ -221,7 +217,7 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
     _remark(axes, shown.counts, shown.statistic)
 
 
-def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]], statistic: Statistic) -> None:
+def _remark(axes: Axes, counts: Mapping[str, Ints], statistic: Statistic) -> None:
     """Write how alike fish and model are, or who was never seen here."""
     empty = [case for case, values in counts.items() if not values.sum()]
     text = ""
@@ -235,9 +231,7 @@ def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]], statistic: Stat
     axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
 
 
-def _occupation(
-    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], zones: Sequence[str]
-) -> Panel:
+def _occupation(statistic: Statistic, counts: Mapping[str, Ints], zones: Sequence[str]) -> Panel:
     shares = {case: frequencies(values) for case, values in counts.items()}
     said = "; ".join(
         f"{case} " + ", ".join(f"{zone} {s:.0%}" for zone, s in zip(zones, share, strict=True))
@@ -256,7 +250,7 @@ def _draw_occupation(
     axes: Axes,
     *,
     statistic: Statistic,
-    counts: Mapping[str, NDArray[np.int64]],
+    counts: Mapping[str, Ints],
     zones: Sequence[str],
 ) -> None:
     at = np.arange(len(zones))
@@ -285,9 +279,7 @@ def _draw_occupation(
     _remark(axes, counts, statistic)
 
 
-def _transitions(
-    statistic: Statistic, case: str, counts: NDArray[np.int64], *, zones: Sequence[str]
-) -> Panel:
+def _transitions(statistic: Statistic, case: str, counts: Ints, *, zones: Sequence[str]) -> Panel:
     share = frequencies(counts)
     stays = ", ".join(
         f"{zone} {share[z, z]:.0%}" for z, zone in enumerate(zones) if not np.isnan(share[z, z])

@@ -25,6 +25,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
+from zfcal.arrays import Ints
+
 INK = "#1b1f24"
 MUTED = "#59636e"
 GRID = "#dde2e8"
@@ -168,9 +170,7 @@ def wrapped(name: str) -> str:
     return "\n".join(textwrap.wrap(name.replace("_", " "), 11, break_long_words=False)) or name
 
 
-def name_ticks(
-    axes: Axes, at: NDArray[np.int64] | NDArray[np.floating], names: Sequence[str]
-) -> None:
+def name_ticks(axes: Axes, at: Ints | NDArray[np.floating], names: Sequence[str]) -> None:
     """Put names below an x axis, slanted where they would run into each other."""
     labels = [wrapped(name) for name in names]
     longest = max(len(line) for label in labels for line in label.split("\n"))
