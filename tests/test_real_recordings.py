@@ -11,13 +11,13 @@ import pytest
 import shapely
 
 from zfcal.artifacts.arenas import arena_of, load_arena
+from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.tables import read_table, read_tracks
 from zfcal.errors import InputError
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.events import LeftOut, Note, say_nothing
 from zfcal.stages.import_ import Source, import_tracks
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.segments import segment_path
 from zfcal.tracks import FISH, ROBOT
 
 PX_PER_M = 1024 / 1.11

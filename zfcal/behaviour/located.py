@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Bools, Floats, Indices, Ints
-from zfcal.behaviour.sampling import sample_range
 from zfcal.errors import InputError
+from zfcal.sampling import sample_range
 from zfcal.tracks import Samples
 
 

@@ -17,6 +17,7 @@ from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
@@ -41,7 +42,7 @@ from zfcal.stages.calibrate.rounds import (
 )
 from zfcal.stages.calibrate.searching import CalibrateOptions, baseline_scores, run_search
 from zfcal.stages.events import Event, Result, Tell
-from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
+from zfcal.stages.segments import STEP_S, Segments, guess_options
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
