@@ -15,7 +15,6 @@ from zfcal.cameras.camera import Projection
 from zfcal.errors import InputError
 
 ABOVE, BELOW = "above", "below"
-SIDES = (ABOVE, BELOW)
 UNKNOWN = "unknown"
 
 NAMES = ("lower left", "lower right", "upper right", "upper left")

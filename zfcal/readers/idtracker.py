@@ -50,7 +50,6 @@ GUESSED = 0.1
 TIDY = ("frame", "time", "individual", "x", "y", "probability")
 
 _WIDE = re.compile(r"([xyXY])_?(\d+)")
-_OLD = re.compile(r"(X|Y|ProbId)(\d+)")
 
 
 def read_idtracker(path: Path, options: ImportOptions) -> Imported:

@@ -313,21 +313,6 @@ def background_of(image: Image, *, sd: float = _LEAST_SD) -> Background:
     return _within(level, np.full(level.shape, max(sd, _LEAST_SD), np.float32))
 
 
-def background_of_many(images: list[Grey]) -> Background:
-    """Return the median of frames as the background; its noise is their median deviation.
-
-    Parameters
-    ----------
-    images : list of ndarray of uint8, each of shape (height, width)
-        Fish in them should not rest.
-    """
-    stack = np.stack(images)
-    level = np.median(stack, axis=0).astype(np.uint8)
-    deviation = np.median(cv2.absdiff(stack, np.broadcast_to(level, stack.shape)), axis=0)
-    sd = np.maximum(1.4826 * deviation, _LEAST_SD).astype(np.float32)
-    return _within(level, sd)
-
-
 def _within(level: Grey, sd: Floats32) -> Background:
     width = _SIGMAS * sd
     return Background(
