@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -83,8 +83,6 @@ class Alignment:
         Turn of the positions below, counter-clockwise about the origin.
     shift_m
         What is then added to them.
-    offset_sd_s, angle_sd_rad, shift_sd_m
-        Standard deviations by the scatter, as if frames were independent.
     share
         Share of the frames, of those in which below saw the robot, that have a blob where
         it should be.
@@ -102,9 +100,6 @@ class Alignment:
     offset_s: float
     angle_rad: float
     shift_m: tuple[float, float]
-    offset_sd_s: float
-    angle_sd_rad: float
-    shift_sd_m: float
     share: float
     time_s: Floats
     blobs_m: Floats
@@ -236,7 +231,7 @@ def _refined(frames: _Frames, below: Spots, start: Floats, gate_m: float) -> Flo
     rows, _, near = _partners(frames, below, start, gate_m)
     if near.sum() < _LEAST_FRAMES:
         return start
-    return _fit(below, frames.time_s[near], frames.blobs_m[rows[near]], start).x
+    return _fit(below, frames.time_s[near], frames.blobs_m[rows[near]], start)
 
 
 def _partners(
@@ -247,13 +242,13 @@ def _partners(
     return rows, places, away <= gate_m
 
 
-def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Any:
+def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Floats:
     def residuals(values: Floats) -> Floats:
         off = _moved(_at(below, time_s - values[0]), values[1], values[2:]) - blobs_m
         return np.where(np.isfinite(off), off, 0.0).ravel()
 
     scale = np.array([0.1, 0.1, 0.05, 0.05])
-    return least_squares(
+    found = least_squares(
         residuals,
         start,
         loss="soft_l1",
@@ -264,6 +259,7 @@ def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Any:
             [LONGEST_OFFSET_S + 0.5, np.inf, np.inf, np.inf],
         ),
     )
+    return found.x
 
 
 def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
@@ -272,18 +268,13 @@ def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
     if near.sum() < _LEAST_FRAMES:
         near[:] = False
     time_s, blobs_m = frames.time_s[near], frames.blobs_m[rows[near]]
-    sd = np.full(4, np.nan)
     held_out_m = np.full(blobs_m.shape, np.nan)
     if len(time_s):
-        sd = _spread(_fit(below, time_s, blobs_m, values), len(time_s))
         held_out_m = _held_out(below, time_s, blobs_m, values)
     return Alignment(
         offset_s=float(values[0]),
         angle_rad=float((values[1] + math.pi) % (2 * math.pi) - math.pi),
         shift_m=(float(values[2]), float(values[3])),
-        offset_sd_s=float(sd[0]),
-        angle_sd_rad=float(sd[1]),
-        shift_sd_m=float(np.hypot(sd[2], sd[3])),
         share=float(near.sum() / max(n_seen, 1)),
         time_s=time_s,
         blobs_m=blobs_m,
@@ -292,18 +283,12 @@ def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
     )
 
 
-def _spread(found: Any, n_frames: int) -> Floats:
-    n_spare = max(2 * n_frames - 4, 1)
-    variance = 2 * found.cost / n_spare
-    return np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance)
-
-
 def _held_out(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Floats:
     errors = np.full(blobs_m.shape, np.nan)
     even = time_blocks(time_s)
     for half in (even, ~even):
         if half.sum() >= _LEAST_FRAMES and (~half).any():
-            values = _fit(below, time_s[half], blobs_m[half], start).x
+            values = _fit(below, time_s[half], blobs_m[half], start)
             moved = _moved(_at(below, time_s[~half] - values[0]), values[1], values[2:])
             errors[~half] = moved - blobs_m[~half]
     return errors
