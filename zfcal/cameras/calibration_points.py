@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -159,14 +159,9 @@ def calibrate_points(
     else:
         fitted = _fit(pairs, chosen.free, robust=robust)
         found = _calibration_of(pairs, chosen.free, fitted, robust=robust)
-    notes = (*found.notes, *_notes(pairs, chosen, tried, fitted))
-    return Calibration(
-        camera=found.camera,
-        pairs=pairs,
-        method=found.method,
-        n_parameters=found.n_parameters,
-        left_out_m=found.left_out_m,
-        notes=notes,
+    return replace(
+        found,
+        notes=(*found.notes, *_notes(pairs, chosen, tried, fitted)),
         details={**found.details, "tried": {item.name: _rms_mm(item) for item in tried}},
     )
 
@@ -293,15 +288,7 @@ def _homography_alone(pairs: Pairs) -> Calibration:
         f"{len(pairs)} points support no lens, only a homography: straight walls stay bent. "
         "With 6 points a lens can be tried, 12 to 20 judge it."
     )
-    return Calibration(
-        camera=found.camera,
-        pairs=pairs,
-        method=found.method,
-        n_parameters=found.n_parameters,
-        left_out_m=found.left_out_m,
-        notes=(*found.notes, note),
-        details=found.details,
-    )
+    return replace(found, notes=(*found.notes, note))
 
 
 def _notes(
