@@ -1,6 +1,6 @@
 """Whether every artifact of a trial is whole, valid and what its lineage says.
 
-The computer that it lies on is looked at in `computer`.
+The computer that it lies on is looked at in `machine`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from zfcal.arena import Arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
-from zfcal.artifacts.computer import check_computer
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import package_version, read_lineage
+from zfcal.artifacts.machine import check_computer
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.reading.contents import hash_of, open_regular, unreadable
