@@ -17,9 +17,9 @@ from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.document import SCHEMA, integration_document
 from zfcal.report.figures.panels import Picture, write_picture
 from zfcal.report.gather import Damage, gather, input_files
+from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
