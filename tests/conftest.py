@@ -77,6 +77,18 @@ def repository():
     return REPOSITORY
 
 
+@pytest.fixture(scope="module")
+def scripts(repository):
+    """Return what imports a script of benchmarks/ by its name, as it imports its neighbours."""
+    folder, path, known = str(repository / "benchmarks"), list(sys.path), set(sys.modules)
+    sys.path.insert(0, folder)
+    yield importlib.import_module
+    sys.path[:] = path
+    for name in set(sys.modules) - known:
+        if str(getattr(sys.modules[name], "__file__", None)).startswith(folder):
+            del sys.modules[name]
+
+
 @pytest.fixture(scope="session")
 def examine():
     """Return what lists the problems of an MCAP file, as `mcap doctor` would."""

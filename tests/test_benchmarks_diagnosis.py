@@ -1,7 +1,6 @@
 """What the benchmark of the diagnosis plans, keeps and counts."""
 
 import dataclasses
-import importlib
 import json
 import math
 import sys
@@ -9,30 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-SCRIPTS = (
-    "bench_diagnosis",
-    "diagnosis_document",
-    "diagnosis_figures",
-    "diagnosis_film",
-    "diagnosis_ledger",
-    "diagnosis_plan",
-    "diagnosis_summary",
-    "diagnosis_trial",
-    "measuring",
-    "regressions",
-)
 LISTED, UNLISTED = ("alignment", "crowding", "robot-avoidance"), ("sound", "one-eye")
 
 
 @pytest.fixture(scope="module")
-def bench(repository):
-    """Return the script, which imports its neighbours by name."""
-    before = list(sys.path)
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module("bench_diagnosis")
-    sys.path[:] = before
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
+def bench(scripts):
+    """Return the script."""
+    return scripts("bench_diagnosis")
 
 
 @pytest.fixture

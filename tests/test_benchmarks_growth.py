@@ -1,21 +1,14 @@
 """What the growth benchmark makes of its numbers."""
 
-import importlib
 import sys
 
 import pytest
 
-SCRIPTS = ("bench_growth", "growth_document", "measuring", "regressions")
-
 
 @pytest.fixture(scope="module")
-def growth(repository):
-    """Return the script, which imports its neighbours by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module("bench_growth")
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
+def growth(scripts):
+    """Return the script."""
+    return scripts("bench_growth")
 
 
 def test_the_exponent_of_a_square_is_two(growth):

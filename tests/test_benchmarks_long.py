@@ -1,22 +1,14 @@
 """What the benchmark of long trials makes of its numbers."""
 
 import argparse
-import importlib
-import sys
 
 import pytest
 
-SCRIPTS = ("bench_long", "measuring", "regressions")
-
 
 @pytest.fixture(scope="module")
-def long(repository):
-    """Return the script, which imports its neighbours by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module("bench_long")
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
+def long(scripts):
+    """Return the script."""
+    return scripts("bench_long")
 
 
 def row(command, processor_s, peak_mb):

@@ -1,23 +1,9 @@
 """What the comparison of optimisers makes of its numbers; the packages compared are not needed."""
 
-import importlib
-import sys
-
 import numpy as np
 import pytest
 
-SCRIPTS = ("measuring", "optimisers_document", "recorder", "synthetic")
 OURS, OTHER, SLOW = "ours", "another", "slow"
-
-
-@pytest.fixture(scope="module")
-def scripts(repository):
-    """Return what imports a script by its name, as scripts import their neighbours."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Where a benchmark's results go, and what it says of those that became worse."""
 
-import importlib
 import json
 import math
 import sys
@@ -9,20 +8,6 @@ import pytest
 
 COMMITTED = ("calibration", "closed_loop", "cluster", "drive", "growth", "long", "main_job",
              "optimisers", "roofline", "rounds", "tracking", "tracking_live")  # fmt: skip
-
-SCRIPTS = (*(f"bench_{name}" for name in COMMITTED), "growth_document", "measuring", "naive",
-           "optimisers", "optimisers_document", "regressions", "rounds_document",
-           "tracking_measures")  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def scripts(repository):
-    """Return what imports a script by its name, as scripts import their neighbours."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
 
 
 @pytest.fixture

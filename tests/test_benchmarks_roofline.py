@@ -1,23 +1,15 @@
 """What the roofline makes of its numbers, and that the plain program is the model."""
 
-import importlib
 import math
-import sys
 
 import numpy as np
 import pytest
 
-SCRIPTS = ("bench_roofline", "naive", "measuring", "regressions")
-
 
 @pytest.fixture(scope="module")
-def roofline(repository):
-    """Return the script, which imports its neighbours by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module("bench_roofline")
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
+def roofline(scripts):
+    """Return the script."""
+    return scripts("bench_roofline")
 
 
 FOUND = {

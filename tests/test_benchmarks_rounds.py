@@ -1,24 +1,15 @@
 """What the rounds benchmark makes of its numbers."""
 
-import importlib
-import sys
-
 import numpy as np
 import pytest
 
 from zfcal.parameters import natural, to_genes
 
-SCRIPTS = ("bench_rounds", "rounds_document", "measuring", "regressions")
-
 
 @pytest.fixture(scope="module")
-def rounds(repository):
-    """Return the script, which imports its neighbours by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module("bench_rounds")
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
+def rounds(scripts):
+    """Return the script."""
+    return scripts("bench_rounds")
 
 
 @pytest.fixture

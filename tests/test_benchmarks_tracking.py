@@ -1,9 +1,7 @@
 """What the benchmarks of tracking make of tracks: scores, measures, documents."""
 
-import importlib
 import json
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,30 +11,18 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 FPS = 15.0
-SCRIPTS = ("bench_tracking_live", "measuring", "regressions", "tracking_measures",
-           "tracking_scores")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def script(repository):
-    """Return a function that imports a script, which imports its neighbours by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
-
-
-@pytest.fixture(scope="module")
-def scores(script):
+def scores(scripts):
     """Return what makes scores of tracks."""
-    return script("tracking_scores")
+    return scripts("tracking_scores")
 
 
 @pytest.fixture(scope="module")
-def measures(script):
+def measures(scripts):
     """Return what compares tracks with the truth, within 20 mm at 15 Hz."""
-    of = script("tracking_measures").measures
+    of = scripts("tracking_measures").measures
     return lambda truth, told: of(truth, told, gate=20.0, fps=FPS)
 
 
@@ -211,16 +197,16 @@ def test_whom_the_truth_does_not_know_is_nobody_but_not_where_it_is_whole(measur
     assert found["recall"] == 1.0
 
 
-def test_a_film_goes_to_its_end_and_back(script):
+def test_a_film_goes_to_its_end_and_back(scripts):
     """Without showing its last image, or its first, twice in a row."""
-    live = script("bench_tracking_live")
+    live = scripts("bench_tracking_live")
 
     assert [live.to_and_fro(k, 4) for k in range(8)] == [0, 1, 2, 3, 2, 1, 0, 1]
 
 
-def test_the_document_tells_latency_and_memory(script):
+def test_the_document_tells_latency_and_memory(scripts):
     """With an hour of video and without."""
-    live = script("bench_tracking_live")
+    live = scripts("bench_tracking_live")
     found = {
         "machine": "a machine",
         "load_before": 0.5,

@@ -1,8 +1,6 @@
 """Real recordings: converted, imported and analysed; their tables are those of their numbers."""
 
-import importlib
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,17 +19,6 @@ from zfcal.stages.init import NewTrial, create_trial
 from zfcal.tracks import FISH, ROBOT
 
 PX_PER_M = 1024 / 1.11
-SCRIPTS = ("ring", "recordings", "real_document")
-
-
-@pytest.fixture(scope="module")
-def scripts(repository):
-    """Return what imports the modules beside the scripts, which import each other by name."""
-    sys.path.insert(0, str(repository / "benchmarks"))
-    yield importlib.import_module
-    sys.path.remove(str(repository / "benchmarks"))
-    for name in SCRIPTS:
-        sys.modules.pop(name, None)
 
 
 @pytest.fixture(scope="module")
