@@ -17,8 +17,8 @@ from zfcal.arrays import Bools, Floats
 from zfcal.errors import InputError
 
 VOID = 0
-WALL_ZONE_M = 0.07
-WALL_TOLERANCE_M = 0.01
+_WALL_ZONE_M = 0.07
+_WALL_TOLERANCE_M = 0.01
 N_BINS = 10
 
 _AREA_TOLERANCE = 1e-6
@@ -97,8 +97,8 @@ class Arena:
     name: str
     outline: shapely.Polygon
     zones: tuple[Zone, ...]
-    wall_zone_m: float = WALL_ZONE_M
-    wall_tolerance_m: float = WALL_TOLERANCE_M
+    wall_zone_m: float = _WALL_ZONE_M
+    wall_tolerance_m: float = _WALL_TOLERANCE_M
     bins: Bins = field(default_factory=Bins)
 
     @property
@@ -238,8 +238,8 @@ def make_arena(  # noqa: PLR0913 - one keyword for each thing that an arena file
     name: str,
     outline: shapely.Polygon,
     zones: tuple[Zone, ...] = (),
-    wall_zone_m: float = WALL_ZONE_M,
-    wall_tolerance_m: float = WALL_TOLERANCE_M,
+    wall_zone_m: float = _WALL_ZONE_M,
+    wall_tolerance_m: float = _WALL_TOLERANCE_M,
     bins: Bins | None = None,
 ) -> Arena:
     """Check an outline and its zones and return the arena.

@@ -22,7 +22,7 @@ KAPPA_0_MAX = 30.0
 KAPPA_F_MAX = 30.0
 ALPHA_MAX = 50.0
 
-KAPPA_LIMIT = 1000.0
+_KAPPA_LIMIT = 1000.0
 """A larger concentration is no behaviour (it spreads by less than 2 degrees) and no law
 that a density on 360 angles can hold."""
 
@@ -68,9 +68,9 @@ class ZoneParameters:
         for key, value in numbers.items():
             if not 0 <= value < math.inf:
                 raise InputError(f"{where}: {key} must be finite and not negative, got {value!r}.")
-            if key.startswith("kappa") and value > KAPPA_LIMIT:
+            if key.startswith("kappa") and value > _KAPPA_LIMIT:
                 raise InputError(
-                    f"{where}: {key} must be at most {KAPPA_LIMIT:g}, got {value!r}.",
+                    f"{where}: {key} must be at most {_KAPPA_LIMIT:g}, got {value!r}.",
                     hint="It is a von Mises concentration; real fish have 1 to 30.",
                 )
         _check_frequencies(where, self.speed_frequency)

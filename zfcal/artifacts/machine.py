@@ -12,15 +12,15 @@ from pathlib import Path
 
 from zfcal.artifacts.findings import ERROR, OK, WARNING, Finding
 
-PACKAGES = ("zfcal", "numpy", "numba", "pyarrow", "pandas", "scipy", "shapely", "mcap")
+_PACKAGES = ("zfcal", "numpy", "numba", "pyarrow", "pandas", "scipy", "shapely", "mcap")
 
-NETWORK_FILE_SYSTEMS = ("nfs", "cifs", "smb", "fuse", "9p", "afs", "ceph", "glusterfs", "lustre")
+_NETWORK_FILE_SYSTEMS = ("nfs", "cifs", "smb", "fuse", "9p", "afs", "ceph", "glusterfs", "lustre")
 """Starts of the names of file systems on which changes made elsewhere are not announced."""
 
-LOW_DISK_BYTES = 2**30
+_LOW_DISK_BYTES = 2**30
 """About what half an hour of camera images takes."""
 
-NO_DISK_BYTES = 50 * 2**20
+_NO_DISK_BYTES = 50 * 2**20
 """Too little to finish a round."""
 
 _THIS_WAS_WRITTEN_S = 1.7e9
@@ -32,7 +32,7 @@ _MOUNTS = Path("/proc/self/mountinfo")
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that bear on the numbers."""
     found = {"python": platform.python_version()}
-    for name in PACKAGES:
+    for name in _PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -81,7 +81,7 @@ def file_system(path: Path, mounts: Path = _MOUNTS) -> str:
 
 def is_network(kind: str) -> bool:
     """Return whether a file system is one on which changes made elsewhere are not announced."""
-    return kind.startswith(NETWORK_FILE_SYSTEMS)
+    return kind.startswith(_NETWORK_FILE_SYSTEMS)
 
 
 def check_computer(root: Path, now_s: float) -> Iterator[Finding]:
@@ -108,8 +108,8 @@ def check_computer(root: Path, now_s: float) -> Iterator[Finding]:
 def _disk(free_bytes: int) -> Iterator[Finding]:
     says = f"{free_bytes / 2**30:.1f} GiB free"
     level = OK
-    if free_bytes < LOW_DISK_BYTES:
-        level = ERROR if free_bytes < NO_DISK_BYTES else WARNING
+    if free_bytes < _LOW_DISK_BYTES:
+        level = ERROR if free_bytes < _NO_DISK_BYTES else WARNING
     hint = "" if level == OK else "Make room before the next recording."
     yield Finding(level=level, where="disk", says=says, hint=hint)
 

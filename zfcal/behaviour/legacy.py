@@ -35,7 +35,7 @@ from zfcal.errors import InputError
 EXTENT_M = 0.89
 """The extent that the scripts take for the arena of two rooms, in metres."""
 
-DISTANCE_SHARE = 0.25
+_DISTANCE_SHARE = 0.25
 """D is binned from 0 to this share of the extent."""
 
 
@@ -93,7 +93,7 @@ def measure_legacy(
     located = locate(samples, arena)
     counts = measure(located, arena)
     zone, mean_m = _mean_distances(located)
-    edges_m = bin_edges((0.0, DISTANCE_SHARE * extent_m))
+    edges_m = bin_edges((0.0, _DISTANCE_SHARE * extent_m))
     kept = mean_m <= edges_m[-1]
     cell = zone[kept] * N_BINS + np.searchsorted(edges_m[1:-1], mean_m[kept], side="right")
     n_zones = len(arena.zones)

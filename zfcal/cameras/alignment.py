@@ -17,17 +17,17 @@ from scipy.optimize import least_squares
 from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 
-LONGEST_OFFSET_S = 2.0
-LEAST_EXTENT_M = 0.1
-LEAST_TIME_S = 5.0
-LEAST_SHARE = 0.5
+_LONGEST_OFFSET_S = 2.0
+_LEAST_EXTENT_M = 0.1
+_LEAST_TIME_S = 5.0
+_LEAST_SHARE = 0.5
 """Of the time below, in which a blob overhead must be where the robot should be."""
 
-LONGEST_GAP_S = 0.25
+_LONGEST_GAP_S = 0.25
 """Positions farther apart in time are not joined by a line."""
 
-NEAR_M = 0.02
-_GATES_M = (0.06, 0.04, 0.03, NEAR_M)
+_NEAR_M = 0.02
+_GATES_M = (0.06, 0.04, 0.03, _NEAR_M)
 _SCALE_M = 0.003
 _BLOCK_S = 5.0
 _CELL_M = 0.015
@@ -140,7 +140,7 @@ def align_spots(overhead: Spots, below: Spots) -> Alignment:
     overhead, below = overhead.known(), below.known()
     _check(overhead, below)
     found = _found(overhead, below)
-    if not found.share >= LEAST_SHARE:
+    if not found.share >= _LEAST_SHARE:
         _explain(overhead, below, found.share)
     return found
 
@@ -255,15 +255,15 @@ def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Floats
         f_scale=_SCALE_M,
         x_scale=scale,
         bounds=(
-            [-LONGEST_OFFSET_S - 0.5, -np.inf, -np.inf, -np.inf],
-            [LONGEST_OFFSET_S + 0.5, np.inf, np.inf, np.inf],
+            [-_LONGEST_OFFSET_S - 0.5, -np.inf, -np.inf, -np.inf],
+            [_LONGEST_OFFSET_S + 0.5, np.inf, np.inf, np.inf],
         ),
     )
     return found.x
 
 
 def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
-    rows, places, near = _partners(frames, below, values, NEAR_M)
+    rows, places, near = _partners(frames, below, values, _NEAR_M)
     n_seen = int(np.isfinite(places[:, 0]).sum())
     if near.sum() < _LEAST_FRAMES:
         near[:] = False
@@ -300,7 +300,7 @@ def _at(below: Spots, time_s: Floats) -> Floats:
     after = np.clip(np.searchsorted(below.time_s, time_s), 1, len(below.time_s) - 1)
     gap = below.time_s[after] - below.time_s[after - 1]
     inside = (time_s >= below.time_s[0]) & (time_s <= below.time_s[-1])
-    return np.where((inside & (gap <= LONGEST_GAP_S))[:, None], places, np.nan)
+    return np.where((inside & (gap <= _LONGEST_GAP_S))[:, None], places, np.nan)
 
 
 def _turned(xy_m: Floats, angle_rad: float) -> Floats:
@@ -323,16 +323,16 @@ def _check(overhead: Spots, below: Spots) -> None:
     together_s = min(overhead.time_s[-1], below.time_s[-1]) - max(
         overhead.time_s[0], below.time_s[0]
     )
-    if not together_s >= LEAST_TIME_S:
+    if not together_s >= _LEAST_TIME_S:
         raise InputError(
             f"Both cameras saw the tank together for {max(together_s, 0.0):.1f} s, "
-            f"{LEAST_TIME_S:g} s are needed.",
+            f"{_LEAST_TIME_S:g} s are needed.",
             hint="Do both recordings show the same minutes, and count from the same start?",
         )
     extent_m = float(np.ptp(below.xy_m, axis=0).max())
-    if not extent_m >= LEAST_EXTENT_M:
+    if not extent_m >= _LEAST_EXTENT_M:
         raise InputError(
-            f"The robot moved over {extent_m * _MM:.0f} mm, {LEAST_EXTENT_M * _MM:.0f} mm are "
+            f"The robot moved over {extent_m * _MM:.0f} mm, {_LEAST_EXTENT_M * _MM:.0f} mm are "
             "needed to tell a turn.",
             hint="Record a minute in which the robot drives all over the tank.",
         )
@@ -349,6 +349,6 @@ def _explain(overhead: Spots, below: Spots, share: float) -> NoReturn:
         )
     raise InputError(
         "The robot that the camera below sees is not among the blobs overhead: at best "
-        f"{share:.0%} of its positions have one within {NEAR_M * _MM:.0f} mm.",
+        f"{share:.0%} of its positions have one within {_NEAR_M * _MM:.0f} mm.",
         hint="Do both recordings show the same minutes? Are both cameras calibrated?",
     )

@@ -21,7 +21,7 @@ from zfcal.units import M_PER_CM, M_PER_MM
 EXTENT_LIMIT_M = 20.0
 """Positions that span more than this are no tank: the scale is wrong."""
 
-MIRRORED = (
+_MIRRORED = (
     "In this format y counts downwards, so the tracks are mirrored: "
     "--flip-y with --origin turns them up."
 )
@@ -179,7 +179,7 @@ def _place(rows: Rows, scale_m: float, options: ImportOptions) -> tuple[Floats, 
 
 def _axes(rows: Rows, options: ImportOptions) -> tuple[str, ...]:
     if rows.y_down and not options.flip_y:
-        return (MIRRORED,)
+        return (_MIRRORED,)
     return ()
 
 

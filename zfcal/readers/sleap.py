@@ -24,7 +24,7 @@ from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
 
-MATLAB = ("track", "xy", "node", "frame")
+_MATLAB = ("track", "xy", "node", "frame")
 
 _OURS = ("frame", "track", "node", "xy")
 
@@ -70,11 +70,11 @@ def read_sleap(path: Path, options: ImportOptions) -> Imported:
 def _order(path: Path, file: Any) -> tuple[str, ...]:
     """Return what the axes of ``tracks`` stand for."""
     if "tracks" not in file or "dims" not in file["tracks"].attrs:
-        return MATLAB
+        return _MATLAB
     words = tuple(json.loads(file["tracks"].attrs["dims"]))
-    if sorted(words) != sorted(MATLAB):
+    if sorted(words) != sorted(_MATLAB):
         raise InputError(
-            f"{path}: expected dims of {', '.join(MATLAB)}, got {', '.join(map(str, words))}."
+            f"{path}: expected dims of {', '.join(_MATLAB)}, got {', '.join(map(str, words))}."
         )
     return words
 

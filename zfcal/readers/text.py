@@ -25,7 +25,7 @@ from zfcal.artifacts.arrays import array_of, numbers_of
 from zfcal.artifacts.reading.limits import TABLE_BYTES, largest, too_large
 from zfcal.errors import InputError
 
-MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
+_MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
 """Cells that stand for a missing value."""
 
 _NAMES = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
@@ -174,7 +174,7 @@ def read_table(path: Path, layout: Layout) -> TextTable:
             convert_options=pa_csv.ConvertOptions(
                 column_types=types,
                 include_columns=list(types),
-                null_values=list(MISSING),
+                null_values=list(_MISSING),
                 strings_can_be_null=True,
             ),
         )
@@ -264,7 +264,7 @@ def _why(path: Path, layout: Layout, names: tuple[str, ...], reason: str) -> Inp
                 )
             for name in layout.numeric:
                 cell = cells[names.index(name)].strip()
-                if cell not in MISSING and not _is_number(cell):
+                if cell not in _MISSING and not _is_number(cell):
                     return InputError(
                         f"{path}, line {line}, column {name}: expected a number, got {cell[:40]!r}."
                     )

@@ -33,7 +33,7 @@ from zfcal.trial import Trial
 
 Damage = Callable[[DamagedError], None]
 
-POOLED_KEY = "robot_pooled_from_s"
+_POOLED_KEY = "robot_pooled_from_s"
 """Extra metadata of the scores: from when on the robot is judged."""
 
 _KEY_COLUMNS = ("compared", "feature", "zone")
@@ -256,7 +256,7 @@ def _pooled_from(reader: _Reader) -> int:
     for _, path in reversed(reader.files("scores", ".parquet")):
         extra = reader.attempt(path, read_extra)
         if extra is not None:
-            value = extra.get(POOLED_KEY)
+            value = extra.get(_POOLED_KEY)
             return value if isinstance(value, int) else 0
     return 0
 

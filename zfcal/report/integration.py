@@ -17,12 +17,12 @@ from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integrat
 
 SCHEMA = "zfcal.integration/1"
 
-LATE_S = 300
+_LATE_S = 300
 """From here on the robot is judged (Cazenille et al.: scores have settled by then)."""
 
 NOT_COMPARED = "The robot has not been compared with the fish yet."
 
-HALVES_MIN_S = 600.0
+_HALVES_MIN_S = 600.0
 """Five minutes a half: with less, chance alone makes the halves differ as two windows do."""
 
 
@@ -57,9 +57,9 @@ def measure_integration(
         missing.append("There is no robot in this trial.")
     elif not robot:
         missing.append(NOT_COMPARED)
-    elif start_s < LATE_S:
+    elif start_s < _LATE_S:
         missing.append(
-            f"The trial is too young to judge the robot from {LATE_S} s on: the times before "
+            f"The trial is too young to judge the robot from {_LATE_S} s on: the times before "
             "are in, when the fish were still getting used to it."
         )
     if robot and math.isnan(robot["S"].ceiling):
@@ -96,10 +96,10 @@ def _halves(seen: Seen | None) -> tuple[dict[str, float], str]:
     if seen is None or not seen.n_points:
         return {}, "There are no tracks."
     length_s = (seen.last_k - seen.first_k + 1) * seen.dt_s
-    if length_s < HALVES_MIN_S - seen.dt_s:
+    if length_s < _HALVES_MIN_S - seen.dt_s:
         return {}, (
             f"The recording is {length_s:.0f} s long; to compare its halves with each other it "
-            f"needs {HALVES_MIN_S:.0f} s."
+            f"needs {_HALVES_MIN_S:.0f} s."
         )
     scores = seen.halves.scores()
     if scores is None:

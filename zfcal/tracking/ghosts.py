@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Bools, Floats32, Grey
 
-SURROUNDINGS_PX = 3
+_SURROUNDINGS_PX = 3
 _SQUARE = np.ones((3, 3), np.uint8)
-_WIDE = np.ones((2 * SURROUNDINGS_PX - 1,) * 2, np.uint8)
-_ACROSS = (2 * SURROUNDINGS_PX + 1,) * 2
+_WIDE = np.ones((2 * _SURROUNDINGS_PX - 1,) * 2, np.uint8)
+_ACROSS = (2 * _SURROUNDINGS_PX + 1,) * 2
 
 
 class Piece(NamedTuple):
@@ -60,8 +60,8 @@ def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Bools)
     """
     for number in (np.flatnonzero(asked[1:]) + 1).tolist():
         x, y, width, height = boxes[number, :4].tolist()
-        top, left = max(y - SURROUNDINGS_PX, 0), max(x - SURROUNDINGS_PX, 0)
-        crop = np.s_[top : y + height + SURROUNDINGS_PX, left : x + width + SURROUNDINGS_PX]
+        top, left = max(y - _SURROUNDINGS_PX, 0), max(x - _SURROUNDINGS_PX, 0)
+        crop = np.s_[top : y + height + _SURROUNDINGS_PX, left : x + width + _SURROUNDINGS_PX]
         inside = labels[crop] == number
         near = cv2.dilate(inside.astype(np.uint8), _SQUARE) > 0
         wide = cv2.dilate(inside.astype(np.uint8), _WIDE) > 0

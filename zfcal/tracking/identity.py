@@ -25,10 +25,10 @@ from zfcal.tracking.seen import Exchange
 from zfcal.tracking.trail import Trail
 from zfcal.tracking.usual import Body
 
-WITHIN = (0.06, 0.035)
+_WITHIN = (0.06, 0.035)
 """Spread of one fish's log area and log darkness over time, at first; learnt with the film."""
 
-BETWEEN = (0.085, 0.055)
+_BETWEEN = (0.085, 0.055)
 """Spread from fish to fish of one age and tank, on the published film of eight zebrafish."""
 
 _WIDE = (0.5, 0.5)
@@ -93,7 +93,7 @@ class Identities:
         self._n = np.zeros(n_agents)
         self._mean = np.zeros((n_agents, 2))
         self._length = np.zeros(n_agents)
-        self._within = np.array(WITHIN) ** 2 * _FAITH
+        self._within = np.array(_WITHIN) ** 2 * _FAITH
         self._looks = _FAITH
         self._time_s = -math.inf
         self._crossed_s = {
@@ -183,7 +183,7 @@ class Identities:
         """Let what tracks look like speak, and learn what they look like."""
         seen = np.log(np.array([(t.shape.area_px, t.blob.darkness) for t in trails]))
         # Nobody knows beforehand whether one is a lure.
-        between = np.array(BETWEEN if (self._n > 0).all() else _WIDE) ** 2
+        between = np.array(_BETWEEN if (self._n > 0).all() else _WIDE) ** 2
         within = self._within / self._looks
         weigh(self._chance, rows, seen, self._n, self._mean, within, between, weight, _OUTLIER)
         balance(self._chance, _LEAST, _ROUNDS)

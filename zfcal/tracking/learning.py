@@ -20,7 +20,7 @@ from zfcal.arrays import Bools, Floats, Grey
 from zfcal.tracking.background import DARK, EITHER, LIGHT, Background
 from zfcal.tracking.ghosts import Piece, pieces_of
 
-USUAL_MIN_BLOB_PX = 12.0
+_USUAL_MIN_BLOB_PX = 12.0
 """Smallest blob where nothing was learnt."""
 
 _SHARE_OF_BODY = 0.15
@@ -105,11 +105,11 @@ class Learnt:
     def min_blob_px(self) -> float:
         """The smallest blob that may be an animal."""
         if not self.area_px > 0:
-            return USUAL_MIN_BLOB_PX
+            return _USUAL_MIN_BLOB_PX
         smallest = max(_SHARE_OF_BODY * self.area_px, _LEAST_PX)
-        if smallest > USUAL_MIN_BLOB_PX and self.least_px > 0:
+        if smallest > _USUAL_MIN_BLOB_PX and self.least_px > 0:
             # What is usually there is not dropped for being smaller than something large.
-            return min(smallest, max(_SHARE_OF_BODY * self.least_px, USUAL_MIN_BLOB_PX))
+            return min(smallest, max(_SHARE_OF_BODY * self.least_px, _USUAL_MIN_BLOB_PX))
         return smallest
 
 
@@ -269,5 +269,5 @@ def _least_area(found: Sequence[Sequence[Standing]], n: int, signs: set[int]) ->
     """Return the area of the smallest of n + 1 pieces that is a blob by the usual measure."""
     areas = [[each.area_px for each in frame if each.sign in signs] for frame in found]
     ranked = _ranked(areas, n + 1)
-    blobs = ranked[ranked > USUAL_MIN_BLOB_PX]
+    blobs = ranked[ranked > _USUAL_MIN_BLOB_PX]
     return float(blobs[-1]) if len(blobs) else float("nan")

@@ -32,7 +32,7 @@ _AHEAD_M = 0.002
 _BANNER_PX = 18
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
-SHEET_FRAMES = 12
+_SHEET_FRAMES = 12
 _SHEET_COLUMNS = 4
 _TILE_PX = 320
 _ROOM_PX = 40
@@ -245,7 +245,7 @@ class WorstFrames:
         How many.
     """
 
-    def __init__(self, number: int = SHEET_FRAMES) -> None:
+    def __init__(self, number: int = _SHEET_FRAMES) -> None:
         self._number = number
         self._kept: dict[int, tuple[float, float, Image]] = {}
 

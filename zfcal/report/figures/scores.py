@@ -31,8 +31,8 @@ from zfcal.report.views import (
     TrialView,
 )
 
-COLOURS = MappingProxyType({MODEL: theme.MODEL, SOCIAL: theme.GROUP, ROBOT: theme.ROBOT})
-NAMES = MappingProxyType(
+_COLOURS = MappingProxyType({MODEL: theme.MODEL, SOCIAL: theme.GROUP, ROBOT: theme.ROBOT})
+_NAMES = MappingProxyType(
     {
         MODEL: "calibrated model against the fish",
         SOCIAL: "fish with robot against the fish alone",
@@ -193,7 +193,7 @@ def _bottom(lines: Sequence[Line]) -> float:
 
 def _draw(axes: Axes, *, lines: dict[str, Line], feature: str, bottom: float) -> None:
     for compared, line in lines.items():
-        _draw_line(axes, line, COLOURS[compared], own_band=len(lines) > 1)
+        _draw_line(axes, line, _COLOURS[compared], own_band=len(lines) > 1)
     ends_s = np.concatenate([line.end_s[~np.isnan(line.value)] for line in lines.values()])
     if not ends_s.size:
         axes.text(0.5, 0.5, "no count on either side", ha="center", transform=axes.transAxes)
@@ -234,21 +234,21 @@ def _key(lines: dict[CourseKey, Line], shown: Sequence[str], *, several: bool) -
     mean = "mean over trials: " if several else ""
     entries = [
         Entry(
-            label=mean + NAMES[key],
-            colour=COLOURS[key],
+            label=mean + _NAMES[key],
+            colour=_COLOURS[key],
             mark="line",
-            marker=theme.MARKER_OF[COLOURS[key]],
+            marker=theme.MARKER_OF[_COLOURS[key]],
         )
         for key in shown
     ]
     single = len(shown) == 1
     if any(not np.isnan(line.low).all() for line in lines.values()):
         text = "one standard deviation" if several else _BANDS[shown[-1]]
-        colour = theme.BAND if single else COLOURS[shown[-1]]
+        colour = theme.BAND if single else _COLOURS[shown[-1]]
         entries.append(Entry(label=text, colour=colour, mark="band"))
     if any(not np.isnan(line.ceiling).all() for line in lines.values()):
         text = ("mean " if several else "") + _CEILINGS[shown[-1]]
-        colour = theme.BAND if single else COLOURS[shown[-1]]
+        colour = theme.BAND if single else _COLOURS[shown[-1]]
         entries.append(Entry(label=text, colour=colour, mark="dash"))
     if MODEL in shown:
         entries.append(
@@ -283,7 +283,7 @@ def _describe(text: str, lines: dict[str, Line]) -> str:
         if known.any():
             values = line.value[known]
             said.append(
-                f"{NAMES[compared]}: {known.sum()} windows, first {values[0]:.2f}, last "
+                f"{_NAMES[compared]}: {known.sum()} windows, first {values[0]:.2f}, last "
                 f"{values[-1]:.2f}, mean {values.mean():.2f}"
             )
     return f"{text} over time. " + ("; ".join(said) or "No value") + "."

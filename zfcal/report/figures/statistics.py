@@ -21,11 +21,11 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
 
-FISH_CASE = "fish"
-MODEL_CASE = "model"
-ROBOT_CASE = "robot"
-COLOURS = MappingProxyType(
-    {FISH_CASE: theme.FISH, MODEL_CASE: theme.MODEL, ROBOT_CASE: theme.ROBOT}
+_FISH_CASE = "fish"
+_MODEL_CASE = "model"
+_ROBOT_CASE = "robot"
+_COLOURS = MappingProxyType(
+    {_FISH_CASE: theme.FISH, _MODEL_CASE: theme.MODEL, _ROBOT_CASE: theme.ROBOT}
 )
 _MANY_ZONES = 5
 _READING = (
@@ -89,7 +89,7 @@ def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena)
         if statistic.name in stats.names
         and stats.of(statistic.name).shape == statistic.shape(arena)
     }
-    if FISH_CASE not in counts:
+    if _FISH_CASE not in counts:
         return
     if statistic.form == "zones":
         yield _occupation(statistic, counts, arena.zone_names)
@@ -119,26 +119,26 @@ def _histograms(statistic: Statistic, counts: Mapping[str, Ints], arena: Arena) 
 
 def _note(cases: Mapping[str, Statistics]) -> str:
     parts = [_READING]
-    if MODEL_CASE in cases:
+    if _MODEL_CASE in cases:
         parts.append(
             "The number in a panel is the similarity of fish and model there, 1 for equal."
         )
-    if ROBOT_CASE in cases:
+    if _ROBOT_CASE in cases:
         parts.append("For the robot, distances between two fish are those of robot and fish.")
     return " ".join(parts)
 
 
 def _entry(case: str) -> Entry:
     labels = {
-        FISH_CASE: "fish, as observed",
-        MODEL_CASE: "calibrated model, long simulation",
-        ROBOT_CASE: "robot, as observed",
+        _FISH_CASE: "fish, as observed",
+        _MODEL_CASE: "calibrated model, long simulation",
+        _ROBOT_CASE: "robot, as observed",
     }
-    if case == FISH_CASE:
-        return Entry(label=labels[case], colour=COLOURS[case], mark="bar")
-    mark: Mark = "line" if case == MODEL_CASE else "dot"
-    marker = theme.MARKER_OF[COLOURS[case]]
-    return Entry(label=labels[case], colour=COLOURS[case], mark=mark, marker=marker)
+    if case == _FISH_CASE:
+        return Entry(label=labels[case], colour=_COLOURS[case], mark="bar")
+    mark: Mark = "line" if case == _MODEL_CASE else "dot"
+    marker = theme.MARKER_OF[_COLOURS[case]]
+    return Entry(label=labels[case], colour=_COLOURS[case], mark=mark, marker=marker)
 
 
 def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
@@ -201,13 +201,13 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
         if np.isnan(share).all():
             continue
         top = max(top, float(share.max()))
-        if case == FISH_CASE:
+        if case == _FISH_CASE:
             width = 0.92 * (edges[1] - edges[0])
-            axes.bar(centres, share, width=width, color=COLOURS[case], alpha=0.45, lw=0)
+            axes.bar(centres, share, width=width, color=_COLOURS[case], alpha=0.45, lw=0)
         else:
-            style = "-" if case == MODEL_CASE else ":"
-            marker = theme.MARKER_OF[COLOURS[case]]
-            axes.plot(centres, share, color=COLOURS[case], ls=style, marker=marker)
+            style = "-" if case == _MODEL_CASE else ":"
+            marker = theme.MARKER_OF[_COLOURS[case]]
+            axes.plot(centres, share, color=_COLOURS[case], ls=style, marker=marker)
     limits = (float(edges[0]), float(edges[-1]))
     axes.set(xlabel=shown.axis, ylabel="share", xlim=limits, ylim=(0, top * 1.22 or 1))
     if is_even:
@@ -225,8 +225,8 @@ def _remark(axes: Axes, counts: Mapping[str, Ints], statistic: Statistic) -> Non
         text = "none seen"
     elif empty:
         text = "none seen: " + ", ".join(empty)
-    elif {FISH_CASE, MODEL_CASE} <= counts.keys():
-        alike = float(statistic.compare(counts[FISH_CASE], counts[MODEL_CASE]))
+    elif {_FISH_CASE, _MODEL_CASE} <= counts.keys():
+        alike = float(statistic.compare(counts[_FISH_CASE], counts[_MODEL_CASE]))
         text = f"similarity {alike:.2f}"
     axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
 
@@ -255,13 +255,13 @@ def _draw_occupation(
 ) -> None:
     at = np.arange(len(zones))
     width = 0.8 / len(counts)
-    hatches = {ROBOT_CASE: "....", MODEL_CASE: "////"}
+    hatches = {_ROBOT_CASE: "....", _MODEL_CASE: "////"}
     top = 0.0
     for index, (case, values) in enumerate(counts.items()):
         share = 100 * np.nan_to_num(frequencies(values))
         top = max(top, float(share.max()))
         x = at + (index - (len(counts) - 1) / 2) * width
-        bars = axes.bar(x, share, width=0.92 * width, color=COLOURS[case], alpha=0.45, lw=0)
+        bars = axes.bar(x, share, width=0.92 * width, color=_COLOURS[case], alpha=0.45, lw=0)
         if case in hatches:
             for bar in bars:
                 bar.set(hatch=hatches[case], edgecolor=theme.GROUND, alpha=0.6)
@@ -289,7 +289,7 @@ def _transitions(statistic: Statistic, case: str, counts: Ints, *, zones: Sequen
         alt=f"Table of transitions of the {case} between zones; stays: {stays or 'none seen'}.",
         draw=partial(_draw_transitions, share=share, zones=zones),
         size_in=(PANEL_IN[0], max(PANEL_IN[1], 0.5 * len(zones) + 1.1)),
-        colour=COLOURS[case],
+        colour=_COLOURS[case],
     )
 
 
