@@ -13,9 +13,9 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.tables import read_table, read_tracks
 from zfcal.behaviour.features.registry import further, named, statistics
 from zfcal.behaviour.rows import statistics_from_rows
-from zfcal.behaviour.sampling import sample
 from zfcal.report.figures.panels import compose
 from zfcal.report.figures.statistics import statistics_picture
+from zfcal.sampling import sample
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.events import Made, UpToDate
 from zfcal.stages.trial_context import open_trial

@@ -13,12 +13,12 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Bools, Floats
 from zfcal.errors import InputError
 
 VOID = 0
-WALL_ZONE_M = 0.07
-WALL_TOLERANCE_M = 0.01
+_WALL_ZONE_M = 0.07
+_WALL_TOLERANCE_M = 0.01
 N_BINS = 10
 
 _AREA_TOLERANCE = 1e-6
@@ -97,8 +97,8 @@ class Arena:
     name: str
     outline: shapely.Polygon
     zones: tuple[Zone, ...]
-    wall_zone_m: float = WALL_ZONE_M
-    wall_tolerance_m: float = WALL_TOLERANCE_M
+    wall_zone_m: float = _WALL_ZONE_M
+    wall_tolerance_m: float = _WALL_TOLERANCE_M
     bins: Bins = field(default_factory=Bins)
 
     @property
@@ -174,7 +174,7 @@ class Arena:
         return self._fill_cracks(ids, inside, points)
 
     def _fill_cracks(
-        self, ids: NDArray[np.int8], inside: NDArray[np.bool_], points: NDArray[np.object_]
+        self, ids: NDArray[np.int8], inside: Bools, points: NDArray[np.object_]
     ) -> NDArray[np.int8]:
         """Give points between two zones that should touch to the nearest one.
 
@@ -238,8 +238,8 @@ def make_arena(  # noqa: PLR0913 - one keyword for each thing that an arena file
     name: str,
     outline: shapely.Polygon,
     zones: tuple[Zone, ...] = (),
-    wall_zone_m: float = WALL_ZONE_M,
-    wall_tolerance_m: float = WALL_TOLERANCE_M,
+    wall_zone_m: float = _WALL_ZONE_M,
+    wall_tolerance_m: float = _WALL_TOLERANCE_M,
     bins: Bins | None = None,
 ) -> Arena:
     """Check an outline and its zones and return the arena.

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 FOV_RAD = math.radians(135.0)
@@ -21,7 +22,7 @@ KAPPA_0_MAX = 30.0
 KAPPA_F_MAX = 30.0
 ALPHA_MAX = 50.0
 
-KAPPA_LIMIT = 1000.0
+_KAPPA_LIMIT = 1000.0
 """A larger concentration is no behaviour (it spreads by less than 2 degrees) and no law
 that a density on 360 angles can hold."""
 
@@ -67,9 +68,9 @@ class ZoneParameters:
         for key, value in numbers.items():
             if not 0 <= value < math.inf:
                 raise InputError(f"{where}: {key} must be finite and not negative, got {value!r}.")
-            if key.startswith("kappa") and value > KAPPA_LIMIT:
+            if key.startswith("kappa") and value > _KAPPA_LIMIT:
                 raise InputError(
-                    f"{where}: {key} must be at most {KAPPA_LIMIT:g}, got {value!r}.",
+                    f"{where}: {key} must be at most {_KAPPA_LIMIT:g}, got {value!r}.",
                     hint="It is a von Mises concentration; real fish have 1 to 30.",
                 )
         _check_frequencies(where, self.speed_frequency)
@@ -125,7 +126,7 @@ class Parameters:
         """Names of the zones, in the arena's order."""
         return tuple(zone.name for zone in self.zones)
 
-    def gamma_matrix(self) -> NDArray[np.float64]:
+    def gamma_matrix(self) -> Floats:
         """Return the attraction from zone (row) to zone (column), shape (zone, zone)."""
         names = self.zone_names
         return np.array([[zone.gamma[name] for name in names] for zone in self.zones])
@@ -144,14 +145,14 @@ def gene_names(zone_names: tuple[str, ...]) -> tuple[str, ...]:
     )
 
 
-def gene_scales(n_zones: int) -> NDArray[np.float64]:
+def gene_scales(n_zones: int) -> Floats:
     """Return the value of each parameter at gene 1, shape (gene,)."""
     return np.concatenate(
         [np.tile([KAPPA_0_MAX, KAPPA_F_MAX, ALPHA_MAX], n_zones), np.ones(n_zones**2)]
     )
 
 
-def to_genes(parameters: Parameters) -> NDArray[np.float64]:
+def to_genes(parameters: Parameters) -> Floats:
     """Return the genes in [0, 1] of a model, shape (gene,); beyond the bounds they are cut off.
 
     The order is that of `gene_names`: three per zone, then the rows of gamma.

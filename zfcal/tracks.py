@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Bools, Floats, Floats32, Indices, Ints
 from zfcal.errors import InputError
 
 FISH = 0
@@ -47,13 +47,13 @@ class Tracks:
     """
 
     time_s: Floats
-    frame: NDArray[np.int64]
+    frame: Ints
     agent: NDArray[np.int32]
     kind: NDArray[np.int8]
     x_m: Floats
     y_m: Floats
-    heading_rad: NDArray[np.float32]
-    confidence: NDArray[np.float32]
+    heading_rad: Floats32
+    confidence: Floats32
 
     def __post_init__(self) -> None:
         sizes = {field.name: getattr(self, field.name).shape for field in fields(self)}
@@ -63,7 +63,7 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.frame)
 
-    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Tracks:
+    def take(self, rows: Bools | Indices | slice) -> Tracks:
         """Return the chosen rows, in the order in which they are chosen."""
         return Tracks(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
@@ -150,14 +150,14 @@ class Samples:
     """
 
     dt_s: float
-    k: NDArray[np.int64]
+    k: Ints
     agent: NDArray[np.int32]
     kind: NDArray[np.int8]
     xy_m: Floats
-    confidence: NDArray[np.float32]
+    confidence: Floats32
 
     @property
-    def guessed(self) -> NDArray[np.bool_]:
+    def guessed(self) -> Bools:
         """Whether a position is a guess, shape (sample, agent); False where there is none."""
         return np.asarray(self.confidence < GUESS)
 
@@ -165,7 +165,7 @@ class Samples:
         """Return the samples of one kind of agent only."""
         return self.take_agents(self.kind == kind)
 
-    def take_agents(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Samples:
+    def take_agents(self, chosen: Bools | Indices) -> Samples:
         """Return the samples of the chosen agents."""
         return Samples(
             dt_s=self.dt_s,
@@ -230,5 +230,5 @@ def _between(part: Samples, first: int, stop: int) -> Samples:
     return cut.take_agents(np.flatnonzero((~np.isnan(xy_m[..., 0])).any(axis=0)))
 
 
-def _pieces(values: NDArray[np.intp], sizes: list[int]) -> list[NDArray[np.intp]]:
+def _pieces(values: Indices, sizes: list[int]) -> list[Indices]:
     return np.split(values, np.cumsum(sizes)[:-1])

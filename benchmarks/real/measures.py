@@ -20,6 +20,7 @@ import numpy as np
 from benchmarks.real.recordings import Recording
 from zfcal.arena import VOID
 from zfcal.artifacts.models import read_model
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_table, read_tracks
 from zfcal.behaviour.ceilings import halves_ceiling, robot_ceiling, summarise
 from zfcal.behaviour.histograms import bin_edges, frequencies
@@ -34,7 +35,7 @@ from zfcal.stages.calibrate.holdout import evaluate_model
 from zfcal.stages.calibrate.likelihood import estimate
 from zfcal.stages.calibrate.rounds import score_table
 from zfcal.stages.events import say_nothing
-from zfcal.stages.segments import Segments, segment_path, segment_starts
+from zfcal.stages.segments import Segments
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.stages.windows import whole_segments
 from zfcal.tracks import FISH, GUESS, ROBOT

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.behaviour.statistics import Statistics, measure
+from zfcal.sampling import sample
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 DT_S = 1 / 3

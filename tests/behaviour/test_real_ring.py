@@ -7,9 +7,9 @@ import shapely
 from zfcal.arena import Zone, make_arena
 from zfcal.behaviour.ceilings import halves_ceiling, robot_ceiling, summarise
 from zfcal.behaviour.located import locate
-from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import measure, measure_robot
+from zfcal.sampling import sample
 from zfcal.tracks import FISH, Tracks
 
 FPS = 15

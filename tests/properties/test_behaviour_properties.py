@@ -15,9 +15,9 @@ from zfcal.behaviour.histograms import bin_of, similarity
 from zfcal.behaviour.legacy import compare_legacy, measure_legacy
 from zfcal.behaviour.located import join, locate
 from zfcal.behaviour.rows import statistics_from_rows, statistics_to_rows
-from zfcal.behaviour.sampling import sample, sample_range
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import measure, measure_robot
+from zfcal.sampling import sample, sample_range
 from zfcal.tracks import Samples, Tracks
 
 COUNTS = ("distance", "wall", "occupation", "transition", "speed")

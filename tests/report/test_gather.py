@@ -134,3 +134,19 @@ def test_of_several_trials_no_model_is_simulated(small_trial, monkeypatch):
     monkeypatch.setitem(sys.modules, "zfcal.report.simulated", None)
 
     assert gather(root, unexpected, alone=False).model_statistics is None
+
+
+def test_a_segment_of_another_minute_is_left_out_as_by_every_stage(small_trial):
+    """A file that somebody gave another name; one between two minutes is no segment."""
+    root = small_trial()
+    whole = (root / "tracks" / "000000.parquet").read_bytes()
+    for name in ("000060.parquet", "000090.parquet"):
+        (root / "tracks" / name).write_bytes(whole)
+    heard = []
+
+    view = gather(root, heard.append)
+
+    assert view.seen.n_points == 900 * 5
+    (line,) = view.left_out
+    assert "tracks/000060.parquet: holds the times" in line
+    assert "expected 60 s to 120 s" in line

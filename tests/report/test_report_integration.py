@@ -8,8 +8,7 @@ import pytest
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.validation import check
 from zfcal.behaviour.located import locate
-from zfcal.report.document import integration_document
-from zfcal.report.integration import NOT_COMPARED, measure_integration
+from zfcal.report.integration import NOT_COMPARED, integration_document, measure_integration
 from zfcal.report.seen import see
 from zfcal.report.views import FEATURE_NAMES, ROBOT
 

@@ -11,11 +11,11 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import SCHEMA, write_model
 from zfcal.artifacts.tables import read_tracks
-from zfcal.behaviour.sampling import sample
 from zfcal.calibrate.group import Group
 from zfcal.model.effects import all_effects, generic_effects
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
 from zfcal.parameters import natural, to_genes
+from zfcal.sampling import sample
 from zfcal.stages.calibrate.holdout import FixedModel
 from zfcal.stages.events import say_nothing
 from zfcal.stages.simulate import SimulateOptions, simulate

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join
 from zfcal.behaviour.statistics import measure
 from zfcal.errors import InputError
 from zfcal.stages import segments as module
-from zfcal.stages.segments import Segments, guess_options, segment_hashes, segment_path
+from zfcal.stages.segments import Segments, guess_options, segment_hashes
 from zfcal.tracks import FISH
 
 STARTS = [0, 60, 120, 180]

@@ -7,9 +7,9 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_model
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import read_tracks
-from zfcal.behaviour.sampling import sample
 from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
+from zfcal.sampling import sample
 from zfcal.stages.events import Made, UpToDate, say_nothing
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.simulate import SimulateOptions, between_steps, new_trial, simulate

@@ -10,10 +10,10 @@ import pytest
 from zfcal.artifacts.lineage import package_version, read_lineage
 from zfcal.artifacts.lock import lock
 from zfcal.artifacts.reading.contents import hash_of, read_bytes
+from zfcal.artifacts.segments import segment_starts
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.errors import ChangedError, DamagedError, InputError, LockedError, TakenError
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, UpToDate
-from zfcal.stages.segments import segment_starts
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Stage, run
 from zfcal.stages.trial_context import Task
 

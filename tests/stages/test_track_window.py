@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join, locate
 from zfcal.stages.events import LeftOut, say_nothing
 from zfcal.stages.recording import cut
-from zfcal.stages.segments import Segments, segment_path
+from zfcal.stages.segments import Segments
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import concatenate

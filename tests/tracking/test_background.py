@@ -8,7 +8,6 @@ from zfcal.errors import InputError
 from zfcal.tracking.background import (
     BackgroundLearner,
     background_of,
-    background_of_many,
     grey_of,
     shows_nothing,
 )
@@ -125,14 +124,6 @@ def test_frames_of_two_sizes_do_not_mix(drawn):
 
     with pytest.raises(InputError, match="80 x 80 px, got one of 60 x 60 px"):
         learner.add(drawn.image([], size=60))
-
-
-def test_the_median_of_frames_is_a_background(drawn):
-    """Fish that swim are not in it; its range is four standard deviations of the noise."""
-    background = background_of_many([drawn.image(b) for b in drawn.circling(40)])
-
-    assert np.abs(background.level.astype(int) - 180).max() <= 9
-    assert background.low[0, 0] == pytest.approx(172, abs=2)
 
 
 def test_a_negative_of_the_negative_is_the_same(drawn):

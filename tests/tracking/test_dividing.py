@@ -10,7 +10,7 @@ from zfcal.tracking.assign import assign
 from zfcal.tracking.background import background_of
 from zfcal.tracking.blobs import shape_of
 from zfcal.tracking.detect import Corners, Limits, compare, find_blobs
-from zfcal.tracking.splitting import by_clusters, by_darkness
+from zfcal.tracking.dividing import by_clusters, by_darkness
 
 
 def blobs_of(drawn, bodies, *, corners=None, min_blob_px=12.0):

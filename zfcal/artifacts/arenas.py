@@ -18,16 +18,16 @@ from zfcal.artifacts.validation import check, nearest, read_json, written_by_peo
 from zfcal.errors import InputError
 
 Document: TypeAlias = dict[str, Any]
-Ring: TypeAlias = list[list[float]]
+_Ring: TypeAlias = list[list[float]]
 
-LARGEST_M = 20.0
-SMALLEST_M = 0.02
-N_CORNERS = 256
+_LARGEST_M = 20.0
+_SMALLEST_M = 0.02
+_N_CORNERS = 256
 """Corners of a circle: its chords then lie at most r (1 - cos(pi / 256)) = 7.5e-5 r inside it."""
 
 _BIN_NAMES = {"D": "distance_m", "W": "wall_distance_m", "V": "speed_m_s"}
 
-_LARGEST_BIN = {"D": 2 * LARGEST_M, "W": 2 * LARGEST_M, "V": 10.0}
+_LARGEST_BIN = {"D": 2 * _LARGEST_M, "W": 2 * _LARGEST_M, "V": 10.0}
 """No tank has a longer diagonal, and no fish is faster: all would lie in one bin."""
 
 
@@ -102,8 +102,8 @@ def arena_of(document: Document, *, name: str = "arena") -> Arena:
     _check_size(name, outline)
     lengths = {key: document[key] for key in ("wall_zone_m", "wall_tolerance_m") if key in document}
     for key, length_m in lengths.items():
-        if not length_m <= LARGEST_M:
-            raise InputError(f"Arena {name!r}: {key} is {length_m:g}, more than {LARGEST_M:g} m.")
+        if not length_m <= _LARGEST_M:
+            raise InputError(f"Arena {name!r}: {key} is {length_m:g}, more than {_LARGEST_M:g} m.")
     return make_arena(
         name=name,
         outline=outline,
@@ -221,7 +221,7 @@ def _collection(name: str, features: list[Document], *, bins: Document) -> Docum
     }
 
 
-def _feature(role: str, rings: list[Ring], **properties: Any) -> Document:
+def _feature(role: str, rings: list[_Ring], **properties: Any) -> Document:
     return {
         "type": "Feature",
         "properties": {"role": role, **properties},
@@ -229,9 +229,9 @@ def _feature(role: str, rings: list[Ring], **properties: Any) -> Document:
     }
 
 
-def _circle(radius_m: float) -> Ring:
+def _circle(radius_m: float) -> _Ring:
     """Return a closed ring of corners on the circle, to the micrometre, counter-clockwise."""
-    angles = [2 * math.pi * corner / N_CORNERS for corner in range(N_CORNERS)]
+    angles = [2 * math.pi * corner / _N_CORNERS for corner in range(_N_CORNERS)]
     # Adding zero turns -0.0 into 0.0, which reads better in a file.
     ring = [
         [round(radius_m * math.cos(a), 6) + 0.0, round(radius_m * math.sin(a), 6) + 0.0]
@@ -253,9 +253,10 @@ def _open_tank_bins(inradius_m: float) -> Document:
 
 
 def _check_length(name: str, length_m: float) -> None:
-    if not SMALLEST_M <= length_m <= LARGEST_M:
+    if not _SMALLEST_M <= length_m <= _LARGEST_M:
         raise InputError(
-            f"{name} must be a length between {SMALLEST_M} and {LARGEST_M:g} m, got {length_m!r}.",
+            f"{name} must be a length between {_SMALLEST_M} and {_LARGEST_M:g} m, "
+            f"got {length_m!r}.",
             hint="Lengths are in metres: a tank of 50 cm has radius_m = 0.25.",
         )
 
@@ -270,7 +271,7 @@ def _area(geometry: Document, where: str) -> shapely.Polygon | shapely.MultiPoly
     return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
 
-def _polygon(rings: list[Ring], where: str) -> shapely.Polygon:
+def _polygon(rings: list[_Ring], where: str) -> shapely.Polygon:
     for number, ring in enumerate(rings):
         which = f"{where}, ring {number}"
         if ring[0][:2] != ring[-1][:2]:
@@ -307,14 +308,14 @@ def _check_size(name: str, outline: shapely.Polygon) -> None:
     """Refuse sizes of no tank: degrees, millimetres and pixels are read as metres otherwise."""
     x0, y0, x1, y1 = outline.bounds
     extent_m = max(x1 - x0, y1 - y0)
-    if not extent_m <= LARGEST_M:
+    if not extent_m <= _LARGEST_M:
         raise InputError(
-            f"Arena {name!r}: is {extent_m:g} m long, more than {LARGEST_M:g} m.",
+            f"Arena {name!r}: is {extent_m:g} m long, more than {_LARGEST_M:g} m.",
             hint="Coordinates are metres. Are these millimetres (divide by 1000) or pixels?",
         )
-    if not extent_m >= SMALLEST_M:
+    if not extent_m >= _SMALLEST_M:
         raise InputError(
-            f"Arena {name!r}: is {extent_m:g} m long, less than {SMALLEST_M:g} m.",
+            f"Arena {name!r}: is {extent_m:g} m long, less than {_SMALLEST_M:g} m.",
             hint="Coordinates are metres from a corner of the tank. Are these degrees of longitude "
             "and latitude, as map editors write them?",
         )

@@ -15,6 +15,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from zfcal.arrays import Bools
+
 _DTYPES: dict[Any, np.dtype[Any]] = {
     pa.float64(): np.dtype(np.float64),
     pa.float32(): np.dtype(np.float32),
@@ -22,8 +24,6 @@ _DTYPES: dict[Any, np.dtype[Any]] = {
     pa.int32(): np.dtype(np.int32),
     pa.int8(): np.dtype(np.int8),
 }
-
-Bools = NDArray[np.bool_]
 
 
 def array_of(values: Any, kind: pa.DataType, *, nan_is_null: bool = False) -> pa.Array:

@@ -1,6 +1,6 @@
 """Whether every artifact of a trial is whole, valid and what its lineage says.
 
-The computer that it lies on is looked at in `computer`.
+The computer that it lies on is looked at in `machine`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from zfcal.arena import Arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
-from zfcal.artifacts.computer import check_computer
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import package_version, read_lineage
+from zfcal.artifacts.machine import check_computer
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.reading.contents import hash_of, open_regular, unreadable
@@ -33,13 +33,13 @@ from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.trial import CONFIG_NAME, LOOP_NAME, NUMBER, Trial, second_of
 from zfcal.units import SEGMENT_S
 
-CLOCK_SLACK_S = 2.0
+_CLOCK_SLACK_S = 2.0
 """Two computers that share a trial may differ by so much without a warning."""
 
-GROWING_S = 10.0
+_GROWING_S = 10.0
 """A file that changed so lately is taken to be growing still."""
 
-FORGOTTEN_S = 3600.0
+_FORGOTTEN_S = 3600.0
 """No copy and no write takes so long: a dot-file of that age was left behind."""
 
 
@@ -180,17 +180,17 @@ def _dot_file(place: _Place, path: Path, name: str) -> Iterator[Finding]:
     if path.name.startswith(".lock-"):
         return
     age_s = place.now_s - path.stat().st_mtime
-    if is_part(path.name) and (is_orphan(path) or age_s > FORGOTTEN_S):
+    if is_part(path.name) and (is_orphan(path) or age_s > _FORGOTTEN_S):
         yield Finding(
             level=NOTE,
             where=name,
             says="was left by a command that was killed; nothing reads it",
             hint=f"Remove it: rm '{path}'",
         )
-    elif age_s > FORGOTTEN_S and path.suffix == ".checkpoint":
+    elif age_s > _FORGOTTEN_S and path.suffix == ".checkpoint":
         says = "a round that was not finished; calibrate goes on from there"
         yield Finding(level=NOTE, where=name, says=says)
-    elif age_s > FORGOTTEN_S:
+    elif age_s > _FORGOTTEN_S:
         yield Finding(level=NOTE, where=name, says="a dot-file that no command of zfcal reads")
 
 
@@ -212,7 +212,7 @@ def _unknown(place: _Place, name: str) -> Iterator[Finding]:
 
 def _clock(place: _Place, path: Path, name: str) -> Iterator[Finding]:
     ahead_s = path.stat().st_mtime - place.now_s
-    if not ahead_s <= CLOCK_SLACK_S:
+    if not ahead_s <= _CLOCK_SLACK_S:
         yield Finding(
             level=WARNING,
             where=name,
@@ -287,7 +287,7 @@ def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
     name = path.relative_to(place.root).as_posix()
     if found.whole:
         return
-    if place.now_s - path.stat().st_mtime < GROWING_S:
+    if place.now_s - path.stat().st_mtime < _GROWING_S:
         yield Finding(level=NOTE, where=name, says="still grows")
     else:
         says = (

@@ -34,7 +34,7 @@ DRIVE = "zfcal.drive/1"
 LATENCY_KEY = "zfcal.latency"
 """Metadata record: how quick the driver was, when its run ended."""
 
-TOPICS = {
+_TOPICS = {
     "target": "/targets",
     "command": "/commands",
     "pose": "/robot",
@@ -102,7 +102,7 @@ class DriveWriter:
             Of the schema ``zfcal.drive/1``.
         """
         time_ns = round(item["time_s"] * 1e9)
-        self._put(TOPICS[item["what"]], time_ns, to_json(item).encode())
+        self._put(_TOPICS[item["what"]], time_ns, to_json(item).encode())
         if item["what"] == "target":
             self._put(_SCENE, time_ns, _scene(item, time_ns))
         elif item["what"] == "fault":
@@ -165,7 +165,7 @@ def read_drive(path: Path) -> Iterator[Item]:
     DamagedError
         It is no such file.
     """
-    topics = set(TOPICS.values())
+    topics = set(_TOPICS.values())
     for channel, message in read_messages(path, Overview()):
         if channel.topic in topics:
             yield _item(path, channel, message)
@@ -179,7 +179,7 @@ def drive_files(root: Path) -> dict[int, Path]:
 def _item(path: Path, channel: Channel, message: Message) -> Item:
     try:
         found = json_of(message.data)
-        if TOPICS[found["what"]] == channel.topic:
+        if _TOPICS[found["what"]] == channel.topic:
             return dict(found)
     except (ValueError, KeyError, TypeError):
         pass
@@ -193,7 +193,7 @@ def _earlier(path: Path) -> list[tuple[str, int, bytes]]:
     """Return what a file holds already."""
     if not path.exists() or path.stat().st_size == 0:
         return []
-    known = {*TOPICS.values(), _SCENE, _LOG}
+    known = {*_TOPICS.values(), _SCENE, _LOG}
     try:
         return [
             (channel.topic, message.log_time, message.data)
@@ -206,7 +206,7 @@ def _earlier(path: Path) -> list[tuple[str, int, bytes]]:
 
 def _register(writer: Writer) -> dict[str, int]:
     own = writer.register_schema(DRIVE, "jsonschema", _schema())
-    channels = {topic: writer.register_channel(topic, "json", own) for topic in TOPICS.values()}
+    channels = {topic: writer.register_channel(topic, "json", own) for topic in _TOPICS.values()}
     for topic, kind in ((_SCENE, SceneUpdate), (_LOG, Log)):
         schema = register_schema(writer, kind)
         channels[topic] = writer.register_channel(topic, "protobuf", schema)

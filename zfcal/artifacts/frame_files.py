@@ -38,7 +38,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.trial import second_of
 
 FRAMES = "zfcal.frames/1"
-IMAGE_SCHEMA = "foxglove.CompressedImage"
+_IMAGE_SCHEMA = "foxglove.CompressedImage"
 
 JPEG, PNG = "jpeg", "png"
 _MAGIC = {b"\xff\xd8\xff": JPEG, b"\x89PNG\r\n\x1a\n": PNG}
@@ -68,7 +68,7 @@ class Calibration:
     matrix: tuple[float, ...]
 
 
-def image_topic(camera: str) -> str:
+def _image_topic(camera: str) -> str:
     """Return the topic of a camera's images."""
     return f"/{camera}/image"
 
@@ -184,7 +184,7 @@ class FrameWriter:
             channel = self._channel(topic, CameraCalibration)
             message = _calibration_message(self._calibration, self._camera, time_ns)
             self._put(channel, time_ns, message)
-        self._image_channel = self._channel(image_topic(self._camera), CompressedImage)
+        self._image_channel = self._channel(_image_topic(self._camera), CompressedImage)
 
     def _channel(self, topic: str, kind: type[Any]) -> int:
         schema = register_schema(self._writer, kind)
@@ -259,7 +259,7 @@ def read_frames(
     messages = _indexed(path, start_s, found) if start_s > 0 else None
     topic = ""
     for channel, message in messages or read_messages(path, found):
-        if found.schemas.get(channel.topic) != IMAGE_SCHEMA:
+        if found.schemas.get(channel.topic) != _IMAGE_SCHEMA:
             continue
         topic = topic or channel.topic
         if channel.topic != topic:
@@ -270,10 +270,10 @@ def read_frames(
         time_s, data = _decoded(path, message.data)
         if time_s >= start_s - 0.5 / _NS:
             yield time_s, data
-    if found.whole and IMAGE_SCHEMA not in found.schemas.values():
+    if found.whole and _IMAGE_SCHEMA not in found.schemas.values():
         topics = ", ".join(found.schemas) or "nothing"
         raise InputError(
-            f"{path}: holds no camera images ({IMAGE_SCHEMA}), but {topics}.",
+            f"{path}: holds no camera images ({_IMAGE_SCHEMA}), but {topics}.",
             hint=f"See what it is with: zfcal inspect {path}",
         )
 

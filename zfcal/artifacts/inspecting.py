@@ -26,7 +26,7 @@ from zfcal.trial import CONFIG_NAME
 
 Description: TypeAlias = dict[str, Any]
 
-HEAD_ROWS = 5
+_HEAD_ROWS = 5
 
 
 def describe(path: Path) -> Description:
@@ -136,7 +136,7 @@ def _table(path: Path) -> tuple[str | None, str | None, Description]:
         **_span(table),
         **_agents(table),
         "columns": columns,
-        "head": [_finite(row) for row in table.slice(0, HEAD_ROWS).to_pylist()],
+        "head": [_finite(row) for row in table.slice(0, _HEAD_ROWS).to_pylist()],
         "extra": read_extra(path) or None,
     }
     return (schema if known else None), problem, contents

@@ -1,17 +1,30 @@
-"""The computer that a trial lies on: versions, cores, disk, file system."""
+"""The computer that a trial lies on: versions, cores, disk, file system, and whether it is fit."""
 
 from __future__ import annotations
 
 import os
 import platform
 import shutil
+import time
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("zfcal", "numpy", "numba", "pyarrow", "pandas", "scipy", "shapely", "mcap")
+from zfcal.artifacts.findings import ERROR, OK, WARNING, Finding
 
-NETWORK_FILE_SYSTEMS = ("nfs", "cifs", "smb", "fuse", "9p", "afs", "ceph", "glusterfs", "lustre")
+_PACKAGES = ("zfcal", "numpy", "numba", "pyarrow", "pandas", "scipy", "shapely", "mcap")
+
+_NETWORK_FILE_SYSTEMS = ("nfs", "cifs", "smb", "fuse", "9p", "afs", "ceph", "glusterfs", "lustre")
 """Starts of the names of file systems on which changes made elsewhere are not announced."""
+
+_LOW_DISK_BYTES = 2**30
+"""About what half an hour of camera images takes."""
+
+_NO_DISK_BYTES = 50 * 2**20
+"""Too little to finish a round."""
+
+_THIS_WAS_WRITTEN_S = 1.7e9
+"""Late in 2023: a clock before that has lost its battery."""
 
 _MOUNTS = Path("/proc/self/mountinfo")
 
@@ -19,7 +32,7 @@ _MOUNTS = Path("/proc/self/mountinfo")
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that bear on the numbers."""
     found = {"python": platform.python_version()}
-    for name in PACKAGES:
+    for name in _PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -68,7 +81,49 @@ def file_system(path: Path, mounts: Path = _MOUNTS) -> str:
 
 def is_network(kind: str) -> bool:
     """Return whether a file system is one on which changes made elsewhere are not announced."""
-    return kind.startswith(NETWORK_FILE_SYSTEMS)
+    return kind.startswith(_NETWORK_FILE_SYSTEMS)
+
+
+def check_computer(root: Path, now_s: float) -> Iterator[Finding]:
+    """Yield what bears on a trial of the computer: versions, cores, disk, file system, clock.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    now_s
+        Seconds since 1970 by the clock that is looked at.
+    """
+    known = ", ".join(f"{name} {number}" for name, number in versions().items())
+    yield Finding(level=OK, where="versions", says=known)
+    yield Finding(level=OK, where="cores", says=str(cores()))
+    yield from _disk(free_bytes(root))
+    yield from _file_system(file_system(root))
+    is_set = now_s > _THIS_WAS_WRITTEN_S
+    says = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(now_s))
+    hint = "" if is_set else "Set the clock, or the times of files mean nothing."
+    yield Finding(level=OK if is_set else WARNING, where="clock", says=says, hint=hint)
+
+
+def _disk(free_bytes: int) -> Iterator[Finding]:
+    says = f"{free_bytes / 2**30:.1f} GiB free"
+    level = OK
+    if free_bytes < _LOW_DISK_BYTES:
+        level = ERROR if free_bytes < _NO_DISK_BYTES else WARNING
+    hint = "" if level == OK else "Make room before the next recording."
+    yield Finding(level=level, where="disk", says=says, hint=hint)
+
+
+def _file_system(kind: str) -> Iterator[Finding]:
+    if is_network(kind):
+        yield Finding(
+            level=WARNING,
+            where="file system",
+            says=f"{kind}: changes made on other computers are not announced",
+            hint="zfcal watch --poll looks for them; it does so by itself on such a file system.",
+        )
+    else:
+        yield Finding(level=OK, where="file system", says=kind or "of unknown type")
 
 
 def _unescape(text: str) -> str:

@@ -12,8 +12,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.artifacts.reading.contents import read_bytes
 from zfcal.errors import DamagedError, InputError
 
@@ -41,8 +41,8 @@ class OlderCamera:
     size_px: tuple[int, int]
     matrix: tuple[tuple[float, ...], ...] | None
     distortion: tuple[float, ...]
-    px: NDArray[np.float64]
-    m: NDArray[np.float64]
+    px: Floats
+    m: Floats
 
 
 def read_older_camera(path: Path) -> OlderCamera:
@@ -94,7 +94,7 @@ def _camera(path: Path, root: Any) -> OlderCamera:
     )
 
 
-def _points(path: Path, node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _points(path: Path, node: Any) -> tuple[Floats, Floats]:
     count = node.getNode("numberOfPoints")
     if count.empty() or not count.isInt() or count.real() < 1:
         raise InputError(

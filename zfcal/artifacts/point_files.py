@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.artifacts.reading.contents import read_bytes
 from zfcal.errors import DamagedError, InputError
 
@@ -27,8 +27,8 @@ class PointFile:
         The line of the file that each stands on.
     """
 
-    px: NDArray[np.float64]
-    m: NDArray[np.float64]
+    px: Floats
+    m: Floats
     lines: tuple[int, ...]
 
 

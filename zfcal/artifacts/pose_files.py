@@ -27,7 +27,7 @@ from zfcal.tracks import FramePoses
 from zfcal.trial import second_of
 
 LIBRARY = "zfcal"
-CLOCK_KEY = "zfcal.clock"
+_CLOCK_KEY = "zfcal.clock"
 """Metadata record of a live recording: when the trial began, in seconds since 1970."""
 
 _AHEAD_S, _SILENT_S = 60.0, 5.0
@@ -50,7 +50,7 @@ class PoseWriter:
     arena
         Drawn for viewers; None to do without.
     clock
-        Further metadata under `CLOCK_KEY`; None for a recording without a wall clock.
+        Further metadata of the file; None for a recording without a wall clock.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class PoseWriter:
             self._writer.start(profile="", library=LIBRARY)
             self._writer.add_metadata(LINEAGE_KEY, lineage.as_text())
             if clock is not None:
-                self._writer.add_metadata(CLOCK_KEY, dict(clock))
+                self._writer.add_metadata(_CLOCK_KEY, dict(clock))
             self._channels = register(self._writer)
             self._writer.flush()  # type: ignore[no-untyped-call]
         except OSError as error:
@@ -166,7 +166,7 @@ def read_clock(path: Path) -> dict[str, str] | None:
     """Return when a live recording began, as its file of poses states; None if it does not."""
     tail = Tail(path, "/agents")
     tail.poll()
-    return tail.metadata.get(CLOCK_KEY)
+    return tail.metadata.get(_CLOCK_KEY)
 
 
 @final

@@ -16,9 +16,9 @@ from zfcal.artifacts.validation import check, descriptions_of, read_toml, writte
 from zfcal.errors import InputError
 from zfcal.trial import CONFIG_NAME, Trial
 
-SCHEMA = "zfcal.trial/1"
+_SCHEMA = "zfcal.trial/1"
 
-Container: TypeAlias = tomlkit.TOMLDocument | Table
+_Container: TypeAlias = tomlkit.TOMLDocument | Table
 
 
 def find_trial(path: Path) -> Path:
@@ -124,7 +124,7 @@ def name_camera(root: Path, name: str, file: Path) -> bool:
 
 def _as_document(trial: Trial) -> tomlkit.TOMLDocument:
     values: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": _SCHEMA,
         "arena": trial.arena,
         "n_fish": trial.n_fish,
         "n_robots": trial.n_robots,
@@ -150,7 +150,7 @@ def _as_document(trial: Trial) -> tomlkit.TOMLDocument:
 
 
 def _add_commented(
-    place: Container, values: Mapping[str, Any], descriptions: Mapping[str, str]
+    place: _Container, values: Mapping[str, Any], descriptions: Mapping[str, str]
 ) -> None:
     for key, value in values.items():
         place.add(tomlkit.nl())

@@ -40,14 +40,6 @@ POPULATION = "zfcal.population/1"
 
 _EXTRA_KEY = b"zfcal.extra"
 _MAGIC = b"PAR1"
-_BROKEN = (
-    pa.ArrowException,
-    OSError,
-    ValueError,
-    KeyError,
-    NotImplementedError,
-    MemoryError,  # a damaged size
-)
 
 
 def write_table(

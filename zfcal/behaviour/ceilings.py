@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Indices, Ints
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.behaviour.scores import NAN, Scores, compare, score_keys
 from zfcal.behaviour.statistics import check_zones, measure, measure_role
@@ -155,7 +155,7 @@ def robot_ceiling(samples: SamplesOrLocated, arena: Arena) -> list[Scores]:
     return scores
 
 
-def places_of_fish(seen: NDArray[np.int64] | NDArray[np.intp]) -> NDArray[np.intp]:
+def places_of_fish(seen: Ints | Indices) -> Indices:
     """Return the places that were taken long enough to be a fish's; none if fewer than three.
 
     Parameters
@@ -167,7 +167,7 @@ def places_of_fish(seen: NDArray[np.int64] | NDArray[np.intp]) -> NDArray[np.int
     return places if len(places) >= _MIN_FISH else places[:0]
 
 
-def fish_places(located: Located) -> NDArray[np.intp]:
+def fish_places(located: Located) -> Indices:
     """Piece track ids together into as few fish as there must have been.
 
     Parameters
@@ -186,7 +186,7 @@ def fish_places(located: Located) -> NDArray[np.intp]:
     return piece_together(located.k[first], last)[column]
 
 
-def piece_together(first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.intp]:
+def piece_together(first: Ints, last: Ints) -> Indices:
     """Piece track ids together into as few fish as there must have been.
 
     Parameters
@@ -246,7 +246,7 @@ def halves_ceiling(
     return compare(measure(located.take(~odd), arena), measure(located.take(odd), arena))
 
 
-def block_numbers(located: Located, start_k: int, block_s: float) -> NDArray[np.int64]:
+def block_numbers(located: Located, start_k: int, block_s: float) -> Ints:
     """Return in which block of time each point lies, counted from a sample, shape (point,)."""
     since_s = (located.k - start_k) * located.dt_s
     return np.floor(since_s / block_s + 1e-9).astype(np.int64)

@@ -7,13 +7,11 @@ lies below the first edge goes into the first bin.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from zfcal.arena import N_BINS
+from zfcal.arrays import Floats, Indices, Ints
 from zfcal.errors import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def bin_edges(limits: tuple[float, float]) -> Floats:
@@ -31,7 +29,7 @@ def bin_edges(limits: tuple[float, float]) -> Floats:
     return np.linspace(*limits, N_BINS + 1)
 
 
-def bin_of(values: ArrayLike, edges: ArrayLike) -> NDArray[np.intp]:
+def bin_of(values: ArrayLike, edges: ArrayLike) -> Indices:
     """Return the bin of each value.
 
     Parameters
@@ -49,7 +47,7 @@ def bin_of(values: ArrayLike, edges: ArrayLike) -> NDArray[np.intp]:
     return np.searchsorted(np.asarray(edges)[1:-1], np.asarray(values), side="right")
 
 
-def count_cells(cell: NDArray[np.intp], shape: tuple[int, int]) -> Ints:
+def count_cells(cell: Indices, shape: tuple[int, int]) -> Ints:
     """Count how often each cell of a table occurs.
 
     Parameters

@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
+from zfcal.arrays import Bools, Floats, Indices, Ints
 from zfcal.behaviour.histograms import bin_edges, count_cells
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.behaviour.scores import NAN, Scores, from_zones
@@ -35,12 +35,8 @@ from zfcal.errors import InputError
 EXTENT_M = 0.89
 """The extent that the scripts take for the arena of two rooms, in metres."""
 
-DISTANCE_SHARE = 0.25
+_DISTANCE_SHARE = 0.25
 """D is binned from 0 to this share of the extent."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,7 +93,7 @@ def measure_legacy(
     located = locate(samples, arena)
     counts = measure(located, arena)
     zone, mean_m = _mean_distances(located)
-    edges_m = bin_edges((0.0, DISTANCE_SHARE * extent_m))
+    edges_m = bin_edges((0.0, _DISTANCE_SHARE * extent_m))
     kept = mean_m <= edges_m[-1]
     cell = zone[kept] * N_BINS + np.searchsorted(edges_m[1:-1], mean_m[kept], side="right")
     n_zones = len(arena.zones)
@@ -110,7 +106,7 @@ def measure_legacy(
     )
 
 
-def _mean_distances(located: Located) -> tuple[NDArray[np.intp], Floats]:
+def _mean_distances(located: Located) -> tuple[Indices, Floats]:
     """Return zone index and mean distance of every sample's group of two or more in a zone."""
     points = located.take(located.zone > 0)
     order = np.lexsort((points.zone, points.k))

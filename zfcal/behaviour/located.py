@@ -14,13 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
-from zfcal.behaviour.sampling import sample_range
+from zfcal.arrays import Bools, Floats, Indices, Ints
 from zfcal.errors import InputError
+from zfcal.sampling import sample_range
 from zfcal.tracks import Samples
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +61,7 @@ class Located:
     def __len__(self) -> int:
         return len(self.k)
 
-    def take(self, rows: Bools | NDArray[np.intp] | slice) -> Located:
+    def take(self, rows: Bools | Indices | slice) -> Located:
         """Return the chosen points; they must be chosen in order."""
         per_point = {f.name: getattr(self, f.name)[rows] for f in fields(self)[2:]}
         return Located(arena=self.arena, dt_s=self.dt_s, **per_point)

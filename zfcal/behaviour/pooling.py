@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Indices, Ints
 from zfcal.behaviour.ceilings import block_numbers, piece_together, places_of_fish
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.scores import Scores, compare
@@ -26,8 +27,6 @@ from zfcal.behaviour.statistics import (
 )
 from zfcal.tracks import FISH, ROBOT
 from zfcal.units import SEGMENT_S
-
-Ints = NDArray[np.int64]
 
 
 @final
@@ -114,7 +113,7 @@ class Pool:
         self._spans[rows[column], 1] = fish.k  # ascending: the last one stays
         self._spans[rows, 2] += sign * np.bincount(column, minlength=len(agents))
 
-    def _rows_of(self, agents: NDArray[np.int32], first_k: Ints) -> NDArray[np.intp]:
+    def _rows_of(self, agents: NDArray[np.int32], first_k: Ints) -> Indices:
         """Return the rows of some ids; ids that are new get one."""
         new = [(int(a), k) for a, k in zip(agents, first_k, strict=True) if int(a) not in self._row]
         if new:

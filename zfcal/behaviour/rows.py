@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS
+from zfcal.arrays import Ints
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import named
 from zfcal.behaviour.features.statistic import GROUP_ROW
@@ -158,7 +158,7 @@ def _statistics(cells: dict[tuple[Any, ...], Any], *, where: str) -> Statistics:
                 hint="Make the file again: zfcal analyse TRIAL --force",
             )
 
-    def counts(feature: str) -> NDArray[np.int64]:
+    def counts(feature: str) -> Ints:
         part = wanted[feature]
         values = np.array([cells[key] for key in part], dtype=np.int64)
         is_row = part[0][2:] == (None, None)

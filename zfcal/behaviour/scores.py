@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.behaviour.features.registry import named as named_statistic
 from zfcal.behaviour.histograms import similarity
 from zfcal.behaviour.statistics import Statistics, check_zones
 from zfcal.errors import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NAN = float("nan")
 

@@ -13,17 +13,14 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
+from zfcal.arrays import Bools, Indices, Ints
 from zfcal.behaviour.features.registry import named
 from zfcal.behaviour.features.statistic import Points, count, count_each
 from zfcal.behaviour.located import Located, SamplesOrLocated, locate
 from zfcal.errors import InputError
 from zfcal.tracks import ROBOT
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 ATTRIBUTES: Mapping[str, str] = MappingProxyType(
     {"D": "distance", "W": "wall", "O": "occupation", "T": "transition", "V": "speed"}
@@ -231,7 +228,7 @@ def measure_role(
     )
 
 
-def measure_each(located: Located, column: NDArray[np.intp], n_columns: int) -> Ints:
+def measure_each(located: Located, column: Indices, n_columns: int) -> Ints:
     """Count what each of several agents did, and its distances to all the others.
 
     Parameters

@@ -12,10 +12,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Grey = NDArray[np.uint8]
+from zfcal.arrays import Floats, Grey
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 

@@ -9,26 +9,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from zfcal.cameras.lens import Floats
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 
-LONGEST_OFFSET_S = 2.0
-LEAST_EXTENT_M = 0.1
-LEAST_TIME_S = 5.0
-LEAST_SHARE = 0.5
+_LONGEST_OFFSET_S = 2.0
+_LEAST_EXTENT_M = 0.1
+_LEAST_TIME_S = 5.0
+_LEAST_SHARE = 0.5
 """Of the time below, in which a blob overhead must be where the robot should be."""
 
-LONGEST_GAP_S = 0.25
+_LONGEST_GAP_S = 0.25
 """Positions farther apart in time are not joined by a line."""
 
-NEAR_M = 0.02
-_GATES_M = (0.06, 0.04, 0.03, NEAR_M)
+_NEAR_M = 0.02
+_GATES_M = (0.06, 0.04, 0.03, _NEAR_M)
 _SCALE_M = 0.003
 _BLOCK_S = 5.0
 _CELL_M = 0.015
@@ -84,8 +83,6 @@ class Alignment:
         Turn of the positions below, counter-clockwise about the origin.
     shift_m
         What is then added to them.
-    offset_sd_s, angle_sd_rad, shift_sd_m
-        Standard deviations by the scatter, as if frames were independent.
     share
         Share of the frames, of those in which below saw the robot, that have a blob where
         it should be.
@@ -103,9 +100,6 @@ class Alignment:
     offset_s: float
     angle_rad: float
     shift_m: tuple[float, float]
-    offset_sd_s: float
-    angle_sd_rad: float
-    shift_sd_m: float
     share: float
     time_s: Floats
     blobs_m: Floats
@@ -146,12 +140,12 @@ def align_spots(overhead: Spots, below: Spots) -> Alignment:
     overhead, below = overhead.known(), below.known()
     _check(overhead, below)
     found = _found(overhead, below)
-    if not found.share >= LEAST_SHARE:
+    if not found.share >= _LEAST_SHARE:
         _explain(overhead, below, found.share)
     return found
 
 
-def time_blocks(time_s: Floats) -> NDArray[np.bool_]:
+def time_blocks(time_s: Floats) -> Bools:
     """Return every other block of five seconds: what one half foretells of the other."""
     return np.asarray((time_s // _BLOCK_S).astype(np.int64) % 2 == 0)
 
@@ -174,7 +168,7 @@ class _Frames:
     """The blobs overhead by frame: times of frames, and for each blob its frame's number."""
 
     time_s: Floats
-    number: NDArray[np.int64]
+    number: Ints
     blobs_m: Floats
 
     @classmethod
@@ -182,7 +176,7 @@ class _Frames:
         time_s, number = np.unique(spots.time_s, return_inverse=True)
         return cls(time_s=time_s, number=number.astype(np.int64), blobs_m=spots.xy_m)
 
-    def nearest(self, places_m: Floats) -> tuple[NDArray[np.int64], Floats]:
+    def nearest(self, places_m: Floats) -> tuple[Ints, Floats]:
         """Return for each frame the row of the blob nearest to a place, and its distance."""
         away = np.hypot(*(self.blobs_m - places_m[self.number]).T)
         away = np.where(np.isnan(away), np.inf, away)
@@ -237,54 +231,50 @@ def _refined(frames: _Frames, below: Spots, start: Floats, gate_m: float) -> Flo
     rows, _, near = _partners(frames, below, start, gate_m)
     if near.sum() < _LEAST_FRAMES:
         return start
-    return _fit(below, frames.time_s[near], frames.blobs_m[rows[near]], start).x
+    return _fit(below, frames.time_s[near], frames.blobs_m[rows[near]], start)
 
 
 def _partners(
     frames: _Frames, below: Spots, values: Floats, gate_m: float
-) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+) -> tuple[Ints, Floats, Bools]:
     places = _moved(_at(below, frames.time_s - values[0]), values[1], values[2:])
     rows, away = frames.nearest(places)
     return rows, places, away <= gate_m
 
 
-def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Any:
+def _fit(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Floats:
     def residuals(values: Floats) -> Floats:
         off = _moved(_at(below, time_s - values[0]), values[1], values[2:]) - blobs_m
         return np.where(np.isfinite(off), off, 0.0).ravel()
 
     scale = np.array([0.1, 0.1, 0.05, 0.05])
-    return least_squares(
+    found = least_squares(
         residuals,
         start,
         loss="soft_l1",
         f_scale=_SCALE_M,
         x_scale=scale,
         bounds=(
-            [-LONGEST_OFFSET_S - 0.5, -np.inf, -np.inf, -np.inf],
-            [LONGEST_OFFSET_S + 0.5, np.inf, np.inf, np.inf],
+            [-_LONGEST_OFFSET_S - 0.5, -np.inf, -np.inf, -np.inf],
+            [_LONGEST_OFFSET_S + 0.5, np.inf, np.inf, np.inf],
         ),
     )
+    return found.x
 
 
 def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
-    rows, places, near = _partners(frames, below, values, NEAR_M)
+    rows, places, near = _partners(frames, below, values, _NEAR_M)
     n_seen = int(np.isfinite(places[:, 0]).sum())
     if near.sum() < _LEAST_FRAMES:
         near[:] = False
     time_s, blobs_m = frames.time_s[near], frames.blobs_m[rows[near]]
-    sd = np.full(4, np.nan)
     held_out_m = np.full(blobs_m.shape, np.nan)
     if len(time_s):
-        sd = _spread(_fit(below, time_s, blobs_m, values), len(time_s))
         held_out_m = _held_out(below, time_s, blobs_m, values)
     return Alignment(
         offset_s=float(values[0]),
         angle_rad=float((values[1] + math.pi) % (2 * math.pi) - math.pi),
         shift_m=(float(values[2]), float(values[3])),
-        offset_sd_s=float(sd[0]),
-        angle_sd_rad=float(sd[1]),
-        shift_sd_m=float(np.hypot(sd[2], sd[3])),
         share=float(near.sum() / max(n_seen, 1)),
         time_s=time_s,
         blobs_m=blobs_m,
@@ -293,18 +283,12 @@ def _alignment(frames: _Frames, below: Spots, values: Floats) -> Alignment:
     )
 
 
-def _spread(found: Any, n_frames: int) -> Floats:
-    n_spare = max(2 * n_frames - 4, 1)
-    variance = 2 * found.cost / n_spare
-    return np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance)
-
-
 def _held_out(below: Spots, time_s: Floats, blobs_m: Floats, start: Floats) -> Floats:
     errors = np.full(blobs_m.shape, np.nan)
     even = time_blocks(time_s)
     for half in (even, ~even):
         if half.sum() >= _LEAST_FRAMES and (~half).any():
-            values = _fit(below, time_s[half], blobs_m[half], start).x
+            values = _fit(below, time_s[half], blobs_m[half], start)
             moved = _moved(_at(below, time_s[~half] - values[0]), values[1], values[2:])
             errors[~half] = moved - blobs_m[~half]
     return errors
@@ -316,7 +300,7 @@ def _at(below: Spots, time_s: Floats) -> Floats:
     after = np.clip(np.searchsorted(below.time_s, time_s), 1, len(below.time_s) - 1)
     gap = below.time_s[after] - below.time_s[after - 1]
     inside = (time_s >= below.time_s[0]) & (time_s <= below.time_s[-1])
-    return np.where((inside & (gap <= LONGEST_GAP_S))[:, None], places, np.nan)
+    return np.where((inside & (gap <= _LONGEST_GAP_S))[:, None], places, np.nan)
 
 
 def _turned(xy_m: Floats, angle_rad: float) -> Floats:
@@ -339,16 +323,16 @@ def _check(overhead: Spots, below: Spots) -> None:
     together_s = min(overhead.time_s[-1], below.time_s[-1]) - max(
         overhead.time_s[0], below.time_s[0]
     )
-    if not together_s >= LEAST_TIME_S:
+    if not together_s >= _LEAST_TIME_S:
         raise InputError(
             f"Both cameras saw the tank together for {max(together_s, 0.0):.1f} s, "
-            f"{LEAST_TIME_S:g} s are needed.",
+            f"{_LEAST_TIME_S:g} s are needed.",
             hint="Do both recordings show the same minutes, and count from the same start?",
         )
     extent_m = float(np.ptp(below.xy_m, axis=0).max())
-    if not extent_m >= LEAST_EXTENT_M:
+    if not extent_m >= _LEAST_EXTENT_M:
         raise InputError(
-            f"The robot moved over {extent_m * _MM:.0f} mm, {LEAST_EXTENT_M * _MM:.0f} mm are "
+            f"The robot moved over {extent_m * _MM:.0f} mm, {_LEAST_EXTENT_M * _MM:.0f} mm are "
             "needed to tell a turn.",
             hint="Record a minute in which the robot drives all over the tank.",
         )
@@ -365,6 +349,6 @@ def _explain(overhead: Spots, below: Spots, share: float) -> NoReturn:
         )
     raise InputError(
         "The robot that the camera below sees is not among the blobs overhead: at best "
-        f"{share:.0%} of its positions have one within {NEAR_M * _MM:.0f} mm.",
+        f"{share:.0%} of its positions have one within {_NEAR_M * _MM:.0f} mm.",
         hint="Do both recordings show the same minutes? Are both cameras calibrated?",
     )

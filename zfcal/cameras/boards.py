@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.frames import Image
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.poses import View
 from zfcal.errors import InputError
 
-LEAST_CORNERS = 8
+_LEAST_CORNERS = 8
 """Corners of a ChArUco board below which an image does not count."""
 
-MARKER_SHARE = 0.75
+_MARKER_SHARE = 0.75
 _DICTIONARY = "DICT_4X4_250"
 _SMALLEST_SQUARE_M, _LARGEST_SQUARE_M = 0.001, 0.5
 
@@ -147,7 +147,7 @@ def _right_way_round(grey: Image, board: Board, px: Floats) -> Floats:
 def _find_charuco(grey: Image, board: Board) -> View | None:
     detector = cv2.aruco.CharucoDetector(_charuco(board))
     corners, numbers, _, _ = detector.detectBoard(grey)
-    if numbers is None or len(numbers) < LEAST_CORNERS:
+    if numbers is None or len(numbers) < _LEAST_CORNERS:
         return None
     m = board.corners_m[np.ravel(numbers)]
     spread = np.linalg.svd(m - m.mean(axis=0), compute_uv=False)
@@ -160,6 +160,6 @@ def _charuco(board: Board) -> cv2.aruco.CharucoBoard:
     return cv2.aruco.CharucoBoard(
         (board.columns + 1, board.rows + 1),
         board.square_m,
-        MARKER_SHARE * board.square_m,
+        _MARKER_SHARE * board.square_m,
         cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, _DICTIONARY)),
     )

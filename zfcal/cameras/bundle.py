@@ -14,8 +14,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.optimize import least_squares
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Camera
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens
 from zfcal.cameras.poses import (
     NOISE_PX,
     View,
@@ -27,9 +28,9 @@ from zfcal.cameras.poses import (
 )
 from zfcal.errors import InputError
 
-FOCAL_PRIOR_LOG = 1.0
-CENTRE_PRIOR_SHARE = 0.1
-COEFFICIENT_PRIOR = 1.0
+_FOCAL_PRIOR_LOG = 1.0
+_CENTRE_PRIOR_SHARE = 0.1
+_COEFFICIENT_PRIOR = 1.0
 """Standard deviations of what is likely: log of the focal length about the image's width, the
 principal point about the middle (share of the width), coefficients about zero. They decide
 where the points leave it open, such as the focal length of a camera that looks straight down."""
@@ -276,9 +277,9 @@ class _Problem:
         return mean
 
     def _prior_sd(self) -> Floats:
-        sd = np.full(self.free.n_lens, COEFFICIENT_PRIOR)
+        sd = np.full(self.free.n_lens, _COEFFICIENT_PRIOR)
         n_focal = 1 if self.free.square else 2
-        sd[:n_focal] = FOCAL_PRIOR_LOG
+        sd[:n_focal] = _FOCAL_PRIOR_LOG
         if self.free.centre:
-            sd[n_focal : n_focal + 2] = CENTRE_PRIOR_SHARE * max(self.size_px)
+            sd[n_focal : n_focal + 2] = _CENTRE_PRIOR_SHARE * max(self.size_px)
         return sd

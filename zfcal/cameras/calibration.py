@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Camera, Homography
 from zfcal.cameras.handedness import seen_from
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.pairs import Pairs
 from zfcal.errors import InputError
 
@@ -207,7 +207,7 @@ def fit_homography(pairs: Pairs) -> Homography:
     return Homography(size_px=pairs.size_px, matrix=rows)
 
 
-def corners_of(bounds_m: tuple[float, float, float, float]) -> Floats:
+def _corners_of(bounds_m: tuple[float, float, float, float]) -> Floats:
     """Return the corners of a rectangle from the lower left one, counter-clockwise.
 
     Parameters
@@ -260,7 +260,7 @@ def _corner_pairs(
     corners = np.asarray(corners_px, np.float64)
     if corners.shape != (4, 2):
         raise InputError(f"Four corners X,Y are needed, got an array of shape {corners.shape}.")
-    pairs = Pairs(px=corners, m=corners_of(bounds_m), size_px=size_px)
+    pairs = Pairs(px=corners, m=_corners_of(bounds_m), size_px=size_px)
     pairs.check_spread(4, what="A homography")
     _check_convex(corners)
     return pairs

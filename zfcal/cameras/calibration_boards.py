@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.cameras.calibration import summary
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError
 
-LEAST_VIEWS = 3
-GOOD_VIEWS = 8
-N_FOLDS = 4
+_LEAST_VIEWS = 3
+_GOOD_VIEWS = 8
+_N_FOLDS = 4
 _GAIN = 0.97
 """A richer lens must foretell views left out better than this times a simpler one."""
 
@@ -27,7 +28,7 @@ _COVERED = 0.6
 _GRID = 5
 _MM = 1000.0
 
-LADDERS = {
+_LADDERS = {
     PINHOLE: (
         Freedom(
             name="pinhole, k1 k2",
@@ -118,16 +119,16 @@ def calibrate_lens(
     InputError
         There are too few views, or no lens sees them so.
     """
-    if len(views) < LEAST_VIEWS:
+    if len(views) < _LEAST_VIEWS:
         raise InputError(
-            f"A lens needs {LEAST_VIEWS} views of the board or more, got {len(views)}.",
+            f"A lens needs {_LEAST_VIEWS} views of the board or more, got {len(views)}.",
             hint="Hold it in 8 to 20 ways: tipped, near and far, in all corners of the image.",
         )
     unseen = [
         (errors, free)
         for name in ((PINHOLE, FISHEYE) if model is None else (model,))
         if (start := _start(views, size_px, name)) is not None
-        for free in LADDERS[name]
+        for free in _LADDERS[name]
         if np.isfinite(errors := _cross_validated(views, size_px, free, start)).all()
     ]
     tried = _judged(unseen)
@@ -157,7 +158,7 @@ def _cross_validated(
     The pose of such a view is found from every other corner and judged by the rest.
     """
     errors: list[Floats] = []
-    folds = np.arange(len(views)) % min(N_FOLDS, len(views))
+    folds = np.arange(len(views)) % min(_N_FOLDS, len(views))
     for fold in range(folds.max() + 1):
         kept = [view for view, at in zip(views, folds, strict=True) if at != fold]
         cameras = [camera for camera, at in zip(start[1], folds, strict=True) if at != fold]
@@ -249,8 +250,8 @@ def _view_notes(off_px: Sequence[Floats], names: Sequence[str]) -> list[str]:
 
 def _notes(n_views: int, covered: float, fitted: Fitted) -> list[str]:
     notes = []
-    if n_views < GOOD_VIEWS:
-        notes.append(f"{n_views} views are few: {GOOD_VIEWS} to 20 make the lens sure.")
+    if n_views < _GOOD_VIEWS:
+        notes.append(f"{n_views} views are few: {_GOOD_VIEWS} to 20 make the lens sure.")
     if covered < _COVERED:
         notes.append(
             f"Corners of the board cover {covered:.0%} of the image: where there were none the "

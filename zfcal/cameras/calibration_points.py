@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.bundle import Fitted, Freedom, Start, find_start, fit_views
 from zfcal.cameras.calibration import (
     Calibration,
@@ -23,7 +24,7 @@ from zfcal.cameras.calibration import (
     outlier_notes,
 )
 from zfcal.cameras.camera import Camera, Homography
-from zfcal.cameras.lens import FISHEYE, PINHOLE, Floats, Lens, shown_size
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens, shown_size
 from zfcal.cameras.pairs import Pairs
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError
@@ -55,17 +56,17 @@ LADDERS = {
         ),
     ),
 }
-"""Lenses from the simplest on; a rung is tried where it leaves `SPARE` numbers to judge it by."""
+"""Lenses from the simplest on; a rung is tried where it leaves `_SPARE` numbers to judge it by."""
 
-SPARE = 4
-N_POSE = 6
-N_FOLDS = 12
+_SPARE = 4
+_N_POSE = 6
+_N_FOLDS = 12
 _CLIP = 6.0
 _MM = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tried:
+class _Tried:
     """One camera model that was tried.
 
     Parameters
@@ -121,10 +122,10 @@ def calibrate_pose(lens: Lens, pairs: Pairs, *, robust: bool = False) -> Calibra
         camera=camera,
         pairs=pairs,
         method=f"{lens.model} pose",
-        n_parameters=N_POSE,
+        n_parameters=_N_POSE,
         left_out_m=errors_m,
         notes=outlier_notes(errors_m),
-        details=standing(camera),
+        details=_standing(camera),
     )
 
 
@@ -158,19 +159,14 @@ def calibrate_points(
     else:
         fitted = _fit(pairs, chosen.free, robust=robust)
         found = _calibration_of(pairs, chosen.free, fitted, robust=robust)
-    notes = (*found.notes, *_notes(pairs, chosen, tried, fitted))
-    return Calibration(
-        camera=found.camera,
-        pairs=pairs,
-        method=found.method,
-        n_parameters=found.n_parameters,
-        left_out_m=found.left_out_m,
-        notes=notes,
+    return replace(
+        found,
+        notes=(*found.notes, *_notes(pairs, chosen, tried, fitted)),
         details={**found.details, "tried": {item.name: _rms_mm(item) for item in tried}},
     )
 
 
-def standing(camera: Camera) -> dict[str, Any]:
+def _standing(camera: Camera) -> dict[str, Any]:
     """Return where a camera stands: its place over the arena, and how far it is tipped.
 
     ``camera_m`` is negative in z below the plane; ``tilt_deg`` is between the axis and the
@@ -182,21 +178,21 @@ def standing(camera: Camera) -> dict[str, Any]:
     return {"camera_m": [float(value) for value in place], "tilt_deg": tilt_deg}
 
 
-def _try_all(pairs: Pairs, model: str | None, *, robust: bool) -> Sequence[Tried]:
+def _try_all(pairs: Pairs, model: str | None, *, robust: bool) -> Sequence[_Tried]:
     tried = []
-    if model is None and 2 * len(pairs) >= 8 + SPARE:
+    if model is None and 2 * len(pairs) >= 8 + _SPARE:
         errors = _cross_validated(pairs, None, robust=robust)
-        tried.append(Tried(name="homography", n_parameters=8, errors_m=errors, free=None))
+        tried.append(_Tried(name="homography", n_parameters=8, errors_m=errors, free=None))
     for name in (PINHOLE, FISHEYE) if model is None else (model,):
         start = _start(pairs, name)
         for free in LADDERS[name]:
-            n_parameters = N_POSE + free.n_lens
-            if 2 * len(pairs) < n_parameters + SPARE or start is None:
+            n_parameters = _N_POSE + free.n_lens
+            if 2 * len(pairs) < n_parameters + _SPARE or start is None:
                 continue
             errors = _cross_validated(pairs, free, start=start, robust=robust)
             if np.isfinite(errors).sum() > len(pairs) / 2:
                 tried.append(
-                    Tried(name=free.name, n_parameters=n_parameters, errors_m=errors, free=free)
+                    _Tried(name=free.name, n_parameters=n_parameters, errors_m=errors, free=free)
                 )
     return tried
 
@@ -216,7 +212,7 @@ def _cross_validated(
     The search for it starts from where all points roughly fit: that saves most of the time.
     """
     errors = np.full(len(pairs), np.nan)
-    folds = np.arange(len(pairs)) % min(N_FOLDS, len(pairs))
+    folds = np.arange(len(pairs)) % min(_N_FOLDS, len(pairs))
     for fold in range(folds.max() + 1):
         seen = folds != fold
         some = Pairs(px=pairs.px[seen], m=pairs.m[seen], size_px=pairs.size_px)
@@ -239,7 +235,7 @@ def _fit(pairs: Pairs, free: Freedom, *, start: Start | None = None, robust: boo
     return fit_views([view], pairs.size_px, free, start=start, robust=robust)
 
 
-def _simplest_of_the_best(tried: Sequence[Tried]) -> Tried:
+def _simplest_of_the_best(tried: Sequence[_Tried]) -> _Tried:
     """Return the simplest model that is within a standard error of the best (Hastie et al. 2009).
 
     A point that no model foretells counts little: it is mistyped, and says nothing of models.
@@ -257,7 +253,7 @@ def _simplest_of_the_best(tried: Sequence[Tried]) -> Tried:
     return min(good, key=lambda item: item.n_parameters)
 
 
-def _known(item: Tried) -> Floats:
+def _known(item: _Tried) -> Floats:
     return np.where(np.isfinite(item.errors_m), item.errors_m, np.inf)
 
 
@@ -275,13 +271,13 @@ def _calibration_of(pairs: Pairs, free: Freedom, fitted: Fitted, *, robust: bool
         camera=camera,
         pairs=pairs,
         method=free.name,
-        n_parameters=N_POSE + free.n_lens,
+        n_parameters=_N_POSE + free.n_lens,
         left_out_m=errors_m,
         notes=outlier_notes(errors_m),
         details={
             "focal_px": fitted.lens.matrix[0][0],
             "focal_sd_px": fitted.focal_sd_px,
-            **standing(camera),
+            **_standing(camera),
         },
     )
 
@@ -292,19 +288,11 @@ def _homography_alone(pairs: Pairs) -> Calibration:
         f"{len(pairs)} points support no lens, only a homography: straight walls stay bent. "
         "With 6 points a lens can be tried, 12 to 20 judge it."
     )
-    return Calibration(
-        camera=found.camera,
-        pairs=pairs,
-        method=found.method,
-        n_parameters=found.n_parameters,
-        left_out_m=found.left_out_m,
-        notes=(*found.notes, note),
-        details=found.details,
-    )
+    return replace(found, notes=(*found.notes, note))
 
 
 def _notes(
-    pairs: Pairs, chosen: Tried, tried: Sequence[Tried], fitted: Fitted | None
+    pairs: Pairs, chosen: _Tried, tried: Sequence[_Tried], fitted: Fitted | None
 ) -> tuple[str, ...]:
     notes = []
     richer = [item for item in tried if item.n_parameters > chosen.n_parameters]
@@ -322,6 +310,6 @@ def _notes(
     return tuple(notes)
 
 
-def _rms_mm(item: Tried) -> float | None:
+def _rms_mm(item: _Tried) -> float | None:
     known = item.errors_m[np.isfinite(item.errors_m)]
     return float(np.sqrt(np.mean(known**2)) * _MM) if len(known) else None

@@ -14,19 +14,11 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from zfcal.cameras.lens import (
-    FISHEYE,
-    PINHOLE,
-    Floats,
-    Lens,
-    Matrix,
-    check_size,
-    shown_size,
-    square_matrix,
-)
+from zfcal.arrays import Floats
+from zfcal.cameras.lens import FISHEYE, PINHOLE, Lens, Matrix, check_size, shown_size, square_matrix
 from zfcal.errors import InputError
 
-__all__ = ["FISHEYE", "PINHOLE", "Camera", "Floats", "Homography", "Projection", "check_fits"]
+__all__ = ["FISHEYE", "PINHOLE", "Camera", "Homography", "Projection", "check_fits"]
 
 Distortion = tuple[float, ...]
 

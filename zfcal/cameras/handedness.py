@@ -10,15 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
-from zfcal.cameras.lens import Floats
 from zfcal.errors import InputError
 
 ABOVE, BELOW = "above", "below"
-SIDES = (ABOVE, BELOW)
-UNKNOWN = "unknown"
+_UNKNOWN = "unknown"
 
-NAMES = ("lower left", "lower right", "upper right", "upper left")
+_NAMES = ("lower left", "lower right", "upper right", "upper left")
 
 
 def seen_from(camera: Projection, near_px: ArrayLike | None = None) -> str:
@@ -41,7 +40,7 @@ def seen_from(camera: Projection, near_px: ArrayLike | None = None) -> str:
     (a, b), (c, d) = right - here, down - here
     turn = a * d - b * c
     if np.isnan(turn):
-        return UNKNOWN
+        return _UNKNOWN
     return ABOVE if turn < 0 else BELOW
 
 
@@ -69,9 +68,9 @@ def check_side(
         It is the wrong way round.
     """
     found = seen_from(camera)
-    if found == UNKNOWN and near_px is not None:
+    if found == _UNKNOWN and near_px is not None:
         found = seen_from(camera, near_px)
-    if found not in {expected, UNKNOWN}:
+    if found not in {expected, _UNKNOWN}:
         how = "mirrored" if found == BELOW else "not mirrored"
         raise InputError(
             f"{what}: the arena is seen from {found} ({how}), expected from {expected}.", hint=hint
@@ -103,7 +102,7 @@ def check_corners(camera: Projection, corners_px: ArrayLike, expected: str) -> N
         expected,
         what=f"Corners {as_typed(corners)}",
         near_px=corners.mean(axis=0),
-        hint=f"{', '.join(NAMES)} {_view(expected)}: '{as_typed(in_order(corners, expected))}'. "
+        hint=f"{', '.join(_NAMES)} {_view(expected)}: '{as_typed(in_order(corners, expected))}'. "
         f"Or does this camera look {where}? Then say --seen-from {other}.",
     )
 

@@ -13,18 +13,17 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats
 from zfcal.errors import InputError
 
-Floats = NDArray[np.float64]
 Matrix = tuple[tuple[float, ...], ...]
 
 PINHOLE = "pinhole"
 FISHEYE = "fisheye"
-N_COEFFICIENTS = {PINHOLE: (0, 4, 5, 8, 12, 14), FISHEYE: (4,)}
+_N_COEFFICIENTS = {PINHOLE: (0, 4, 5, 8, 12, 14), FISHEYE: (4,)}
 
-WIDEST_RAD = {PINHOLE: math.radians(85), FISHEYE: math.radians(89.5)}
+_WIDEST_RAD = {PINHOLE: math.radians(85), FISHEYE: math.radians(89.5)}
 """Rays farther from the axis have no pixel: the plane of a tank is not seen along it."""
 
 _N_ANGLES = 1024
@@ -66,9 +65,9 @@ class Lens:
 
     def __post_init__(self) -> None:
         check_size(self.size_px)
-        if self.model not in N_COEFFICIENTS:
+        if self.model not in _N_COEFFICIENTS:
             raise InputError(f"A camera's model must be pinhole or fisheye, got {self.model!r}.")
-        allowed = N_COEFFICIENTS[self.model]
+        allowed = _N_COEFFICIENTS[self.model]
         if len(self.distortion) not in allowed:
             raise InputError(
                 f"A {self.model} camera has {' or '.join(map(str, allowed))} distortion "
@@ -191,12 +190,12 @@ class Lens:
         rays[self._misses(rays, wanted)] = np.nan
         return rays
 
-    def _misses(self, rays: Floats, wanted: Floats) -> NDArray[np.bool_]:
+    def _misses(self, rays: Floats, wanted: Floats) -> Bools:
         inside = np.hypot(*rays.T) <= self.widest_ray
         off = np.abs(self._project(np.where(inside[:, None], rays, 0.0)) - wanted).max(axis=1)
         return ~(inside & (off < 10 * _EXACT_PX))
 
-    def _radial_start(self, wanted: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def _radial_start(self, wanted: Floats) -> tuple[Floats, Bools]:
         (fx, skew, cx), (_, fy, cy), _ = self.matrix
         down = (wanted[:, 1] - cy) / fy
         across = (wanted[:, 0] - cx - skew * down) / fx
@@ -244,7 +243,7 @@ def square_matrix(rows: Matrix, what: str) -> Floats:
 @lru_cache(maxsize=64)
 def _branch(model: str, distortion: tuple[float, ...]) -> tuple[Floats, Floats]:
     """Return lengths of rays and of their images (by focal length), up to where these turn."""
-    angle = np.linspace(0.0, WIDEST_RAD[model], _N_ANGLES)
+    angle = np.linspace(0.0, _WIDEST_RAD[model], _N_ANGLES)
     rays = np.tan(angle)
     if model == FISHEYE:
         powers = angle[:, None] ** np.array([3, 5, 7, 9])

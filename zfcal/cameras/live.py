@@ -22,7 +22,7 @@ cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 QUEUE = 45
 """Images that wait at most: three seconds at 15 Hz; then the oldest go."""
 
-PATIENCE_S = 30.0
+_PATIENCE_S = 30.0
 """How long a camera that has gone is waited for."""
 
 _RETRY_S = 0.5
@@ -80,7 +80,7 @@ class LiveCamera:
     is_live = True
 
     def __init__(
-        self, address: str, *, clock: ArrivalClock, fps: float, patience_s: float = PATIENCE_S
+        self, address: str, *, clock: ArrivalClock, fps: float, patience_s: float = _PATIENCE_S
     ) -> None:
         self.name = address
         self.rate_hz: float | None = None

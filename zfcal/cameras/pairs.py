@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zfcal.cameras.lens import Floats, check_size, shown_size
+from zfcal.arrays import Floats
+from zfcal.cameras.lens import check_size, shown_size
 from zfcal.errors import InputError
 
-SMALLEST_M = 0.01
-LARGEST_M = 20.0
+_SMALLEST_M = 0.01
+_LARGEST_M = 20.0
 """Points nearer together or farther apart are not in metres, or of no tank."""
 
 _ON_A_LINE = 1e-3
@@ -109,9 +110,9 @@ class Pairs:
         if len(self) < 2:
             return
         extent_m = float(np.ptp(self.m, axis=0).max())
-        if not SMALLEST_M <= extent_m <= LARGEST_M:
+        if not _SMALLEST_M <= extent_m <= _LARGEST_M:
             raise InputError(
-                f"The points span {extent_m:g} m, expected {SMALLEST_M:g} to {LARGEST_M:g} m.",
+                f"The points span {extent_m:g} m, expected {_SMALLEST_M:g} to {_LARGEST_M:g} m.",
                 hint="Are they in centimetres or millimetres? Give metres.",
             )
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras._kernels import read_grid
 from zfcal.cameras.camera import Projection
-
-Floats = NDArray[np.float64]
 
 _STEP_PX = 4
 

@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Camera
-from zfcal.cameras.lens import FISHEYE, Floats, Lens
+from zfcal.cameras.lens import FISHEYE, Lens
 from zfcal.errors import InputError
 
 NOISE_PX = 0.5

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.cameras.alignment import Alignment, time_blocks
 from zfcal.cameras.camera import Camera, Homography
-from zfcal.cameras.lens import Floats
 from zfcal.cameras.pairs import Pairs
 from zfcal.cameras.poses import View, fit_pose
 from zfcal.errors import InputError
 
-MOST_PAIRS = 600
+_MOST_PAIRS = 600
 _GAIN = 0.95
 """A pose must foretell the other half better than this times the turn and shift."""
 
@@ -57,7 +57,7 @@ def register(camera: Camera | Homography, alignment: Alignment) -> Registered:
     alignment
         Of its positions with those overhead.
     """
-    few = np.linspace(0, len(alignment.time_s) - 1, min(MOST_PAIRS, len(alignment.time_s)))
+    few = np.linspace(0, len(alignment.time_s) - 1, min(_MOST_PAIRS, len(alignment.time_s)))
     chosen = np.unique(few.astype(np.int64))
     px = camera.to_pixels(alignment.below_m[chosen])
     pairs = Pairs(px=px, m=alignment.blobs_m[chosen], size_px=camera.size_px)

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import FISHEYE, PINHOLE, Camera
-
-Floats = NDArray[np.float64]
 
 OVERHEAD_PX = (500, 500)
 BELOW_PX = (640, 480)

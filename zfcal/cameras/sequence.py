@@ -18,7 +18,7 @@ import numpy as np
 from zfcal.cameras.stamps import Problem, Shot
 from zfcal.errors import InputError
 
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
+_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 
 _DATE = re.compile(
     r"(20\d\d)-?(\d\d)-?(\d\d)[T_ -]?(\d\d)[-:.]?(\d\d)[-:.]?(\d\d)(?:[._-](\d{1,9}))?"
@@ -36,7 +36,7 @@ def images_of(text: str) -> list[Path] | None:
     """
     path = Path(text)
     if path.is_dir():
-        found = [part for part in path.iterdir() if part.suffix.lower() in ENDINGS]
+        found = [part for part in path.iterdir() if part.suffix.lower() in _ENDINGS]
         found = [part for part in found if not part.name.startswith(".")]
         return sorted(found, key=_natural) or None
     if path.exists() or not glob.has_magic(text):
@@ -46,11 +46,11 @@ def images_of(text: str) -> list[Path] | None:
         raise InputError(
             f"{text}: no file answers to this pattern.", hint="Put it in quotes: 'day3/*.png'."
         )
-    wrong = [part for part in found if part.suffix.lower() not in ENDINGS]
+    wrong = [part for part in found if part.suffix.lower() not in _ENDINGS]
     if wrong:
         raise InputError(
             f"{wrong[0]}: is no image, and {text} names it.",
-            hint=f"Images end in {', '.join(ENDINGS)}; videos are given one at a time.",
+            hint=f"Images end in {', '.join(_ENDINGS)}; videos are given one at a time.",
         )
     return sorted(found, key=_natural)
 

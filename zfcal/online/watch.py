@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.lock import lock
+from zfcal.artifacts.segments import segment_starts
 from zfcal.errors import InputError, ZfcalError
 from zfcal.online.arrivals import FOLDERS, Arrivals, Arrived, Signature, segment_ends
 from zfcal.online.hints import Hints, reason_to_poll
@@ -40,7 +41,6 @@ from zfcal.online.watch_stages import (
 )
 from zfcal.online.worker import Done, Failure, Worker
 from zfcal.stages import events as of
-from zfcal.stages.segments import segment_starts
 from zfcal.stages.skipping import skipped_ends
 from zfcal.stages.trial_context import open_trial
 from zfcal.stages.windows import window_ends

@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.online.scheduling import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, Takes
 from zfcal.online.worker import Job
 from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
 from zfcal.stages.recording import starts_between, stretch_of
-from zfcal.stages.segments import Segments, segment_path, segment_starts
+from zfcal.stages.segments import Segments
 from zfcal.stages.skipping import write_skipped
 from zfcal.stages.trial_context import Task, open_trial
 

@@ -11,16 +11,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Rows
+from zfcal.readers.raw import Rows
 from zfcal.tracks import FISH, KINDS, ROBOT, Tracks
 from zfcal.units import M_PER_CM, M_PER_MM
 
 EXTENT_LIMIT_M = 20.0
 """Positions that span more than this are no tank: the scale is wrong."""
 
-MIRRORED = (
+_MIRRORED = (
     "In this format y counts downwards, so the tracks are mirrored: "
     "--flip-y with --origin turns them up."
 )
@@ -129,9 +130,7 @@ def _kinds(
     return kind, (f"Agents are numbered: {listed}.",) if renamed else ()
 
 
-def _present(
-    path: Path, rows: Rows, options: ImportOptions
-) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def _present(path: Path, rows: Rows, options: ImportOptions) -> tuple[Bools, tuple[str, ...]]:
     """Return which rows hold a position that is to be kept."""
     infinite = np.isinf(rows.x) | np.isinf(rows.y)
     if infinite.any():
@@ -152,7 +151,7 @@ def _present(
             f"{int(unsure.sum())} of {len(seen)} positions have a confidence below "
             f"{options.min_confidence:g} and are taken as missing."
         )
-    keep: NDArray[np.bool_] = seen & ~unsure
+    keep: Bools = seen & ~unsure
     if not keep.any():
         raise InputError(
             f"{path}: expected positions, got none: all {len(seen)} are missing"
@@ -180,11 +179,11 @@ def _place(rows: Rows, scale_m: float, options: ImportOptions) -> tuple[Floats, 
 
 def _axes(rows: Rows, options: ImportOptions) -> tuple[str, ...]:
     if rows.y_down and not options.flip_y:
-        return (MIRRORED,)
+        return (_MIRRORED,)
     return ()
 
 
-def _narrow(path: Path, agent: NDArray[np.int64]) -> NDArray[np.int32]:
+def _narrow(path: Path, agent: Ints) -> NDArray[np.int32]:
     if agent.size and not (agent.min() >= 0 and agent.max() <= _INT32.max):
         raise InputError(
             f"{path}: agent numbers must be 0 to {_INT32.max}, got {int(agent.min())} to "

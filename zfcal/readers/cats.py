@@ -22,11 +22,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_rate
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Grid, Ints, Rows
+from zfcal.readers.raw import Grid, Rows
 from zfcal.readers.text import Layout, TextTable, cell_error, header_of, numbers
 from zfcal.readers.text import read_table as read_text
 from zfcal.tracks import FISH, ROBOT

@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
-from zfcal.readers.raw import Floats, Ints
 
-RATE_TOLERANCE = 0.02
+_RATE_TOLERANCE = 0.02
 """Share by which a clock may be off before it is another frame rate."""
 
-TWO_RATES = 1.2
+_TWO_RATES = 1.2
 """Ratio between parts of a file above which it has two frame rates."""
 
 _BLOCK = 20
@@ -43,7 +42,7 @@ def check_rate(path: Path, time_s: Floats, *, fps: float, frame: Ints | None = N
     counts = np.ones(len(steps)) if frame is None else np.diff(frame).astype(np.float64)
     blocks = np.array_split(np.arange(len(steps)), min(max(len(steps) // _BLOCK, 1), _MAX_BLOCKS))
     rates = np.array([_rate(steps[b], counts[b], told=frame is not None) for b in blocks])
-    other = np.maximum(rates / rates[0], rates[0] / rates) > TWO_RATES
+    other = np.maximum(rates / rates[0], rates[0] / rates) > _TWO_RATES
     if other.any():
         at = int(np.argmax(other))
         raise InputError(
@@ -55,7 +54,7 @@ def check_rate(path: Path, time_s: Floats, *, fps: float, frame: Ints | None = N
 
 
 def _rate(steps: Floats, counts: Floats, *, told: bool) -> float:
-    regular: NDArray[np.bool_] = np.ones(len(steps), dtype=np.bool_)
+    regular: Bools = np.ones(len(steps), dtype=np.bool_)
     if not told:
         # The lower median is a step that occurs: half way between two would suit neither.
         usual = np.partition(steps, (len(steps) - 1) // 2)[(len(steps) - 1) // 2]
@@ -65,7 +64,7 @@ def _rate(steps: Floats, counts: Floats, *, told: bool) -> float:
 
 def _compare(path: Path, rate_hz: float, fps: float, *, n_steps: int) -> None:
     # A time is rounded once at either end of a stretch: a short one tells its rate less well.
-    tolerance = max(RATE_TOLERANCE, 0.1 / n_steps)
+    tolerance = max(_RATE_TOLERANCE, 0.1 / n_steps)
     if not abs(rate_hz / fps - 1) <= tolerance:
         raise InputError(
             f"{path}: the times advance at {rate_hz:.4g} Hz, expected fps = {fps:.6g} Hz.",
@@ -90,7 +89,7 @@ def check_declared(path: Path, declared_hz: float, fps: float) -> tuple[str, ...
         return (f"The file states no usable frame rate ({declared_hz!r}).",)
     difference = abs(declared_hz - fps)
     cut_off = float(declared_hz).is_integer() and difference < 1
-    if not (difference <= RATE_TOLERANCE * fps or cut_off):
+    if not (difference <= _RATE_TOLERANCE * fps or cut_off):
         raise InputError(
             f"{path}: the file states {declared_hz:.6g} frames per second, expected fps = "
             f"{fps:.6g}.",

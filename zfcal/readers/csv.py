@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import EXTENT_LIMIT_M, Imported, assemble
 from zfcal.readers.clock import check_rate
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Ints, Rows
+from zfcal.readers.raw import Rows
 from zfcal.readers.text import (
     Layout,
     TextTable,
@@ -29,10 +30,10 @@ from zfcal.readers.text import (
 )
 from zfcal.tracks import KINDS
 
-NUMERIC = ("time_s", "frame", "x_m", "y_m", "x_px", "y_px", "heading_rad", "confidence")
-TEXT = ("agent", "kind")
+_NUMERIC = ("time_s", "frame", "x_m", "y_m", "x_px", "y_px", "heading_rad", "confidence")
+_TEXT = ("agent", "kind")
 
-EXPECTED = "time_s (or frame), agent, and x_m, y_m (or x_px, y_px)"
+_EXPECTED = "time_s (or frame), agent, and x_m, y_m (or x_px, y_px)"
 
 _UNIX_TIME_S = 1e8
 _MAX_HEADING_RAD = 2 * np.pi + 1e-6
@@ -87,17 +88,17 @@ def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str
     needed = {"agent", f"x_{unit}", f"y_{unit}"}
     if not ({"time_s", "frame"} & set(names) and needed <= set(names)):
         raise InputError(
-            f"{path}, line 1: expected columns {EXPECTED}, got {', '.join(header)}.",
+            f"{path}, line 1: expected columns {_EXPECTED}, got {', '.join(header)}.",
             hint="Rename them in the file, or here: --columns agent=id,x_px=pos_x",
         )
     other = "m" if unit == "px" else "px"
-    wanted = set(NUMERIC + TEXT) - {f"x_{other}", f"y_{other}"}
+    wanted = set(_NUMERIC + _TEXT) - {f"x_{other}", f"y_{other}"}
     layout = Layout(
         names=names,
         delimiter=",",
         n_header=1,
-        numeric=tuple(name for name in names if name in wanted and name in NUMERIC),
-        text=tuple(name for name in names if name in TEXT),
+        numeric=tuple(name for name in names if name in wanted and name in _NUMERIC),
+        text=tuple(name for name in names if name in _TEXT),
     )
     extra = [name or "(no name)" for name in names if name not in wanted]
     notes = (f"Columns passed over: {', '.join(extra)}.",) if extra else ()
@@ -107,10 +108,10 @@ def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str
 def _renamed(path: Path, header: tuple[str, ...], options: ImportOptions) -> tuple[str, ...]:
     theirs_to_ours = {}
     for ours, theirs in options.columns:
-        if ours not in NUMERIC + TEXT:
+        if ours not in _NUMERIC + _TEXT:
             raise InputError(
                 f"Import option columns: {ours!r} is no column of tracks, expected one of "
-                f"{', '.join(NUMERIC + TEXT)}."
+                f"{', '.join(_NUMERIC + _TEXT)}."
             )
         if theirs not in header:
             raise InputError(

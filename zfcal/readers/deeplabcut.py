@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import load_plain
 from zfcal.readers.poses import Poses, choose
-from zfcal.readers.raw import Floats, Ints
 from zfcal.readers.text import (
     Layout,
     first_lines,
@@ -35,12 +35,12 @@ from zfcal.readers.text import (
     whole_numbers,
 )
 
-KEY = "df_with_missing"
+_KEY = "df_with_missing"
 
-SINGLE = "single"
+_SINGLE = "single"
 """The individual that holds body parts of no animal."""
 
-Column = tuple[str, ...]
+_Column = tuple[str, ...]
 """Scorer, individual (with several animals), body part, coordinate."""
 
 
@@ -61,7 +61,7 @@ def read_deeplabcut(path: Path, options: ImportOptions) -> Imported:
     return assemble(path, choose(path, poses, options).rows(), options)
 
 
-def _poses(path: Path, frame: Ints, columns: Sequence[Column], values: Floats) -> Poses:
+def _poses(path: Path, frame: Ints, columns: Sequence[_Column], values: Floats) -> Poses:
     """Sort the columns by individual and body part."""
     if values.shape != (len(frame), len(columns)):
         raise InputError(
@@ -76,8 +76,8 @@ def _poses(path: Path, frame: Ints, columns: Sequence[Column], values: Floats) -
         raise InputError(f"{path}: expected poses in two dimensions, got x, y and z.")
     agents = tuple(dict.fromkeys(agent for agent, _, _ in found))
     notes: tuple[str, ...] = ()
-    if SINGLE in agents and len(agents) > 1:
-        agents = tuple(agent for agent in agents if agent != SINGLE)
+    if _SINGLE in agents and len(agents) > 1:
+        agents = tuple(agent for agent in agents if agent != _SINGLE)
         notes = ("Body parts of no animal (individual 'single') are passed over.",)
     keypoints = tuple(dict.fromkeys(part for agent, part, _ in found if agent in agents))
     cube = np.full((len(frame), len(agents), len(keypoints), 3), np.nan)
@@ -96,7 +96,7 @@ def _poses(path: Path, frame: Ints, columns: Sequence[Column], values: Floats) -
     )
 
 
-def _read_csv(path: Path) -> tuple[Ints, list[Column], Floats]:
+def _read_csv(path: Path) -> tuple[Ints, list[_Column], Floats]:
     lines = first_lines(path, 4)
     heads = [next(csv.reader([line]), []) or [""] for line in lines]
     levels = ["scorer", "individuals", "bodyparts", "coords"]
@@ -116,11 +116,11 @@ def _read_csv(path: Path) -> tuple[Ints, list[Column], Floats]:
     return _ascending(path, whole_numbers(table, "frame")), columns, values
 
 
-def _read_h5(path: Path) -> tuple[Ints, list[Column], Floats]:
+def _read_h5(path: Path) -> tuple[Ints, list[_Column], Floats]:
     with open_hdf5(path) as file:
-        if KEY not in file:
-            raise InputError(f"{path}: expected a table {KEY!r}, got {', '.join(sorted(file))}.")
-        group = file[KEY]
+        if _KEY not in file:
+            raise InputError(f"{path}: expected a table {_KEY!r}, got {', '.join(sorted(file))}.")
+        group = file[_KEY]
         if "table" in group:
             index, columns, values = _appendable(path, group)
         else:
@@ -134,11 +134,11 @@ def _read_h5(path: Path) -> tuple[Ints, list[Column], Floats]:
     return _ascending(path, index.astype(np.int64)), columns, values
 
 
-def _appendable(path: Path, group: Any) -> tuple[NDArray[Any], list[Column], Floats]:
+def _appendable(path: Path, group: Any) -> tuple[NDArray[Any], list[_Column], Floats]:
     """Read what ``DataFrame.to_hdf(format="table")`` writes, DeepLabCut's way."""
     table = dataset(group, "table", path)
     blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
-    columns: list[Column] = []
+    columns: list[_Column] = []
     for name in blocks:
         pickled = group["table"].attrs.get(f"{name}_kind", b"")
         kind = load_plain(path, bytes(pickled))
@@ -153,9 +153,9 @@ def _appendable(path: Path, group: Any) -> tuple[NDArray[Any], list[Column], Flo
     return table["index"], columns, values
 
 
-def _fixed(path: Path, group: Any) -> tuple[NDArray[Any], list[Column], Floats]:
+def _fixed(path: Path, group: Any) -> tuple[NDArray[Any], list[_Column], Floats]:
     """Read what ``DataFrame.to_hdf(format="fixed")`` writes."""
-    columns: list[Column] = []
+    columns: list[_Column] = []
     parts: list[Floats] = []
     for block in range(int(group.attrs.get("nblocks", 0))):
         name = f"block{block}"
@@ -167,7 +167,7 @@ def _fixed(path: Path, group: Any) -> tuple[NDArray[Any], list[Column], Floats]:
         columns += list(zip(*levels, strict=True))
         parts.append(np.asarray(dataset(group, f"{name}_values", path), dtype=np.float64))
     if not parts:
-        raise InputError(f"{path}: the table {KEY!r} is empty.")
+        raise InputError(f"{path}: the table {_KEY!r} is empty.")
     return dataset(group, "axis1", path), columns, np.concatenate(parts, axis=1)
 
 

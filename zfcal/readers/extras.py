@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from zfcal.errors import InputError
 
 
-def require(module: str, path: Path) -> Any:
+def _require(module: str, path: Path) -> Any:
     """Return an optional module, or say what to install.
 
     Parameters
@@ -85,7 +85,7 @@ def whole(path: Path, kind: str) -> Iterator[None]:
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
     """Open an HDF5 file for reading; whatever is damaged in it is an `InputError`."""
-    h5py = require("h5py", path)
+    h5py = _require("h5py", path)
     with whole(path, "HDF5"), h5py.File(path, "r") as file:
         yield file
 

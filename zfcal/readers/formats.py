@@ -29,18 +29,12 @@ Reader = Callable[[Path, ImportOptions], Imported]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """A foreign format.
+    """A foreign format; what its files hold stands in ``docs/formats.md``.
 
     Parameters
     ----------
     name
         As in ``--format``.
-    reads
-        Program and files, in words.
-    units
-        Units that the file has: ``m``, ``cm`` or ``px``; pixels need a scale.
-    missing
-        How a missing position is written.
     reader
         Reads a file.
     options
@@ -50,9 +44,6 @@ class Format:
     """
 
     name: str
-    reads: str
-    units: tuple[str, ...]
-    missing: str
     reader: Reader
     options: frozenset[str] = field(default_factory=frozenset)
     folder: bool = False
@@ -61,76 +52,15 @@ class Format:
 _POSES = frozenset({"keypoint", "body_axis"})
 
 _ALL = (
-    Format(
-        name="csv",
-        reads="a row per agent and frame: time_s, agent, x_m, y_m (.csv)",
-        units=("m", "px"),
-        missing="empty or NaN",
-        reader=read_csv,
-        options=frozenset({"columns", "first_frame"}),
-    ),
-    Format(
-        name="cats",
-        reads="CATS2, the older rig: positions-*.txt and trajectory .xml",
-        units=("m",),
-        missing="NaN, or exactly (0, 0)",
-        reader=read_cats,
-    ),
-    Format(
-        name="trex",
-        reads="TRex: .npz or .csv of an individual, or the folder of all",
-        units=("cm", "px"),
-        missing="infinity, or missing = 1",
-        reader=read_trex,
-        options=frozenset({"keypoint"}),
-        folder=True,
-    ),
-    Format(
-        name="idtracker",
-        reads="idtracker.ai .h5, .npy, .csv; idTracker trajectories*.txt",
-        units=("px",),
-        missing="NaN",
-        reader=read_idtracker,
-    ),
-    Format(
-        name="trajectorytools",
-        reads="trajectorytools .npy: arrays or dictionaries",
-        units=("px",),
-        missing="NaN",
-        reader=read_trajectorytools,
-    ),
-    Format(
-        name="mot",
-        reads="MOTChallenge .csv: frame, id, x, y, width, height, confidence",
-        units=("px",),
-        missing="no row, NaN, or x = y = -1 without a box",
-        reader=read_mot,
-        options=frozenset({"box", "first_frame"}),
-    ),
-    Format(
-        name="sleap",
-        reads="SLEAP analysis .h5",
-        units=("px",),
-        missing="NaN",
-        reader=read_sleap,
-        options=_POSES,
-    ),
-    Format(
-        name="deeplabcut",
-        reads="DeepLabCut .csv and .h5, one animal or several",
-        units=("px",),
-        missing="empty or NaN",
-        reader=read_deeplabcut,
-        options=_POSES,
-    ),
-    Format(
-        name="movement",
-        reads="movement .nc (netCDF): poses or boxes",
-        units=("px", "m", "cm", "mm"),
-        missing="NaN",
-        reader=read_movement,
-        options=_POSES,
-    ),
+    Format(name="csv", reader=read_csv, options=frozenset({"columns", "first_frame"})),
+    Format(name="cats", reader=read_cats),
+    Format(name="trex", reader=read_trex, options=frozenset({"keypoint"}), folder=True),
+    Format(name="idtracker", reader=read_idtracker),
+    Format(name="trajectorytools", reader=read_trajectorytools),
+    Format(name="mot", reader=read_mot, options=frozenset({"box", "first_frame"})),
+    Format(name="sleap", reader=read_sleap, options=_POSES),
+    Format(name="deeplabcut", reader=read_deeplabcut, options=_POSES),
+    Format(name="movement", reader=read_movement, options=_POSES),
 )
 
 _SHARED = {"idtracker", "trajectorytools"}

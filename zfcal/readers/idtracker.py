@@ -22,13 +22,14 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import read_npy
-from zfcal.readers.raw import Floats, Grid, Rows
+from zfcal.readers.raw import Grid, Rows
 from zfcal.readers.text import (
     Layout,
     header_of,
@@ -37,19 +38,18 @@ from zfcal.readers.text import (
     whole_numbers,
 )
 
-LOCATED = 0.5
+_LOCATED = 0.5
 """Confidence of a located animal is at least this: its identity may be unsure, not its place."""
 
-TOUCHING = 0.4
+_TOUCHING = 0.4
 """Confidence of a place that was found after taking touching animals apart."""
 
-GUESSED = 0.1
+_GUESSED = 0.1
 """Confidence of a place that idTracker calls not very accurate."""
 
-TIDY = ("frame", "time", "individual", "x", "y", "probability")
+_TIDY = ("frame", "time", "individual", "x", "y", "probability")
 
 _WIDE = re.compile(r"([xyXY])_?(\d+)")
-_OLD = re.compile(r"(X|Y|ProbId)(\d+)")
 
 
 def read_idtracker(path: Path, options: ImportOptions) -> Imported:
@@ -152,8 +152,8 @@ def _notes(path: Path, found: Mapping[str, Any], options: ImportOptions) -> tupl
 
 def _confidence(identity: Floats) -> Floats:
     """Tell located animals from estimated ones by the certainty of identity."""
-    located = np.clip(identity, LOCATED, 1.0)
-    return np.where(np.isnan(identity) | (identity <= 0), TOUCHING, located)
+    located = np.clip(identity, _LOCATED, 1.0)
+    return np.where(np.isnan(identity) | (identity <= 0), _TOUCHING, located)
 
 
 def _read_h5(path: Path) -> dict[str, Any]:
@@ -172,14 +172,14 @@ def _read_h5(path: Path) -> dict[str, Any]:
 
 def _csv(path: Path, options: ImportOptions) -> Rows:
     header = header_of(path, ",")
-    if header == TIDY:
+    if header == _TIDY:
         return _tidy(path, options)
     times = [name for name in header if name in {"time", "seconds"}]
     columns = tuple(name for name in header if _WIDE.fullmatch(name))
     numbers_found = sorted({int(name.strip("xyXY_")) for name in columns})
     if not columns or len(columns) != 2 * len(numbers_found):
         raise InputError(
-            f"{path}, line 1: expected columns time, x1, y1, x2, y2, ... or {', '.join(TIDY)}, "
+            f"{path}, line 1: expected columns time, x1, y1, x2, y2, ... or {', '.join(_TIDY)}, "
             f"got {', '.join(header)[:200]}."
         )
     layout = Layout(names=header, delimiter=",", n_header=1, numeric=(*times, *columns))
@@ -198,7 +198,7 @@ def _csv(path: Path, options: ImportOptions) -> Rows:
 
 
 def _tidy(path: Path, options: ImportOptions) -> Rows:
-    table = read_table(path, Layout(names=TIDY, delimiter=",", n_header=1, numeric=TIDY))
+    table = read_table(path, Layout(names=_TIDY, delimiter=",", n_header=1, numeric=_TIDY))
     frame = whole_numbers(table, "frame")
     frames, first_rows = np.unique(frame, return_index=True)
     _check_times(path, numbers(table, "time")[first_rows], options.fps, frames)
@@ -250,6 +250,6 @@ def _old_text(path: Path, options: ImportOptions) -> Rows:
 
 def _old_confidence(identity: Floats) -> Floats:
     """NaN is no estimate: ``trajectories.txt`` holds only animals that were seen apart."""
-    confidence = np.where(np.isnan(identity), 1.0, np.clip(identity, LOCATED, 1.0))
-    confidence = np.where(identity == -1, TOUCHING, confidence)
-    return np.where(identity <= -2, GUESSED, confidence)
+    confidence = np.where(np.isnan(identity), 1.0, np.clip(identity, _LOCATED, 1.0))
+    confidence = np.where(identity == -1, _TOUCHING, confidence)
+    return np.where(identity <= -2, _GUESSED, confidence)

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Ints, Rows
+from zfcal.readers.raw import Rows
 from zfcal.readers.text import (
     Layout,
     TextTable,
@@ -28,7 +29,7 @@ from zfcal.readers.text import (
     whole_numbers,
 )
 
-NAMES = ("frame", "id", "x", "y", "width", "height", "confidence")
+_NAMES = ("frame", "id", "x", "y", "width", "height", "confidence")
 
 _LONGEST = 10
 
@@ -67,14 +68,14 @@ def _read(path: Path) -> TextTable:
     n_header = 0 if _is_number(cells[0]) else 1
     if n_header:
         _check_header(path, cells)
-    if not len(NAMES) - 1 <= len(cells) <= _LONGEST:
+    if not len(_NAMES) - 1 <= len(cells) <= _LONGEST:
         raise InputError(
-            f"{path}, line 1: expected {len(NAMES)} to {_LONGEST} columns "
-            f"({', '.join(NAMES)}, ...), got {len(cells)}: {first_lines(path, 1)[0][:60]!r}."
+            f"{path}, line 1: expected {len(_NAMES)} to {_LONGEST} columns "
+            f"({', '.join(_NAMES)}, ...), got {len(cells)}: {first_lines(path, 1)[0][:60]!r}."
         )
-    more = tuple(f"column {i}" for i in range(len(NAMES) + 1, len(cells) + 1))
-    names = (*NAMES, *more)[: len(cells)]
-    numeric = tuple(name for name in names if name in NAMES)
+    more = tuple(f"column {i}" for i in range(len(_NAMES) + 1, len(cells) + 1))
+    names = (*_NAMES, *more)[: len(cells)]
+    numeric = tuple(name for name in names if name in _NAMES)
     layout = Layout(names=names, delimiter=",", n_header=n_header, numeric=numeric)
     return read_table(path, layout)
 
@@ -93,7 +94,7 @@ def _check_header(path: Path, cells: tuple[str, ...]) -> None:
     wrong = [cell for cell, names in zip(cells, usual, strict=False) if cell.lower() not in names]
     if wrong:
         raise InputError(
-            f"{path}, line 1: expected columns {', '.join(NAMES)}, got {', '.join(cells)}."
+            f"{path}, line 1: expected columns {', '.join(_NAMES)}, got {', '.join(cells)}."
         )
 
 

@@ -21,15 +21,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import METRES_PER, Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
-from zfcal.readers.raw import Floats, Ints
 
-LEGACY = {"keypoints": "keypoint", "individuals": "individual"}
+_LEGACY = {"keypoints": "keypoint", "individuals": "individual"}
 """Names of dimensions before version 0.17, and since."""
 
 _UNITS = {"px": "px", "pixel": "px", "pixels": "px"} | {unit: unit for unit in METRES_PER}
@@ -80,9 +80,9 @@ def _read(path: Path) -> tuple[dict[str, _Variable], dict[str, str]]:
     """Return the variables that are there of those needed, and the file's attributes."""
     with open_hdf5(path) as file:
         found = {}
-        for name in ("position", "confidence", "time", "space", *LEGACY, *LEGACY.values()):
+        for name in ("position", "confidence", "time", "space", *_LEGACY, *_LEGACY.values()):
             if name in file:
-                new = LEGACY.get(name, name)
+                new = _LEGACY.get(name, name)
                 found[new] = _variable(path, file, name)
         return found, _texts(file.attrs)
 
@@ -95,7 +95,7 @@ def _variable(path: Path, file: Any, name: str) -> _Variable:
     values = dataset(file, name, path)
     return _Variable(
         values=values,
-        dims=tuple(LEGACY.get(dim, dim) for dim in dims),
+        dims=tuple(_LEGACY.get(dim, dim) for dim in dims),
         attributes=_texts(node.attrs),
     )
 

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Grid, Ints
+from zfcal.readers.raw import Grid
 
-MEAN = "mean"
+_MEAN = "mean"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,9 +86,10 @@ def _position(path: Path, poses: Poses, keypoint: str | None) -> tuple[Floats, F
         raise InputError(
             f"{path}: there are several body parts, expected one of them as the position: "
             f"{', '.join(poses.keypoints)}.",
-            hint=f"Such as --keypoint {poses.keypoints[0]}, or --keypoint {MEAN} (of all of them).",
+            hint=f"Such as --keypoint {poses.keypoints[0]}, or --keypoint {_MEAN} "
+            "(of all of them).",
         )
-    if keypoint == MEAN and MEAN not in poses.keypoints:
+    if keypoint == _MEAN and _MEAN not in poses.keypoints:
         # A mean over the parts that happen to be seen would jump from frame to frame.
         return poses.position.mean(axis=2), None if score is None else score.min(axis=2)
     part = 0 if keypoint is None else _part(path, poses, keypoint)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from zfcal.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
 
-MATLAB = ("track", "xy", "node", "frame")
+_MATLAB = ("track", "xy", "node", "frame")
 
 _OURS = ("frame", "track", "node", "xy")
 
@@ -69,16 +70,16 @@ def read_sleap(path: Path, options: ImportOptions) -> Imported:
 def _order(path: Path, file: Any) -> tuple[str, ...]:
     """Return what the axes of ``tracks`` stand for."""
     if "tracks" not in file or "dims" not in file["tracks"].attrs:
-        return MATLAB
+        return _MATLAB
     words = tuple(json.loads(file["tracks"].attrs["dims"]))
-    if sorted(words) != sorted(MATLAB):
+    if sorted(words) != sorted(_MATLAB):
         raise InputError(
-            f"{path}: expected dims of {', '.join(MATLAB)}, got {', '.join(map(str, words))}."
+            f"{path}: expected dims of {', '.join(_MATLAB)}, got {', '.join(map(str, words))}."
         )
     return words
 
 
-def _arranged(path: Path, stored: NDArray[Any], order: tuple[str, ...]) -> NDArray[np.float64]:
+def _arranged(path: Path, stored: NDArray[Any], order: tuple[str, ...]) -> Floats:
     """Return an array with its axes in the order frame, track, node, xy."""
     if stored.ndim != len(order):
         raise InputError(

@@ -19,14 +19,13 @@ from typing import Any, TextIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.artifacts.arrays import array_of, numbers_of
 from zfcal.artifacts.reading.limits import TABLE_BYTES, largest, too_large
 from zfcal.errors import InputError
-from zfcal.readers.raw import Floats, Ints
 
-MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
+_MISSING = ("", "NaN", "nan", "NAN", "NA", "null", "None")
 """Cells that stand for a missing value."""
 
 _NAMES = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
@@ -175,7 +174,7 @@ def read_table(path: Path, layout: Layout) -> TextTable:
             convert_options=pa_csv.ConvertOptions(
                 column_types=types,
                 include_columns=list(types),
-                null_values=list(MISSING),
+                null_values=list(_MISSING),
                 strings_can_be_null=True,
             ),
         )
@@ -202,7 +201,7 @@ def whole_numbers(table: TextTable, name: str) -> Ints:
     return values.astype(np.int64)
 
 
-def labels(table: TextTable, name: str) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+def labels(table: TextTable, name: str) -> tuple[Ints, tuple[str, ...]]:
     """Return for each row the place of its text in the list of texts that occur.
 
     An empty cell is the text ''.
@@ -265,7 +264,7 @@ def _why(path: Path, layout: Layout, names: tuple[str, ...], reason: str) -> Inp
                 )
             for name in layout.numeric:
                 cell = cells[names.index(name)].strip()
-                if cell not in MISSING and not _is_number(cell):
+                if cell not in _MISSING and not _is_number(cell):
                     return InputError(
                         f"{path}, line {line}, column {name}: expected a number, got {cell[:40]!r}."
                     )

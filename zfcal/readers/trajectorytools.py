@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.idtracker import from_dictionary, positions
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import read_npy
-from zfcal.readers.raw import Floats
 
 
 def read_trajectorytools(path: Path, options: ImportOptions) -> Imported:

@@ -20,16 +20,17 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import whole
 from zfcal.readers.options import ImportOptions
-from zfcal.readers.raw import Floats, Ints, Rows
+from zfcal.readers.raw import Rows
 from zfcal.readers.text import Layout, header_of, numbers, read_table
 
-CENTROID = "wcentroid"
-SOURCES = {CENTROID: "#wcentroid", "centroid": "#centroid", "pcentroid": "#pcentroid", "head": ""}
+_CENTROID = "wcentroid"
+_SOURCES = {_CENTROID: "#wcentroid", "centroid": "#centroid", "pcentroid": "#pcentroid", "head": ""}
 """What a position is of, and how TRex marks it in a name."""
 
 _NUMBERED = re.compile(r"(?P<video>.+)_[A-Za-z]+(?P<number>\d+)\.(?:npz|csv|csv\.gz)")
@@ -59,14 +60,14 @@ def read_trex(path: Path, options: ImportOptions) -> Imported:
         ``head``. With ``m_per_px`` the scale of TRex is replaced, where the file
         tells it.
     """
-    source = options.keypoint or CENTROID
-    if source not in SOURCES:
+    source = options.keypoint or _CENTROID
+    if source not in _SOURCES:
         raise InputError(
-            f"{path}: TRex has no body part {source!r}, expected one of {', '.join(SOURCES)}."
+            f"{path}: TRex has no body part {source!r}, expected one of {', '.join(_SOURCES)}."
         )
     files = _files(path) if path.is_dir() else [path]
-    individuals = [_read(file, SOURCES[source], number) for number, file in enumerate(files)]
-    parts = [_rows(individual, SOURCES[source], options) for individual in individuals]
+    individuals = [_read(file, _SOURCES[source], number) for number, file in enumerate(files)]
+    parts = [_rows(individual, _SOURCES[source], options) for individual in individuals]
     return assemble(path, _joined(parts), options)
 
 
@@ -141,7 +142,7 @@ def _rows(individual: _Individual, mark: str, options: ImportOptions) -> Rows:
     x_name, y_name = f"X{mark}", f"Y{mark}"
     missing = [name for name in ("frame", x_name, y_name) if name not in columns]
     if missing:
-        there = [source for source, m in SOURCES.items() if f"X{m}" in columns]
+        there = [source for source, m in _SOURCES.items() if f"X{m}" in columns]
         got = ", ".join(sorted(columns)) or "nothing of it"
         raise InputError(
             f"{path}: expected {missing[0]!r}, got {got}.",

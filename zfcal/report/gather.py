@@ -18,23 +18,22 @@ from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
 from zfcal.artifacts.reading.contents import numbered_of, open_regular
+from zfcal.artifacts.segments import read_segment, segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table, read_tracks
+from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table
 from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
-from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
 from zfcal.report.views import Course, CourseKey, Mark, Round, Source, TrialView
 from zfcal.trial import Trial
-from zfcal.units import SEGMENT_S
 
 Damage = Callable[[DamagedError], None]
 
-POOLED_KEY = "robot_pooled_from_s"
+_POOLED_KEY = "robot_pooled_from_s"
 """Extra metadata of the scores: from when on the robot is judged."""
 
 _KEY_COLUMNS = ("compared", "feature", "zone")
@@ -244,19 +243,12 @@ def _named(said: Any) -> tuple[Mark | None, tuple[str, ...]]:
 
 def _stretches(reader: _Reader) -> Iterator[Located]:
     """Yield where everybody was, for each segment that can be read."""
-    for start_s, path in reader.files("tracks", ".parquet"):
-        part = reader.attempt(path, lambda p, s=start_s: _locate(reader, p, s))  # type: ignore[misc]
-        if part is not None:
-            yield part
-
-
-def _locate(reader: _Reader, path: Path, start_s: int) -> Located:
     trial = reader.trial
-    end_s = start_s + SEGMENT_S
-    samples = sample(
-        read_tracks(path), fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s
-    )
-    return locate(samples, reader.arena)
+    for start_s in segment_starts(trial.root):
+        path = segment_path(trial.root, start_s)
+        read = reader.attempt(path, lambda p: read_segment(trial, int(p.stem)))
+        if read is not None:
+            yield locate(read[1], reader.arena)
 
 
 def _pooled_from(reader: _Reader) -> int:
@@ -264,7 +256,7 @@ def _pooled_from(reader: _Reader) -> int:
     for _, path in reversed(reader.files("scores", ".parquet")):
         extra = reader.attempt(path, read_extra)
         if extra is not None:
-            value = extra.get(POOLED_KEY)
+            value = extra.get(_POOLED_KEY)
             return value if isinstance(value, int) else 0
     return 0
 

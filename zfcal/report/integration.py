@@ -2,23 +2,27 @@
 
 Robot against fish comes from the scores, which pool it from 300 s to the end of
 the newest window; its ceiling puts each fish in the robot's place. The halves
-of the recording are compared here.
+of the recording are compared here. All of it is also a JSON document, for whoever computes on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+from zfcal.artifacts.lineage import Lineage
 from zfcal.report.seen import Seen
-from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integration, Mark
+from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integration, Mark, TrialView
 
-LATE_S = 300
+SCHEMA = "zfcal.integration/1"
+
+_LATE_S = 300
 """From here on the robot is judged (Cazenille et al.: scores have settled by then)."""
 
 NOT_COMPARED = "The robot has not been compared with the fish yet."
 
-HALVES_MIN_S = 600.0
+_HALVES_MIN_S = 600.0
 """Five minutes a half: with less, chance alone makes the halves differ as two windows do."""
 
 
@@ -53,9 +57,9 @@ def measure_integration(
         missing.append("There is no robot in this trial.")
     elif not robot:
         missing.append(NOT_COMPARED)
-    elif start_s < LATE_S:
+    elif start_s < _LATE_S:
         missing.append(
-            f"The trial is too young to judge the robot from {LATE_S} s on: the times before "
+            f"The trial is too young to judge the robot from {_LATE_S} s on: the times before "
             "are in, when the fish were still getting used to it."
         )
     if robot and math.isnan(robot["S"].ceiling):
@@ -92,13 +96,70 @@ def _halves(seen: Seen | None) -> tuple[dict[str, float], str]:
     if seen is None or not seen.n_points:
         return {}, "There are no tracks."
     length_s = (seen.last_k - seen.first_k + 1) * seen.dt_s
-    if length_s < HALVES_MIN_S - seen.dt_s:
+    if length_s < _HALVES_MIN_S - seen.dt_s:
         return {}, (
             f"The recording is {length_s:.0f} s long; to compare its halves with each other it "
-            f"needs {HALVES_MIN_S:.0f} s."
+            f"needs {_HALVES_MIN_S:.0f} s."
         )
     scores = seen.halves.scores()
     if scores is None:
         return {}, "There are no fish in one half of the recording."
     named = {"D": scores.I_D, "W": scores.I_W, "O": scores.I_O, "T": scores.I_T, "S": scores.S}
     return {name: value for name, value in named.items() if not math.isnan(value)}, ""
+
+
+def integration_document(
+    views: Sequence[TrialView], lineage: Lineage, files: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return robot against fish, its ceiling and the halves, trial by trial.
+
+    Parameters
+    ----------
+    views
+        The trials.
+    lineage
+        Of the report.
+    files
+        SHA-256 of the report's other files, by name.
+
+    Returns
+    -------
+    dict
+        Fits ``schemas/integration.schema.json``; what is missing is null, with
+        the reason under ``missing``.
+    """
+    origin = lineage.as_dict()
+    del origin["schema"]
+    return {
+        "schema": SCHEMA,
+        "trials": [_trial(view.name, view.integration, view.left_out) for view in views],
+        "files": dict(files),
+        "lineage": origin,
+    }
+
+
+def _trial(name: str, found: Integration, left_out: Sequence[str]) -> dict[str, Any]:
+    robot = {
+        "start_s": found.start_s,
+        "end_s": found.end_s,
+        "features": {feature: _mark(mark) for feature, mark in found.robot.items()},
+    }
+    return {
+        "trial": name,
+        "robot_vs_fish": robot if found.robot else None,
+        "halves": dict(found.halves) or None,
+        "missing": list(found.missing),
+        **({"left_out": list(left_out)} if left_out else {}),
+    }
+
+
+def _mark(mark: Mark) -> dict[str, float | int | None]:
+    numbers = {
+        "value": mark.value,
+        "ceiling": mark.ceiling,
+        "low": mark.low,
+        "high": mark.high,
+        "against_ceiling": mark.against_ceiling,
+    }
+    known = {key: None if math.isnan(value) else value for key, value in numbers.items()}
+    return {**known, "n_fish": mark.n}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from zfcal.report.numbers import Table
+from zfcal.report.numbers import NONE, Table, mean_and_sd, number
 from zfcal.report.views import FEATURE_NAMES, MODEL, PUBLISHED_S, ROBOT, SOCIAL, TrialView
 
 _TITLES = {
@@ -18,7 +18,6 @@ _TITLES = {
     ROBOT: "Robot against fish, interval by interval",
     SOCIAL: "Fish with robot against the fish alone, interval by interval",
 }
-_NONE = "–"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,8 +77,8 @@ def _course_of(views: Sequence[TrialView], compared: str, feature: str) -> Itera
         ]
         if not marks:
             continue
-        mean, sd = _mean_and_sd([mark.value for mark in marks])
-        ceiling_mean, ceiling_sd = _mean_and_sd([mark.ceiling for mark in marks])
+        mean, sd = mean_and_sd([mark.value for mark in marks])
+        ceiling_mean, ceiling_sd = mean_and_sd([mark.ceiling for mark in marks])
         is_published = (compared, feature) == (MODEL, "S")
         yield Interval(
             compared=compared,
@@ -130,7 +129,7 @@ def _table(compared: str, found: Sequence[Interval]) -> Table:
     if compared == MODEL:
         heads.append("published S")
         for row, end in zip(rows, ends, strict=True):
-            row.append(_number(published_s(end)))
+            row.append(number(published_s(end)))
     return Table(
         name=f"intervals-{compared}",
         title=_TITLES[compared],
@@ -147,22 +146,12 @@ def _row(found: Sequence[Interval | None]) -> list[str]:
     """Return the number of trials, each feature, and the ceiling of the last one, S."""
     n = max(each.n for each in found if each is not None)
     last = found[-1]
-    cells = [_NONE if each is None else _spread(each.mean, each.sd) for each in found]
-    return [str(n), *cells, _NONE if last is None else _spread(last.ceiling_mean, last.ceiling_sd)]
-
-
-def _mean_and_sd(values: Sequence[float]) -> tuple[float, float]:
-    known = [value for value in values if not math.isnan(value)]
-    sd = float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
-    return (float(np.mean(known)) if known else math.nan), sd
+    cells = [NONE if each is None else _spread(each.mean, each.sd) for each in found]
+    return [str(n), *cells, NONE if last is None else _spread(last.ceiling_mean, last.ceiling_sd)]
 
 
 def _spread(mean: float, sd: float) -> str:
-    return _number(mean) if math.isnan(sd) else f"{mean:.3f} ± {sd:.3f}"
-
-
-def _number(value: float) -> str:
-    return _NONE if math.isnan(value) else f"{value:.3f}"
+    return number(mean) if math.isnan(sd) else f"{mean:.3f} ± {sd:.3f}"
 
 
 def _plain(value: float | str) -> str:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from zfcal.artifacts.lineage import to_json
 from zfcal.report.figures.parameters import values_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
@@ -15,7 +17,9 @@ _COMPARED = {
     SOCIAL: "fish with robot",
     ROBOT: "robot",
 }
-_NONE = "–"
+NONE = "–"
+"""Stands for a number that is not there."""
+
 _LONGEST_OPTIONS = 160
 _SCORE_HEADS = ("mean", "last window", "ceiling", "of ceiling", "ceiling's 95 %")
 
@@ -77,8 +81,8 @@ def trials_table(views: Sequence[TrialView]) -> Table:
                 f"{view.tracked_s / 60:.1f}",
                 str(n),
                 *_cells(mean),
-                *(_cells(robot)[:2] if robot is not None else (_NONE, _NONE)),
-                _number(halves),
+                *(_cells(robot)[:2] if robot is not None else (NONE, NONE)),
+                number(halves),
             ]
         )
     heads = ("trial", "min", "windows", "model S, mean", "ceiling", "S / ceiling",
@@ -101,7 +105,7 @@ def lineage_table(views: Sequence[TrialView]) -> Table:
             f"{view.name}/{source.path}" if several else source.path,
             source.lineage.command,
             source.lineage.version,
-            _NONE if source.lineage.seed is None else str(source.lineage.seed),
+            NONE if source.lineage.seed is None else str(source.lineage.seed),
             str(source.n_inputs),
             source.sha256[:12],
             _short(to_json(dict(source.lineage.options))),
@@ -160,8 +164,8 @@ def _scores_by_zone(view: TrialView) -> Table:
 
 def _score_cells(course: Course) -> list[str]:
     last = course.mark(course.last or 0)
-    interval = _NONE if math.isnan(last.low) else f"{last.low:.3f} to {last.high:.3f}"
-    return [_number(course.mean().value), *_cells(last), interval]
+    interval = NONE if math.isnan(last.low) else f"{last.low:.3f} to {last.high:.3f}"
+    return [number(course.mean().value), *_cells(last), interval]
 
 
 def _windows(view: TrialView) -> Table:
@@ -173,7 +177,7 @@ def _windows(view: TrialView) -> Table:
         for key in shown:
             course = view.course(key, "S")
             at = [i for i, each in enumerate(course.end_s) if each == end]
-            cells += list(_cells(course.mark(at[0]))[:2]) if at else [_NONE, _NONE]
+            cells += list(_cells(course.mark(at[0]))[:2]) if at else [NONE, NONE]
         rows.append([str(end), *cells])
     heads = ["end (s)"]
     for key in shown:
@@ -194,8 +198,8 @@ def _parameters(view: TrialView) -> Table:
     if last is not None:
         for name, value in values_of(last).items():
             low, high = last.intervals.get(name, (math.nan, math.nan))
-            interval = _NONE if math.isnan(low) else f"{low:.3g} to {high:.3g}"
-            known = "no" if name in last.unidentified else "yes" if last.intervals else _NONE
+            interval = NONE if math.isnan(low) else f"{low:.3g} to {high:.3g}"
+            known = "no" if name in last.unidentified else "yes" if last.intervals else NONE
             rows.append([name, f"{value:.3g}", interval, known])
     return Table(
         name="parameter-values",
@@ -209,14 +213,22 @@ def _parameters(view: TrialView) -> Table:
     )
 
 
+def number(value: float) -> str:
+    """Return a score as text."""
+    return NONE if math.isnan(value) else f"{value:.3f}"
+
+
+def mean_and_sd(values: Sequence[float]) -> tuple[float, float]:
+    """Return the mean of what is known, and the standard deviation of the sample; NaN without."""
+    known = [value for value in values if not math.isnan(value)]
+    sd = float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
+    return (float(np.mean(known)) if known else math.nan), sd
+
+
 def _cells(mark: Mark) -> tuple[str, str, str]:
     share = mark.against_ceiling
-    percent = _NONE if math.isnan(share) else f"{100 * share:.0f} %"
-    return _number(mark.value), _number(mark.ceiling), percent
-
-
-def _number(value: float) -> str:
-    return _NONE if math.isnan(value) else f"{value:.3f}"
+    percent = NONE if math.isnan(share) else f"{100 * share:.0f} %"
+    return number(mark.value), number(mark.ceiling), percent
 
 
 def _short(text: str) -> str:

@@ -17,18 +17,18 @@ from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.document import SCHEMA, integration_document
 from zfcal.report.figures.panels import Picture, write_picture
 from zfcal.report.gather import Damage, gather, input_files
+from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
 from zfcal.report.views import TrialView
 
-FOLDER = "report"
+_FOLDER = "report"
 PAGE = "index.html"
-NUMBERS = "integration.json"
-TABLE = "intervals.csv"
+_NUMBERS = "integration.json"
+_TABLE = "intervals.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,12 +82,12 @@ def write_report(
         write_whole(path, _drawer(picture))
         written.append(path)
     if len(views) > 1:
-        write_text_whole(place.folder / TABLE, intervals_csv(views))
-        written.append(place.folder / TABLE)
+        write_text_whole(place.folder / _TABLE, intervals_csv(views))
+        written.append(place.folder / _TABLE)
     page = place.folder / PAGE
     write_text_whole(page, render_page(views, pictures, lineage))
     written.append(page)
-    numbers = place.folder / NUMBERS
+    numbers = place.folder / _NUMBERS
     _remove_outdated(place.folder, {path.name for path in written})
     document = integration_document(views, lineage, _hashes(written))
     check(document, "integration", numbers)
@@ -109,7 +109,7 @@ def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | N
         One line, such as ``missing`` or ``input scores/000180.parquet is new``.
     """
     place = _place(roots, out_dir)
-    numbers = place.folder / NUMBERS
+    numbers = place.folder / _NUMBERS
     reason = stale_reason([numbers], _lineage(roots, place))
     if reason is not None:
         return reason
@@ -125,14 +125,14 @@ def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | N
 def report_files(roots: Sequence[Path], out_dir: Path | None = None) -> list[Path]:
     """Return the files of a report that is up to date, the page first."""
     place = _place(roots, out_dir)
-    names = list(read_json(place.folder / NUMBERS)["files"])
-    ordered = [PAGE, *(name for name in names if name != PAGE), NUMBERS]
+    names = list(read_json(place.folder / _NUMBERS)["files"])
+    ordered = [PAGE, *(name for name in names if name != PAGE), _NUMBERS]
     return [place.folder / name for name in ordered]
 
 
 def report_left_out(roots: Sequence[Path], out_dir: Path | None = None) -> list[str]:
     """Return what a report that is up to date leaves out since it is damaged, a line each."""
-    trials = read_json(_place(roots, out_dir).folder / NUMBERS)["trials"]
+    trials = read_json(_place(roots, out_dir).folder / _NUMBERS)["trials"]
     return [
         f"{root}: {line}"
         for root, trial in zip(roots, trials, strict=True)
@@ -144,7 +144,7 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
     if not roots:
         raise InputError("A report needs at least one trial.")
     if len(roots) == 1:
-        folder = out_dir if out_dir is not None else roots[0] / FOLDER
+        folder = out_dir if out_dir is not None else roots[0] / _FOLDER
         return _Place(folder=folder, base=roots[0])
     if out_dir is None:
         raise InputError(
@@ -199,7 +199,7 @@ def _drawer(picture: Picture) -> Callable[[Path], None]:
 def _remove_outdated(folder: Path, made: set[str]) -> None:
     """Remove pictures of the last report that this one has not: they would pass for current."""
     try:
-        before = read_json(folder / NUMBERS).get("files", {})
+        before = read_json(folder / _NUMBERS).get("files", {})
     except (DamagedError, InputError):
         return
     for name in set(before) - made:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.pooling import Halves
 from zfcal.tracks import FISH, ROBOT
@@ -25,8 +25,6 @@ _TOGETHER = 100_000
 _CELLS = 60
 """Squares of a map along the longer side of the tank."""
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Extent = tuple[float, float, float, float]
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from zfcal.report.contents import Statement
+from zfcal.report.numbers import mean_and_sd
 from zfcal.report.summary import Gap, gaps
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
@@ -68,7 +69,7 @@ def _robots(views: Sequence[TrialView]) -> Statement | None:
 
 def _spread(values: Sequence[float]) -> str:
     """Return mean and sample standard deviation as text."""
-    known = [value for value in values if not math.isnan(value)]
-    if len(known) < 2:
-        return f"{known[0]:.2f}" if known else "unknown"
-    return f"{np.mean(known):.2f} ± {np.std(known, ddof=1):.2f}"
+    mean, sd = mean_and_sd(values)
+    if math.isnan(mean):
+        return "unknown"
+    return f"{mean:.2f}" if math.isnan(sd) else f"{mean:.2f} ± {sd:.2f}"

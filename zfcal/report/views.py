@@ -11,18 +11,15 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.artifacts.lineage import Lineage
 from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
 from zfcal.report.seen import Seen
 from zfcal.trial import Trial
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MODEL = "model-vs-control"
 SOCIAL = "social-vs-control"

@@ -12,10 +12,11 @@ from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading.contents import hash_of, hold_steady
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Note, Progress
-from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.stages.segments import END_KEY, STEP_S
 from zfcal.stages.stage import Draft, Item, Output, Run, Write
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.trial_context import Task

@@ -16,22 +16,16 @@ from typing import final
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON
-from zfcal.artifacts.reading.contents import (
-    hash_of,
-    numbered_of,
-    one_content,
-    open_regular,
-    unreadable,
-)
+from zfcal.artifacts.reading.contents import hash_of, one_content, open_regular, unreadable
 from zfcal.artifacts.reading.limits import check_size
+from zfcal.artifacts.segments import read_segment, segment_name, segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.pooling import Pool
-from zfcal.behaviour.sampling import sample
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.stages.events import LeftOut, Tell
 from zfcal.stages.trial_context import OpenTrial, open_trial
-from zfcal.tracks import GUESS, Samples, Tracks
+from zfcal.tracks import GUESS
 from zfcal.units import SEGMENT_S
 
 STEP_S = int(SEGMENT_S)
@@ -45,16 +39,6 @@ _AT_LEAST = 3
 """Segments kept in memory however many points they hold: those of a window."""
 
 
-def segment_name(start_s: int) -> str:
-    """Return the path of the segment that starts at a second, relative to its trial."""
-    return f"tracks/{start_s:06d}.parquet"
-
-
-def segment_path(root: Path, start_s: int) -> Path:
-    """Return the place of the segment that starts at a second."""
-    return root / segment_name(start_s)
-
-
 def segment_hashes(root: Path, starts: Iterable[int]) -> dict[int, str]:
     """Return the SHA-256 of segments by the second at which they start.
 
@@ -64,15 +48,6 @@ def segment_hashes(root: Path, starts: Iterable[int]) -> dict[int, str]:
         One is missing or cannot be read.
     """
     return {start: hash_of(f"{root}/{segment_name(start)}") for start in starts}
-
-
-def segment_starts(root: Path) -> list[int]:
-    """Return the seconds at which the segments of a trial start, in order.
-
-    Segments start on whole minutes; other files in ``tracks/`` are none.
-    """
-    found = numbered_of(root / "tracks", ".parquet")
-    return [second for second in found if second % STEP_S == 0]
 
 
 def segment_files(root: Path, span_s: tuple[int, int] | None) -> list[Path]:
@@ -178,7 +153,7 @@ class Segments:
         with one_content():
             key = (str(path.absolute()), hash_of(path), *_clock(opened))
             if key not in self._located:
-                self._located[key] = locate(read_segment(opened, start_s)[1], opened.arena)
+                self._located[key] = locate(read_segment(opened.trial, start_s)[1], opened.arena)
                 self._forget()
         return self._located[key]
 
@@ -231,39 +206,6 @@ class Segments:
 def _clock(opened: OpenTrial) -> tuple[str, ...]:
     """Return what else bears on where everybody was; an arena that was opened stays the same."""
     return str(opened.trial.fps), str(opened.trial.dt_s), str(id(opened.arena))
-
-
-def read_segment(opened: OpenTrial, start_s: int) -> tuple[Tracks, Samples]:
-    """Return a segment on the camera's clock, and on the model's.
-
-    All that is made from tracks is made from this. A sample is taken from the frames of its
-    own segment: a segment then has the same samples in every window.
-
-    Raises
-    ------
-    DamagedError
-        The file is damaged, of another schema, or holds what no tracker writes.
-    """
-    trial, path = opened.trial, segment_path(opened.trial.root, start_s)
-    tracks = read_tracks(path)
-    end_s = start_s + SEGMENT_S
-    _check_times(path, tracks, start_s)
-    try:
-        samples = sample(tracks, fps=trial.fps, dt_s=trial.dt_s, start_s=start_s, end_s=end_s)
-    except InputError as error:
-        raise DamagedError(f"{path}: {error}", hint=error.hint) from error
-    return tracks, samples
-
-
-def _check_times(path: Path, tracks: Tracks, start_s: int) -> None:
-    """Refuse a segment whose rows lie outside the minute that its name states."""
-    end_s = start_s + SEGMENT_S
-    if len(tracks) and not (tracks.time_s[0] >= start_s and tracks.time_s[-1] < end_s):
-        raise DamagedError(
-            f"{path}: holds the times {tracks.time_s[0]:.6g} s to {tracks.time_s[-1]:.6g} s, "
-            f"expected {start_s} s to {end_s:.6g} s.",
-            hint="The name says where a segment starts: give the file its own name back.",
-        )
 
 
 def is_whole(root: Path, start_s: int, *, fps: float) -> bool:

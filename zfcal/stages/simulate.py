@@ -13,13 +13,13 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model, read_model_for
+from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.errors import InputError
 from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
-from zfcal.stages.segments import segment_path
 from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks

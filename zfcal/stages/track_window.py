@@ -1,6 +1,6 @@
 """All tracks of a trial, or of a stretch of it, on the camera's clock and on the model's.
 
-For whoever looks at a stretch as a whole. Each segment is read as `segments` reads it, so that
+For whoever looks at a stretch as a whole. Each segment is read by `read_segment`, so that
 its samples are those that its statistics were made of.
 """
 
@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from zfcal.artifacts.segments import read_segment
 from zfcal.artifacts.tables import read_extra, read_tracks
-from zfcal.behaviour.sampling import sample_range
 from zfcal.errors import DamagedError, InputError
+from zfcal.sampling import sample_range
 from zfcal.stages.events import LeftOut, Tell
-from zfcal.stages.segments import STEP_S, read_segment, segment_files
+from zfcal.stages.segments import STEP_S, segment_files
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import Samples, Tracks, concatenate, joined
 
@@ -112,7 +113,7 @@ def read_tracked(root: Path) -> Tracks:
 
 def _read_or_tell(opened: OpenTrial, path: Path, tell: Tell) -> tuple[Path, Tracks, Samples] | None:
     try:
-        return (path, *read_segment(opened, int(path.stem)))
+        return (path, *read_segment(opened.trial, int(path.stem)))
     except (DamagedError, InputError) as error:
         tell(LeftOut(path=path, problem=str(error), hint=error.hint))
         return None

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from zfcal.artifacts.segments import segment_starts
 from zfcal.stages.events import Note, Tell
-from zfcal.stages.segments import STEP_S, is_whole, segment_starts
+from zfcal.stages.segments import STEP_S, is_whole
 from zfcal.trial import Trial
 from zfcal.units import WINDOW_S
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Indices
 from zfcal.cameras._kernels import kernel
-from zfcal.tracking._kernels import Floats
 
 
 @kernel
@@ -28,7 +27,7 @@ def balance(chance: Floats, least: float, rounds: int) -> None:
 @kernel
 def weigh(  # noqa: PLR0913, PLR0917 - a kernel
     chance: Floats,
-    rows: NDArray[np.intp],
+    rows: Indices,
     seen: Floats,
     n: Floats,
     mean: Floats,
@@ -87,7 +86,7 @@ def weigh(  # noqa: PLR0913, PLR0917 - a kernel
 @kernel
 def learn(  # noqa: PLR0913, PLR0917 - a kernel
     chance: Floats,
-    rows: NDArray[np.intp],
+    rows: Indices,
     seen: Floats,
     lengths: Floats,
     n: Floats,

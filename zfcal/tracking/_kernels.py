@@ -11,12 +11,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Grey, Ints
 from zfcal.cameras._kernels import kernel, median_ratio, read_grid
 
-Floats = NDArray[np.float64]
-Grey = NDArray[np.uint8]
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -154,7 +152,7 @@ def nearest_squared(pixels: Floats, points: Floats) -> Floats:
 
 
 @kernel
-def clusters(pixels: Floats, weights: Floats, centres: Floats, rounds: int) -> NDArray[np.int64]:
+def clusters(pixels: Floats, weights: Floats, centres: Floats, rounds: int) -> Ints:
     """Return the cluster of each pixel by k-means; the centres are moved in place.
 
     Parameters

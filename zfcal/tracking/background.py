@@ -15,13 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats32, Grey
 from zfcal.cameras._kernels import median_ratio
 from zfcal.cameras.frames import Image
 from zfcal.errors import InputError
 from zfcal.tracking.ghosts import without_step
-
-Grey = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 LEARN_FRAMES = 100
 LEARN_RATE = 0.05
@@ -92,7 +90,7 @@ class Background:
         low = cv2.subtract(white, width)
         return Background(level=white, low=np.asarray(low, np.uint8), high=white)
 
-    def levelled(self, level: Grey, where: NDArray[np.bool_]) -> Background:
+    def levelled(self, level: Grey, where: Bools) -> Background:
         """Return the tank with another level at some pixels, where it is as noisy as it was."""
         width = cv2.max(cv2.subtract(self.level, self.low), cv2.subtract(self.high, self.level))
         return Background(
@@ -166,7 +164,7 @@ class BackgroundLearner:
         n_frames: int = LEARN_FRAMES,
         rate: float = LEARN_RATE,
         *,
-        region: NDArray[np.bool_] | None = None,
+        region: Bools | None = None,
     ) -> None:
         self.n_frames = n_frames
         self._where = None if region is None else _asked(region)
@@ -293,7 +291,7 @@ class BackgroundLearner:
         )
 
 
-def _asked(region: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _asked(region: Bools) -> Bools:
     """Return the pixels of a region, a few beyond, and those that tell how bright an image is."""
     square = np.ones((2 * _BEYOND_PX + 1,) * 2, np.uint8)
     asked = cv2.dilate(region.astype(np.uint8), square) > 0
@@ -315,22 +313,7 @@ def background_of(image: Image, *, sd: float = _LEAST_SD) -> Background:
     return _within(level, np.full(level.shape, max(sd, _LEAST_SD), np.float32))
 
 
-def background_of_many(images: list[Grey]) -> Background:
-    """Return the median of frames as the background; its noise is their median deviation.
-
-    Parameters
-    ----------
-    images : list of ndarray of uint8, each of shape (height, width)
-        Fish in them should not rest.
-    """
-    stack = np.stack(images)
-    level = np.median(stack, axis=0).astype(np.uint8)
-    deviation = np.median(cv2.absdiff(stack, np.broadcast_to(level, stack.shape)), axis=0)
-    sd = np.maximum(1.4826 * deviation, _LEAST_SD).astype(np.float32)
-    return _within(level, sd)
-
-
-def _within(level: Grey, sd: Floats) -> Background:
+def _within(level: Grey, sd: Floats32) -> Background:
     width = _SIGMAS * sd
     return Background(
         level=level.copy(),
@@ -363,7 +346,7 @@ def _usual(samples: list[Grey], *, light: bool) -> Grey:
 
 
 def _without_sitters(
-    learnt: Background, tank: Grey, *, light: bool, where: NDArray[np.bool_] | None = None
+    learnt: Background, tank: Grey, *, light: bool, where: Bools | None = None
 ) -> Background:
     """Return the background with resting fish taken out, where they moved at some time."""
     usual = tank.astype(np.int16)

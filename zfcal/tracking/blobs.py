@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.tracking._kernels import moments
-
-Floats = NDArray[np.float64]
 
 _SKEW = 0.5
 """Skewness along the axis that settles which end is the head."""

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Grey
 from zfcal.tracking._kernels import outlasts_opening, shades
-from zfcal.tracking.background import Background, Grey
+from zfcal.tracking.background import Background
 from zfcal.tracking.blobs import FULL, Blob
-
-Floats = NDArray[np.float64]
 
 _QUALITY = 0.01
 _CORNERS_APART_PX = 5

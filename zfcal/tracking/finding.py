@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from zfcal.tracking.background import Background, Grey
+from zfcal.arrays import Bools, Grey
+from zfcal.tracking.background import Background
 from zfcal.tracking.blobs import Blob
 from zfcal.tracking.detect import Contrast, Corners, Limits, compare, find_blobs
 from zfcal.tracking.learning import Standing, pieces
@@ -51,7 +51,7 @@ class Finder:
         self,
         options: TrackerOptions,
         background: Background,
-        region: NDArray[np.bool_] | None = None,
+        region: Bools | None = None,
         *,
         min_blob_px: float,
         opened: bool = True,
@@ -129,7 +129,7 @@ class Finder:
         self._darkness = darkness
 
 
-def _box_of(shape: tuple[int, ...], region: NDArray[np.bool_] | None) -> tuple[slice, slice]:
+def _box_of(shape: tuple[int, ...], region: Bools | None) -> tuple[slice, slice]:
     """Return rows and columns that hold a region, and what is closed at its border."""
     if region is None or not region.any():
         return slice(0, shape[0]), slice(0, shape[1])
@@ -137,7 +137,7 @@ def _box_of(shape: tuple[int, ...], region: NDArray[np.bool_] | None) -> tuple[s
     return _span(rows), _span(columns)
 
 
-def _span(line: NDArray[np.bool_]) -> slice:
+def _span(line: Bools) -> slice:
     some = np.flatnonzero(line)
     return slice(max(int(some[0]) - _AROUND_PX, 0), int(some[-1]) + 1 + _AROUND_PX)
 

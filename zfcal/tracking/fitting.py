@@ -11,13 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras._kernels import kernel
 from zfcal.tracking import _beliefs, _kernels
 from zfcal.tracking._kernels import summing
-
-Floats = NDArray[np.float64]
 
 _PROFILE = np.array([0.12, 0.22, 0.36, 0.56, 0.76, 0.93, 1.0, 0.9, 0.55])
 """Width along the body, from tail to snout, as a share of the greatest."""

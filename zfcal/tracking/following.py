@@ -6,8 +6,8 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.tracking._kernels import nearest_squared, step_costs
 from zfcal.tracking.assign import Match, assign
 from zfcal.tracking.blobs import Blob
@@ -15,8 +15,6 @@ from zfcal.tracking.identity import Identities
 from zfcal.tracking.seen import Exchange
 from zfcal.tracking.trail import Detection, Trail
 from zfcal.tracking.usual import Bodies, Body
-
-Floats = NDArray[np.float64]
 
 _REACH = 0.6
 _REACH_PER_S = 12.0

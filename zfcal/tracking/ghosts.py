@@ -15,13 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Grey = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
+from zfcal.arrays import Bools, Floats32, Grey
 
-SURROUNDINGS_PX = 3
+_SURROUNDINGS_PX = 3
 _SQUARE = np.ones((3, 3), np.uint8)
-_WIDE = np.ones((2 * SURROUNDINGS_PX - 1,) * 2, np.uint8)
-_ACROSS = (2 * SURROUNDINGS_PX + 1,) * 2
+_WIDE = np.ones((2 * _SURROUNDINGS_PX - 1,) * 2, np.uint8)
+_ACROSS = (2 * _SURROUNDINGS_PX + 1,) * 2
 
 
 class Piece(NamedTuple):
@@ -38,16 +37,16 @@ class Piece(NamedTuple):
     """
 
     crop: tuple[slice, slice]
-    inside: Mask
-    around: Mask
+    inside: Bools
+    around: Bools
     number: int
 
-    def within(self, where: Mask) -> Piece:
+    def within(self, where: Bools) -> Piece:
         """Return it with those surroundings alone that lie somewhere."""
         return self._replace(around=self.around & where[self.crop])
 
 
-def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Mask) -> Iterator[Piece]:
+def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Bools) -> Iterator[Piece]:
     """Yield the pieces of a labelled mask that are asked for and have surroundings.
 
     Parameters
@@ -61,8 +60,8 @@ def pieces_of(labels: NDArray[np.int32], boxes: NDArray[np.int32], asked: Mask) 
     """
     for number in (np.flatnonzero(asked[1:]) + 1).tolist():
         x, y, width, height = boxes[number, :4].tolist()
-        top, left = max(y - SURROUNDINGS_PX, 0), max(x - SURROUNDINGS_PX, 0)
-        crop = np.s_[top : y + height + SURROUNDINGS_PX, left : x + width + SURROUNDINGS_PX]
+        top, left = max(y - _SURROUNDINGS_PX, 0), max(x - _SURROUNDINGS_PX, 0)
+        crop = np.s_[top : y + height + _SURROUNDINGS_PX, left : x + width + _SURROUNDINGS_PX]
         inside = labels[crop] == number
         near = cv2.dilate(inside.astype(np.uint8), _SQUARE) > 0
         wide = cv2.dilate(inside.astype(np.uint8), _WIDE) > 0
@@ -86,7 +85,7 @@ def step_across(image: Grey, piece: Piece) -> float:
     return abs(float(steps.mean())) if len(steps) else 0.0
 
 
-def _mean_near(image: NDArray[np.float32], mask: Mask) -> NDArray[np.float32]:
+def _mean_near(image: Floats32, mask: Bools) -> Floats32:
     """Return the mean of the pixels of a mask about each pixel; NaN where there are none."""
     weight = mask.astype(np.float32)
     plain = cv2.BORDER_CONSTANT
@@ -96,8 +95,8 @@ def _mean_near(image: NDArray[np.float32], mask: Mask) -> NDArray[np.float32]:
 
 
 def without_step(
-    mask: Grey, right: Grey, wrong: Grey, *, core: Grey | None = None, where: Mask | None = None
-) -> Mask:
+    mask: Grey, right: Grey, wrong: Grey, *, core: Grey | None = None, where: Bools | None = None
+) -> Bools:
     """Return the pieces of a mask at whose border one image steps less than another.
 
     Parameters

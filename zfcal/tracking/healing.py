@@ -12,9 +12,9 @@ from collections.abc import Iterable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from zfcal.tracking.background import Background, Grey
+from zfcal.arrays import Bools, Grey
+from zfcal.tracking.background import Background
 from zfcal.tracking.ghosts import without_step
 
 _LOOKS = 4
@@ -37,7 +37,7 @@ class Healer:
         Where animals can be; the tank is healed there alone.
     """
 
-    def __init__(self, region: NDArray[np.bool_] | None = None) -> None:
+    def __init__(self, region: Bools | None = None) -> None:
         self._region = region
         self._looks: deque[tuple[Grey, Grey]] = deque(maxlen=_LOOKS)
 
@@ -81,9 +81,7 @@ class Healer:
         return np.asarray(cv2.dilate(found, _EDGE), np.uint8)
 
 
-def healed(
-    tank: Background, frames: Iterable[Grey], region: NDArray[np.bool_] | None = None
-) -> Background:
+def healed(tank: Background, frames: Iterable[Grey], region: Bools | None = None) -> Background:
     """Return a tank without what frames, in their order, show to have left it."""
     healer = Healer(region)
     for frame in frames:

@@ -17,21 +17,18 @@ from collections.abc import Sequence
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from zfcal.arrays import Bools, Floats, Indices
 from zfcal.tracking._beliefs import balance, learn, weigh
 from zfcal.tracking.seen import Exchange
 from zfcal.tracking.trail import Trail
 from zfcal.tracking.usual import Body
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-
-WITHIN = (0.06, 0.035)
+_WITHIN = (0.06, 0.035)
 """Spread of one fish's log area and log darkness over time, at first; learnt with the film."""
 
-BETWEEN = (0.085, 0.055)
+_BETWEEN = (0.085, 0.055)
 """Spread from fish to fish of one age and tank, on the published film of eight zebrafish."""
 
 _WIDE = (0.5, 0.5)
@@ -96,7 +93,7 @@ class Identities:
         self._n = np.zeros(n_agents)
         self._mean = np.zeros((n_agents, 2))
         self._length = np.zeros(n_agents)
-        self._within = np.array(WITHIN) ** 2 * _FAITH
+        self._within = np.array(_WITHIN) ** 2 * _FAITH
         self._looks = _FAITH
         self._time_s = -math.inf
         self._crossed_s = {
@@ -182,11 +179,11 @@ class Identities:
             self._chance[row, new] = 0.0
             self._chance[row, self._name[row]] = total
 
-    def _look(self, rows: NDArray[np.intp], trails: list[Trail], weight: float) -> None:
+    def _look(self, rows: Indices, trails: list[Trail], weight: float) -> None:
         """Let what tracks look like speak, and learn what they look like."""
         seen = np.log(np.array([(t.shape.area_px, t.blob.darkness) for t in trails]))
         # Nobody knows beforehand whether one is a lure.
-        between = np.array(BETWEEN if (self._n > 0).all() else _WIDE) ** 2
+        between = np.array(_BETWEEN if (self._n > 0).all() else _WIDE) ** 2
         within = self._within / self._looks
         weigh(self._chance, rows, seen, self._n, self._mean, within, between, weight, _OUTLIER)
         balance(self._chance, _LEAST, _ROUNDS)
@@ -225,13 +222,13 @@ class Identities:
             self._forget(self._name != names)
             self._name = names
 
-    def _forget(self, rows: NDArray[np.bool_]) -> None:
+    def _forget(self, rows: Bools) -> None:
         """Let former encounters of some rows explain no exchange to come."""
         for crossed_s in self._crossed_s.values():
             crossed_s[rows] = -math.inf
             crossed_s[:, rows] = -math.inf
 
-    def _exchanged(self, before: Ints, after: Ints) -> list[Exchange]:
+    def _exchanged(self, before: Indices, after: Indices) -> list[Exchange]:
         """Return which rows changed places when, the first one first; none where nobody knows."""
         likely_s, possible_s = self._crossed_s[_LIKELY], self._crossed_s[_POSSIBLE]
         since_s = np.where(likely_s > possible_s - _ENCOUNTER_S, likely_s, possible_s)

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from zfcal.tracking.background import DARK, EITHER, LIGHT, Background, Grey
+from zfcal.arrays import Bools, Floats, Grey
+from zfcal.tracking.background import DARK, EITHER, LIGHT, Background
 from zfcal.tracking.ghosts import Piece, pieces_of
 
-USUAL_MIN_BLOB_PX = 12.0
+_USUAL_MIN_BLOB_PX = 12.0
 """Smallest blob where nothing was learnt."""
 
 _SHARE_OF_BODY = 0.15
@@ -105,11 +105,11 @@ class Learnt:
     def min_blob_px(self) -> float:
         """The smallest blob that may be an animal."""
         if not self.area_px > 0:
-            return USUAL_MIN_BLOB_PX
+            return _USUAL_MIN_BLOB_PX
         smallest = max(_SHARE_OF_BODY * self.area_px, _LEAST_PX)
-        if smallest > USUAL_MIN_BLOB_PX and self.least_px > 0:
+        if smallest > _USUAL_MIN_BLOB_PX and self.least_px > 0:
             # What is usually there is not dropped for being smaller than something large.
-            return min(smallest, max(_SHARE_OF_BODY * self.least_px, USUAL_MIN_BLOB_PX))
+            return min(smallest, max(_SHARE_OF_BODY * self.least_px, _USUAL_MIN_BLOB_PX))
         return smallest
 
 
@@ -118,7 +118,7 @@ def learn(
     tank: Background,
     *,
     n_agents: int | None,
-    region: NDArray[np.bool_] | None = None,
+    region: Bools | None = None,
 ) -> Learnt:
     """Return what frames tell.
 
@@ -151,9 +151,7 @@ def learn(
     )
 
 
-def standing_out(
-    frame: Grey, tank: Background, region: NDArray[np.bool_] | None = None
-) -> list[Standing]:
+def standing_out(frame: Grey, tank: Background, region: Bools | None = None) -> list[Standing]:
     """Return what differs from the tank in a frame, and which sign of animal it speaks for."""
     gain = tank.gain(frame)
     if abs(gain - 1) > 0:
@@ -202,7 +200,7 @@ def _step(image: Grey, piece: Piece) -> float:
     return float(part[piece.inside].mean() - np.median(part[piece.around]))
 
 
-def _ranked(values: Sequence[Sequence[float]], n: int) -> NDArray[np.float64]:
+def _ranked(values: Sequence[Sequence[float]], n: int) -> Floats:
     """Return the largest n of a frame, as they are in half of the frames; 0 for nothing.
 
     A hand is in some of the frames, and one of many pieces in those.
@@ -271,5 +269,5 @@ def _least_area(found: Sequence[Sequence[Standing]], n: int, signs: set[int]) ->
     """Return the area of the smallest of n + 1 pieces that is a blob by the usual measure."""
     areas = [[each.area_px for each in frame if each.sign in signs] for frame in found]
     ranked = _ranked(areas, n + 1)
-    blobs = ranked[ranked > USUAL_MIN_BLOB_PX]
+    blobs = ranked[ranked > _USUAL_MIN_BLOB_PX]
     return float(blobs[-1]) if len(blobs) else float("nan")

@@ -16,12 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Frame, Image
 from zfcal.errors import StorageError
 from zfcal.tracks import GUESS, ROBOT, AgentPose, FramePoses
-
-Floats = NDArray[np.float64]
 
 # Okabe and Ito's colours, which most people can tell apart; blue, green, red.
 _FISH_BGR = ((178, 114, 0), (233, 180, 86), (115, 158, 0), (66, 228, 240), (167, 121, 204))
@@ -33,7 +32,7 @@ _AHEAD_M = 0.002
 _BANNER_PX = 18
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
-SHEET_FRAMES = 12
+_SHEET_FRAMES = 12
 _SHEET_COLUMNS = 4
 _TILE_PX = 320
 _ROOM_PX = 40
@@ -246,7 +245,7 @@ class WorstFrames:
         How many.
     """
 
-    def __init__(self, number: int = SHEET_FRAMES) -> None:
+    def __init__(self, number: int = _SHEET_FRAMES) -> None:
         self._number = number
         self._kept: dict[int, tuple[float, float, Image]] = {}
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Bools
 from zfcal.cameras.camera import Projection
 
-BEYOND_M = 0.005
+_BEYOND_M = 0.005
 """A body that touches a wall seems to reach into it; its reflection lies farther out."""
 
 
-def region_of(
-    arena: Arena, projection: Projection, *, beyond_m: float = BEYOND_M
-) -> NDArray[np.bool_]:
+def region_of(arena: Arena, projection: Projection, *, beyond_m: float = _BEYOND_M) -> Bools:
     """Return the pixels that show the arena.
 
     Parameters

@@ -17,13 +17,11 @@ from typing import final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Frame, Image
 from zfcal.errors import InputError
-
-Floats = NDArray[np.float64]
 
 NEAR_M = 0.05
 """The overhead blob nearest to the LEDs is the robot, if it is no farther than this."""

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from zfcal.errors import InputError
 from zfcal.tracking.background import LEARN_FRAMES, LEARN_RATE, POLARITIES
 
-SHI_TOMASI = "shi-tomasi"
+_SHI_TOMASI = "shi-tomasi"
 SILHOUETTE = "silhouette"
-METHODS = (SHI_TOMASI, SILHOUETTE)
+METHODS = (_SHI_TOMASI, SILHOUETTE)
 
 Reason = Literal[
     "no background",
@@ -54,7 +54,7 @@ class TrackerOptions:
         How long a track that is not seen keeps its id, in seconds.
     """
 
-    method: str = SHI_TOMASI
+    method: str = _SHI_TOMASI
     n_agents: int | None = None
     min_blob_px: float | None = None
     harris: bool = False

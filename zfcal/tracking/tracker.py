@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Grey
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Frame
 from zfcal.cameras.plane import Plane
@@ -22,7 +22,6 @@ from zfcal.tracking.background import (
     LIGHT,
     Background,
     BackgroundLearner,
-    Grey,
     as_dark,
     grey_of,
     shows_nothing,
@@ -39,8 +38,6 @@ from zfcal.tracking.learning import Learnt, learn
 from zfcal.tracking.seen import BadFrame, Exchange, Reason, Seen, TrackerOptions
 from zfcal.tracking.trail import Detection
 from zfcal.tracking.usual import Bodies
-
-Floats = NDArray[np.float64]
 
 _HELD = 500
 """Frames that wait at most for a background; a camera that shows nothing fills no memory."""
@@ -81,7 +78,7 @@ class FishTracker:
         projection: Projection,
         *,
         background: Background | None = None,
-        region: NDArray[np.bool_] | None = None,
+        region: Bools | None = None,
     ) -> None:
         self.options = options
         self._plane = Plane(projection, projection.size_px)

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from zfcal.artifacts.atomic import write_text_whole
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
@@ -14,7 +15,6 @@ from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, CameraChoice
 from zfcal.stages.events import Made, Note, Tell, UpToDate
 from zfcal.stages.init import NewTrial, create_trial
-from zfcal.stages.segments import segment_path, segment_starts
 from zfcal.stages.simulate import SimulateOptions, simulate
 from zfcal.stages.track.plan import Pictures, TrackOptions
 from zfcal.stages.track.track import track

@@ -22,6 +22,7 @@ from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.images import read_image
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading.contents import hash_of
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import name_camera, read_trial
 from zfcal.artifacts.tables import read_tracks
 from zfcal.cameras.camera import Camera, Homography
@@ -31,7 +32,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.cameras import read_camera, write_camera
 from zfcal.stages.camera.messages import calibration_of
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
-from zfcal.stages.segments import STEP_S, segment_path, segment_starts
+from zfcal.stages.segments import STEP_S
 from zfcal.stages.stage import settled
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial, reason_to_make

@@ -6,10 +6,10 @@ import dataclasses
 from pathlib import Path
 
 from zfcal.artifacts.models import read_model
+from zfcal.artifacts.segments import segment_starts
 from zfcal.artifacts.settings import read_trial
 from zfcal.stages.events import Event, Planned, Tell
 from zfcal.stages.recording import starts_between
-from zfcal.stages.segments import segment_starts
 from zfcal.stages.simulate import SimulateOptions, new_trial, simulate
 from zfcal.stages.trial_context import Task
 from zfcal.virtual.film import FilmOptions, camera_names, film, frames_path, photograph_of

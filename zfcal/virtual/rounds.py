@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
+from zfcal.artifacts.segments import segment_starts
 from zfcal.calibrate.task import Settings
 from zfcal.online.worker import Worker
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.events import Tell
-from zfcal.stages.segments import segment_starts
 from zfcal.virtual.trial import Experiment
 
 _NICENESS = 5

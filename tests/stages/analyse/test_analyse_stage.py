@@ -10,10 +10,10 @@ from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.artifacts.tables import read_extra, read_table
 from zfcal.behaviour.located import locate
 from zfcal.behaviour.rows import scores_from_rows, statistics_from_rows
-from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import measure, measure_robot
 from zfcal.errors import InputError
+from zfcal.sampling import sample
 from zfcal.stages.analyse import analyse as stage
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Result, UpToDate

@@ -7,10 +7,10 @@ import pytest
 
 from zfcal.artifacts.models import read_model, read_result
 from zfcal.behaviour.located import locate
-from zfcal.behaviour.sampling import sample
 from zfcal.behaviour.statistics import measure
 from zfcal.errors import InputError
 from zfcal.parameters import n_genes
+from zfcal.sampling import sample
 from zfcal.stages.calibrate.holdout import (
     FixedModel,
     Span,

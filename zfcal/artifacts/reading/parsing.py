@@ -12,13 +12,13 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any, NoReturn
 
-DEEPEST = 100
+_DEEPEST = 100
 """Tables in tables, lists in lists: what people and zfcal write has fewer than ten."""
 
 _LONG_KEY = re.compile(r"(?:[\w\"'-]{1,64}[ \t]*\.[ \t]*){100}")
 """A dotted key of so many parts: the time that each takes grows with the square of them."""
 
-_TOO_DEEP = f"it nests deeper than {DEEPEST}"
+_TOO_DEEP = f"it nests deeper than {_DEEPEST}"
 
 
 def json_of(text: str | bytes, *, not_finite: bool = False) -> Any:
@@ -67,7 +67,7 @@ def toml_of(text: str) -> dict[str, Any]:
 def _check_values(value: object) -> None:
     """Refuse what later steps could not go through: deep nests, and numbers beyond 64 bits."""
     layer = [value]
-    for _ in range(DEEPEST):
+    for _ in range(_DEEPEST):
         for each in layer:
             if isinstance(each, int) and not -(2**63) <= each < 2**64:
                 message = f"the whole number {str(each)[:20]}... has more than 64 bits"

@@ -17,7 +17,7 @@ from zfcal.behaviour import features
 from zfcal.behaviour.features.statistic import Statistic
 from zfcal.errors import InputError
 
-GROUP = "zfcal.statistics"
+_GROUP = "zfcal.statistics"
 """Name of the entry points."""
 
 SCORED = ("D", "W", "O", "T")
@@ -78,7 +78,7 @@ def further(names: Sequence[str]) -> tuple[str, ...]:
 def _all() -> Iterator[Statistic]:
     # Ours is listed as an entry point too; this finds it where zfcal is not installed.
     yield from _statistics_of(features)
-    for point in sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value)):
+    for point in sorted(entry_points(group=_GROUP), key=lambda point: (point.name, point.value)):
         try:
             module = point.load()
         except Exception as error:

@@ -25,10 +25,10 @@ import numpy as np
 from zfcal.behaviour.features.statistic import Observed, Points, Statistic
 from zfcal.units import WINDOW_S
 
-MAX_GAP_S = 1.0
+_MAX_GAP_S = 1.0
 """Longer than this an animal must not be lost within a stay."""
 
-EDGES_S = (0.0, *(WINDOW_S / 2**halvings for halvings in range(8, -1, -1)))
+_EDGES_S = (0.0, *(WINDOW_S / 2**halvings for halvings in range(8, -1, -1)))
 """Each bin is twice as long as the one before, and the last ends with the window."""
 
 
@@ -41,7 +41,7 @@ def observe(points: Points) -> Iterator[Observed]:
     agent, zone, k = located.agent[own], located.zone[own], located.k[own]
     window = np.floor((k - located.k[0]) * located.dt_s / WINDOW_S + 1e-9)
     n_whole = int((k.max() - located.k[0] + 1) * located.dt_s / WINDOW_S + 1e-9)
-    most = int(MAX_GAP_S / located.dt_s + 1e-9) + 1
+    most = int(_MAX_GAP_S / located.dt_s + 1e-9) + 1
     goes_on = (np.diff(k) <= most) & (agent[1:] == agent[:-1])
     goes_on &= (zone[1:] == zone[:-1]) & (window[1:] == window[:-1])
     first = np.flatnonzero(np.concatenate([[True], ~goes_on]))
@@ -58,7 +58,7 @@ STATISTICS = (
         label="Residence times",
         phrase="the times of stay in a zone",
         observe=observe,
-        edges=lambda _: np.array(EDGES_S),
+        edges=lambda _: np.array(_EDGES_S),
         unit="s",
         title="Time of a stay",
         axis="time of a stay",

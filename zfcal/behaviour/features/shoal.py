@@ -18,14 +18,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Indices
 from zfcal.behaviour.features.statistic import Observed, Points, Statistic, lengths
 from zfcal.behaviour.histograms import bin_edges
 from zfcal.units import HEADING_MIN_STEP_M
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 def observe_spread(points: Points) -> Iterator[Observed]:

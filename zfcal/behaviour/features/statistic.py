@@ -11,17 +11,12 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import N_BINS, Arena
+from zfcal.arrays import Bools, Floats, Indices, Ints
 from zfcal.behaviour.histograms import bin_of, similarity
 from zfcal.behaviour.located import Located
 from zfcal.errors import InputError
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 GROUP_ROW = "all"
 """What the zone column says of a statistic that belongs to the group and to no zone."""

@@ -12,16 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from zfcal.arena import Arena, Zone
+from zfcal.arrays import Floats
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture, write_picture
 
-Field = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+_Field = tuple[Floats, Floats, Floats]
 
-WIDTH_IN = 5.4
+_WIDTH_IN = 5.4
 _TALLEST_IN = 6.4
 _GRID_POINTS = 240
 _NICE_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
@@ -45,7 +45,7 @@ def draw_arena(arena: Arena, path: Path) -> None:
     write_picture(arena_picture(arena), path)
 
 
-def arena_picture(arena: Arena, *, width_in: float = WIDTH_IN) -> Picture:
+def arena_picture(arena: Arena, *, width_in: float = _WIDTH_IN) -> Picture:
     """Return the tank as a picture of one panel, with the zones as its key."""
     return Picture(
         name="arena",
@@ -156,7 +156,7 @@ def paint_zones(axes: Axes, arena: Arena, *, alpha: float) -> None:
             )
 
 
-def _draw(axes: Axes, arena: Arena, width_in: float, field: Field) -> None:
+def _draw(axes: Axes, arena: Arena, width_in: float, field: _Field) -> None:
     axes.grid(visible=False)
     paint_walls(axes, arena)
     paint_zones(axes, arena, alpha=0.35)
@@ -165,7 +165,7 @@ def _draw(axes: Axes, arena: Arena, width_in: float, field: Field) -> None:
     _paint_scale(axes, arena)
 
 
-def _distance_field(arena: Arena) -> Field:
+def _distance_field(arena: Arena) -> _Field:
     """Return x, y and the distance to the wall on a grid, NaN outside, in metres."""
     x0, y0, x1, y1 = arena.outline.bounds
     x_m, y_m = np.meshgrid(np.linspace(x0, x1, _GRID_POINTS), np.linspace(y0, y1, _GRID_POINTS))
@@ -174,7 +174,7 @@ def _distance_field(arena: Arena) -> Field:
     return x_m, y_m, distance_m
 
 
-def _paint_distances(axes: Axes, arena: Arena, field: Field) -> None:
+def _paint_distances(axes: Axes, arena: Arena, field: _Field) -> None:
     x_m, y_m, distance_m = field
     step_m = contour_step_m(arena)
     levels = np.arange(step_m, np.nanmax(distance_m), step_m)

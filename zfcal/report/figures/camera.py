@@ -9,12 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.cameras.calibration import Calibration
 from zfcal.cameras.calibration_boards import LensCalibration
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture, write_picture
-
-Floats = NDArray[np.float64]
 
 _ARROW_SHARE = 0.06
 """An error of usual size is drawn as long as this share of the picture."""

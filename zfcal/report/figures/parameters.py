@@ -11,14 +11,11 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, gene_names, gene_scales, to_genes
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Mark, Panel, Picture
 from zfcal.report.views import Round
-
-Floats = NDArray[np.float64]
 
 _OWN = (
     ("kappa_0", "kappa_0: keeps its direction", KAPPA_0_MAX),

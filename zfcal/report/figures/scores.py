@@ -15,8 +15,8 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture
 from zfcal.report.views import (
@@ -31,10 +31,8 @@ from zfcal.report.views import (
     TrialView,
 )
 
-Floats = NDArray[np.float64]
-
-COLOURS = MappingProxyType({MODEL: theme.MODEL, SOCIAL: theme.GROUP, ROBOT: theme.ROBOT})
-NAMES = MappingProxyType(
+_COLOURS = MappingProxyType({MODEL: theme.MODEL, SOCIAL: theme.GROUP, ROBOT: theme.ROBOT})
+_NAMES = MappingProxyType(
     {
         MODEL: "calibrated model against the fish",
         SOCIAL: "fish with robot against the fish alone",
@@ -73,12 +71,12 @@ class Line:
         How many trials have a value for the window.
     """
 
-    end_s: NDArray[np.int64]
+    end_s: Ints
     value: Floats
     low: Floats
     high: Floats
     ceiling: Floats
-    n_trials: NDArray[np.int64]
+    n_trials: Ints
 
 
 def scores_picture(
@@ -162,7 +160,7 @@ def pool(courses: Sequence[Course]) -> Line:
     )
 
 
-def _spread(courses: Sequence[Course], end_s: NDArray[np.int64], part: str) -> Floats:
+def _spread(courses: Sequence[Course], end_s: Ints, part: str) -> Floats:
     """Return one column of all courses on common windows, shape (trial, window)."""
     table = np.full((len(courses), len(end_s)), np.nan)
     for row, course in zip(table, courses, strict=True):
@@ -170,7 +168,7 @@ def _spread(courses: Sequence[Course], end_s: NDArray[np.int64], part: str) -> F
     return table
 
 
-def _mean(table: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _mean(table: Floats) -> tuple[Floats, Ints]:
     known = ~np.isnan(table)
     n = known.sum(axis=0)
     total = np.where(known, table, 0.0).sum(axis=0)
@@ -195,7 +193,7 @@ def _bottom(lines: Sequence[Line]) -> float:
 
 def _draw(axes: Axes, *, lines: dict[str, Line], feature: str, bottom: float) -> None:
     for compared, line in lines.items():
-        _draw_line(axes, line, COLOURS[compared], own_band=len(lines) > 1)
+        _draw_line(axes, line, _COLOURS[compared], own_band=len(lines) > 1)
     ends_s = np.concatenate([line.end_s[~np.isnan(line.value)] for line in lines.values()])
     if not ends_s.size:
         axes.text(0.5, 0.5, "no count on either side", ha="center", transform=axes.transAxes)
@@ -222,7 +220,7 @@ def _draw_line(axes: Axes, line: Line, colour: str, *, own_band: bool) -> None:
     axes.plot(minute, line.value, color=colour, marker=marker)
 
 
-def _draw_published(axes: Axes, ends_s: NDArray[np.int64]) -> None:
+def _draw_published(axes: Axes, ends_s: Ints) -> None:
     last_s = max(int(ends_s.max(initial=0)), PUBLISHED_S[-1][0])
     seconds, values = zip(*PUBLISHED_S, strict=True)
     minutes = [second / _S_PER_MIN for second in seconds]
@@ -236,21 +234,21 @@ def _key(lines: dict[CourseKey, Line], shown: Sequence[str], *, several: bool) -
     mean = "mean over trials: " if several else ""
     entries = [
         Entry(
-            label=mean + NAMES[key],
-            colour=COLOURS[key],
+            label=mean + _NAMES[key],
+            colour=_COLOURS[key],
             mark="line",
-            marker=theme.MARKER_OF[COLOURS[key]],
+            marker=theme.MARKER_OF[_COLOURS[key]],
         )
         for key in shown
     ]
     single = len(shown) == 1
     if any(not np.isnan(line.low).all() for line in lines.values()):
         text = "one standard deviation" if several else _BANDS[shown[-1]]
-        colour = theme.BAND if single else COLOURS[shown[-1]]
+        colour = theme.BAND if single else _COLOURS[shown[-1]]
         entries.append(Entry(label=text, colour=colour, mark="band"))
     if any(not np.isnan(line.ceiling).all() for line in lines.values()):
         text = ("mean " if several else "") + _CEILINGS[shown[-1]]
-        colour = theme.BAND if single else COLOURS[shown[-1]]
+        colour = theme.BAND if single else _COLOURS[shown[-1]]
         entries.append(Entry(label=text, colour=colour, mark="dash"))
     if MODEL in shown:
         entries.append(
@@ -285,7 +283,7 @@ def _describe(text: str, lines: dict[str, Line]) -> str:
         if known.any():
             values = line.value[known]
             said.append(
-                f"{NAMES[compared]}: {known.sum()} windows, first {values[0]:.2f}, last "
+                f"{_NAMES[compared]}: {known.sum()} windows, first {values[0]:.2f}, last "
                 f"{values[-1]:.2f}, mean {values.mean():.2f}"
             )
     return f"{text} over time. " + ("; ".join(said) or "No value") + "."

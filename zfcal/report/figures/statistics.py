@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.features.statistic import Statistic
 from zfcal.behaviour.histograms import frequencies
@@ -21,13 +21,11 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
 
-Floats = NDArray[np.float64]
-
-FISH_CASE = "fish"
-MODEL_CASE = "model"
-ROBOT_CASE = "robot"
-COLOURS = MappingProxyType(
-    {FISH_CASE: theme.FISH, MODEL_CASE: theme.MODEL, ROBOT_CASE: theme.ROBOT}
+_FISH_CASE = "fish"
+_MODEL_CASE = "model"
+_ROBOT_CASE = "robot"
+_COLOURS = MappingProxyType(
+    {_FISH_CASE: theme.FISH, _MODEL_CASE: theme.MODEL, _ROBOT_CASE: theme.ROBOT}
 )
 _MANY_ZONES = 5
 _READING = (
@@ -52,7 +50,7 @@ class _Histogram:
         What is counted; says how two cases are compared.
     """
 
-    counts: Mapping[str, NDArray[np.int64]]
+    counts: Mapping[str, Ints]
     edges: Floats
     axis: str
     statistic: Statistic
@@ -91,7 +89,7 @@ def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena)
         if statistic.name in stats.names
         and stats.of(statistic.name).shape == statistic.shape(arena)
     }
-    if FISH_CASE not in counts:
+    if _FISH_CASE not in counts:
         return
     if statistic.form == "zones":
         yield _occupation(statistic, counts, arena.zone_names)
@@ -102,9 +100,7 @@ def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena)
         yield from _histograms(statistic, counts, arena)
 
 
-def _histograms(
-    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], arena: Arena
-) -> Iterator[Panel]:
+def _histograms(statistic: Statistic, counts: Mapping[str, Ints], arena: Arena) -> Iterator[Panel]:
     colours = theme.zone_colours(arena.zone_names)
     edges = statistic.edges_in(arena)
     unit = f" ({statistic.unit})" if statistic.unit else ""
@@ -123,26 +119,26 @@ def _histograms(
 
 def _note(cases: Mapping[str, Statistics]) -> str:
     parts = [_READING]
-    if MODEL_CASE in cases:
+    if _MODEL_CASE in cases:
         parts.append(
             "The number in a panel is the similarity of fish and model there, 1 for equal."
         )
-    if ROBOT_CASE in cases:
+    if _ROBOT_CASE in cases:
         parts.append("For the robot, distances between two fish are those of robot and fish.")
     return " ".join(parts)
 
 
 def _entry(case: str) -> Entry:
     labels = {
-        FISH_CASE: "fish, as observed",
-        MODEL_CASE: "calibrated model, long simulation",
-        ROBOT_CASE: "robot, as observed",
+        _FISH_CASE: "fish, as observed",
+        _MODEL_CASE: "calibrated model, long simulation",
+        _ROBOT_CASE: "robot, as observed",
     }
-    if case == FISH_CASE:
-        return Entry(label=labels[case], colour=COLOURS[case], mark="bar")
-    mark: Mark = "line" if case == MODEL_CASE else "dot"
-    marker = theme.MARKER_OF[COLOURS[case]]
-    return Entry(label=labels[case], colour=COLOURS[case], mark=mark, marker=marker)
+    if case == _FISH_CASE:
+        return Entry(label=labels[case], colour=_COLOURS[case], mark="bar")
+    mark: Mark = "line" if case == _MODEL_CASE else "dot"
+    marker = theme.MARKER_OF[_COLOURS[case]]
+    return Entry(label=labels[case], colour=_COLOURS[case], mark=mark, marker=marker)
 
 
 def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
@@ -163,7 +159,7 @@ def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
     )
 
 
-def histogram_mean(counts: NDArray[np.int64], edges: Floats) -> float:
+def histogram_mean(counts: Ints, edges: Floats) -> float:
     """Return the mean that a histogram tells, from the centres of its bins.
 
     Parameters
@@ -205,13 +201,13 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
         if np.isnan(share).all():
             continue
         top = max(top, float(share.max()))
-        if case == FISH_CASE:
+        if case == _FISH_CASE:
             width = 0.92 * (edges[1] - edges[0])
-            axes.bar(centres, share, width=width, color=COLOURS[case], alpha=0.45, lw=0)
+            axes.bar(centres, share, width=width, color=_COLOURS[case], alpha=0.45, lw=0)
         else:
-            style = "-" if case == MODEL_CASE else ":"
-            marker = theme.MARKER_OF[COLOURS[case]]
-            axes.plot(centres, share, color=COLOURS[case], ls=style, marker=marker)
+            style = "-" if case == _MODEL_CASE else ":"
+            marker = theme.MARKER_OF[_COLOURS[case]]
+            axes.plot(centres, share, color=_COLOURS[case], ls=style, marker=marker)
     limits = (float(edges[0]), float(edges[-1]))
     axes.set(xlabel=shown.axis, ylabel="share", xlim=limits, ylim=(0, top * 1.22 or 1))
     if is_even:
@@ -221,7 +217,7 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
     _remark(axes, shown.counts, shown.statistic)
 
 
-def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]], statistic: Statistic) -> None:
+def _remark(axes: Axes, counts: Mapping[str, Ints], statistic: Statistic) -> None:
     """Write how alike fish and model are, or who was never seen here."""
     empty = [case for case, values in counts.items() if not values.sum()]
     text = ""
@@ -229,15 +225,13 @@ def _remark(axes: Axes, counts: Mapping[str, NDArray[np.int64]], statistic: Stat
         text = "none seen"
     elif empty:
         text = "none seen: " + ", ".join(empty)
-    elif {FISH_CASE, MODEL_CASE} <= counts.keys():
-        alike = float(statistic.compare(counts[FISH_CASE], counts[MODEL_CASE]))
+    elif {_FISH_CASE, _MODEL_CASE} <= counts.keys():
+        alike = float(statistic.compare(counts[_FISH_CASE], counts[_MODEL_CASE]))
         text = f"similarity {alike:.2f}"
     axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
 
 
-def _occupation(
-    statistic: Statistic, counts: Mapping[str, NDArray[np.int64]], zones: Sequence[str]
-) -> Panel:
+def _occupation(statistic: Statistic, counts: Mapping[str, Ints], zones: Sequence[str]) -> Panel:
     shares = {case: frequencies(values) for case, values in counts.items()}
     said = "; ".join(
         f"{case} " + ", ".join(f"{zone} {s:.0%}" for zone, s in zip(zones, share, strict=True))
@@ -256,18 +250,18 @@ def _draw_occupation(
     axes: Axes,
     *,
     statistic: Statistic,
-    counts: Mapping[str, NDArray[np.int64]],
+    counts: Mapping[str, Ints],
     zones: Sequence[str],
 ) -> None:
     at = np.arange(len(zones))
     width = 0.8 / len(counts)
-    hatches = {ROBOT_CASE: "....", MODEL_CASE: "////"}
+    hatches = {_ROBOT_CASE: "....", _MODEL_CASE: "////"}
     top = 0.0
     for index, (case, values) in enumerate(counts.items()):
         share = 100 * np.nan_to_num(frequencies(values))
         top = max(top, float(share.max()))
         x = at + (index - (len(counts) - 1) / 2) * width
-        bars = axes.bar(x, share, width=0.92 * width, color=COLOURS[case], alpha=0.45, lw=0)
+        bars = axes.bar(x, share, width=0.92 * width, color=_COLOURS[case], alpha=0.45, lw=0)
         if case in hatches:
             for bar in bars:
                 bar.set(hatch=hatches[case], edgecolor=theme.GROUND, alpha=0.6)
@@ -285,9 +279,7 @@ def _draw_occupation(
     _remark(axes, counts, statistic)
 
 
-def _transitions(
-    statistic: Statistic, case: str, counts: NDArray[np.int64], *, zones: Sequence[str]
-) -> Panel:
+def _transitions(statistic: Statistic, case: str, counts: Ints, *, zones: Sequence[str]) -> Panel:
     share = frequencies(counts)
     stays = ", ".join(
         f"{zone} {share[z, z]:.0%}" for z, zone in enumerate(zones) if not np.isnan(share[z, z])
@@ -297,7 +289,7 @@ def _transitions(
         alt=f"Table of transitions of the {case} between zones; stays: {stays or 'none seen'}.",
         draw=partial(_draw_transitions, share=share, zones=zones),
         size_in=(PANEL_IN[0], max(PANEL_IN[1], 0.5 * len(zones) + 1.1)),
-        colour=COLOURS[case],
+        colour=_COLOURS[case],
     )
 
 

@@ -25,9 +25,11 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
+from zfcal.arrays import Ints
+
 INK = "#1b1f24"
 MUTED = "#59636e"
-GRID = "#dde2e8"
+_GRID = "#dde2e8"
 GROUND = "#ffffff"
 BAND = "#8b95a1"
 """The ceiling, its interval and the spread over trials."""
@@ -44,7 +46,7 @@ THEME: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         INK: ("ink", INK, "#e8ebef"),
         MUTED: ("muted", MUTED, "#a3adb8"),
-        GRID: ("grid", GRID, "#343b43"),
+        _GRID: ("grid", _GRID, "#343b43"),
         GROUND: ("ground", GROUND, "#16191d"),
         BAND: ("band", BAND, "#7d8793"),
         FISH: ("fish", FISH, "#a9cdec"),
@@ -61,7 +63,7 @@ THEME: Mapping[str, tuple[str, str, str]] = MappingProxyType(
 )
 """For each colour of a figure: its name on the page, light and dark."""
 
-ZONE_MARKERS = ("o", "s", "D", "^", "v", "P")
+_ZONE_MARKERS = ("o", "s", "D", "^", "v", "P")
 MARKER_OF = MappingProxyType({FISH: "o", MODEL: "^", ROBOT: "s", GROUP: "D"})
 
 _KNOWN_ZONES = {"corridor": 0, "walls": 1, "centre": 2, "inner": 0, "middle": 1, "outer": 2}
@@ -83,7 +85,7 @@ _STYLE: dict[str, Any] = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.linewidth": 0.8,
-    "grid.color": GRID,
+    "grid.color": _GRID,
     "grid.linewidth": 0.7,
     "xtick.color": MUTED,
     "ytick.color": MUTED,
@@ -111,7 +113,7 @@ _REM_PER_PT = 1 / 11.6
 """A letter of 12 points is a little larger than one of 16 pixels."""
 
 
-def zone_numbers(names: Sequence[str]) -> dict[str, int]:
+def _zone_numbers(names: Sequence[str]) -> dict[str, int]:
     """Return for each zone the number of its colour and marker.
 
     Zones of the arenas that come with zfcal keep theirs in every arena; others
@@ -130,12 +132,12 @@ def zone_numbers(names: Sequence[str]) -> dict[str, int]:
 
 def zone_colours(names: Sequence[str]) -> dict[str, str]:
     """Return the colour of each zone, in the order given."""
-    return {name: ZONES[number] for name, number in zone_numbers(names).items()}
+    return {name: ZONES[number] for name, number in _zone_numbers(names).items()}
 
 
 def zone_markers(names: Sequence[str]) -> dict[str, str]:
     """Return the marker of each zone, in the order given."""
-    return {name: ZONE_MARKERS[number] for name, number in zone_numbers(names).items()}
+    return {name: _ZONE_MARKERS[number] for name, number in _zone_numbers(names).items()}
 
 
 @contextmanager
@@ -168,9 +170,7 @@ def wrapped(name: str) -> str:
     return "\n".join(textwrap.wrap(name.replace("_", " "), 11, break_long_words=False)) or name
 
 
-def name_ticks(
-    axes: Axes, at: NDArray[np.int64] | NDArray[np.floating], names: Sequence[str]
-) -> None:
+def name_ticks(axes: Axes, at: Ints | NDArray[np.floating], names: Sequence[str]) -> None:
     """Put names below an x axis, slanted where they would run into each other."""
     labels = [wrapped(name) for name in names]
     longest = max(len(line) for label in labels for line in label.split("\n"))

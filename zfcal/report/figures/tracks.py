@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import PowerNorm
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.behaviour.located import Located
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls, paint_zones
@@ -20,8 +20,6 @@ from zfcal.report.figures.panels import Entry, Panel, Picture
 from zfcal.report.seen import Seen, Visits, grid_of
 from zfcal.tracks import FISH, KINDS, ROBOT
 from zfcal.units import WINDOW_S
-
-Floats = NDArray[np.float64]
 
 _WIDTH_IN = 3.4
 _BAR_IN = 0.6

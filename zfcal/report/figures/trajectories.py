@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats, Ints
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls
 from zfcal.tracks import GUESS, KINDS, ROBOT, Tracks
-
-Floats = NDArray[np.float64]
 
 _WIDTH_IN = 4.6
 _TIMES_IN = 3.4
@@ -82,7 +80,7 @@ def _bar(time_s: Floats, row: int) -> Floats:
     return np.array([(time_s[0], row), (time_s[-1], row)])
 
 
-def unbroken(frame: NDArray[np.int64]) -> Iterator[slice]:
+def unbroken(frame: Ints) -> Iterator[slice]:
     """Yield the runs of frames without a gap.
 
     >>> list(unbroken(np.array([3, 4, 7, 8, 9])))

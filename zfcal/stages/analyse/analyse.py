@@ -16,6 +16,7 @@ from zfcal.arena import VOID
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.segments import segment_name, segment_path
 from zfcal.artifacts.tables import make_table, write_table
 from zfcal.behaviour.features.registry import COUNTED, further, ordered
 from zfcal.behaviour.located import Located, join
@@ -24,14 +25,7 @@ from zfcal.errors import InputError
 from zfcal.stages.analyse.control import ControlGroup
 from zfcal.stages.analyse.scoring import SCORINGS, Window, scores_of
 from zfcal.stages.events import Event, LeftOut, Note, Result, Tell
-from zfcal.stages.segments import (
-    Pooled,
-    Segments,
-    readable,
-    segment_hashes,
-    segment_name,
-    segment_path,
-)
+from zfcal.stages.segments import Pooled, Segments, readable, segment_hashes
 from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.stages.windows import starts_of, whole_segments, window_ends

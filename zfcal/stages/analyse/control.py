@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON
+from zfcal.artifacts.segments import segment_path
 from zfcal.behaviour.legacy import LegacyStatistics, measure_legacy
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.errors import InputError
 from zfcal.stages.events import Tell
-from zfcal.stages.segments import STEP_S, Segments, segment_hashes, segment_path
+from zfcal.stages.segments import STEP_S, Segments, segment_hashes
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.stages.windows import whole_segments
 

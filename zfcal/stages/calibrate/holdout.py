@@ -14,6 +14,7 @@ from zfcal.arrays import Floats, Seeds
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
@@ -40,7 +41,7 @@ from zfcal.stages.calibrate.searching import (
     run_search,
 )
 from zfcal.stages.events import Event, Result, Tell
-from zfcal.stages.segments import STEP_S, Segments, guess_options, segment_path, segment_starts
+from zfcal.stages.segments import STEP_S, Segments, guess_options
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH

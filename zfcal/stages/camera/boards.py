@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.artifacts.atomic import write_bytes_whole
 from zfcal.artifacts.images import read_image
 from zfcal.cameras.boards import Board, draw_board, find_board
@@ -19,7 +20,7 @@ from zfcal.cameras.calibration import Calibration
 from zfcal.cameras.calibration_boards import LensCalibration, calibrate_lens
 from zfcal.cameras.calibration_points import calibrate_pose
 from zfcal.cameras.handedness import BELOW
-from zfcal.cameras.lens import Floats, shown_size
+from zfcal.cameras.lens import shown_size
 from zfcal.cameras.pairs import Pairs
 from zfcal.cameras.poses import View
 from zfcal.cameras.video import encoded

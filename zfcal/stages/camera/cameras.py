@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from zfcal.arrays import Floats
 from zfcal.artifacts.cameras import CameraFile, read_camera_file, write_camera_file
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.cameras.camera import Camera, Homography
-from zfcal.cameras.lens import Floats, Lens
+from zfcal.cameras.lens import Lens
 from zfcal.errors import DamagedError, InputError
 
 HOMOGRAPHY = "homography"

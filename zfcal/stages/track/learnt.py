@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from zfcal.artifacts.lineage import JSON
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Note
-from zfcal.stages.segments import segment_path, segment_starts
 from zfcal.tracking.background import DARK, EITHER, LIGHT, POLARITIES
 from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker

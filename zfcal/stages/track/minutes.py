@@ -14,11 +14,12 @@ from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
 from zfcal.artifacts.reading.contents import check_contents, numbered_of, open_regular
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import LeftOut, Made, Note, Tell, UpToDate
 from zfcal.stages.recording import STRETCH_KEY
-from zfcal.stages.segments import END_KEY, STEP_S, segment_path, segment_starts
+from zfcal.stages.segments import END_KEY, STEP_S
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.trial_context import OpenTrial, Task, reason_to_make
 from zfcal.tracks import FramePoses, Tracks, tracks_of

@@ -10,9 +10,10 @@ from pathlib import Path
 from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.pose_files import read_clock
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Note, Tell
-from zfcal.stages.segments import STEP_S, segment_path, segment_starts
+from zfcal.stages.segments import STEP_S
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.track.learnt import learnt_before
 from zfcal.stages.track.minutes import Minutes, next_agent_of, pose_files, unfinished

@@ -8,11 +8,11 @@ from pathlib import Path
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.reading.contents import Contents, one_content
+from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.cameras.live import ArrivalClock
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Planned, Tell, UpToDate
 from zfcal.stages.recording import check_same_source, starts_between, stretch_of
-from zfcal.stages.segments import segment_path, segment_starts
 from zfcal.stages.stage import settled
 from zfcal.stages.track.following import Following
 from zfcal.stages.track.minutes import Origins, pose_files, poses_reason

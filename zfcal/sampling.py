@@ -10,16 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
 from zfcal.tracks import Samples, Tracks
 
 _SLACK = 1e-6
 """Share of a frame or a step below which a difference of times is rounding."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def sample_range(start_s: float, end_s: float, *, dt_s: float) -> tuple[int, int]:
@@ -108,7 +105,7 @@ def _frames(tracks: Tracks) -> tuple[Ints, Floats]:
     return first, tracks.time_s[first]
 
 
-def _refuse(wrong: NDArray[np.bool_], tracks: Tracks, rule: str) -> None:
+def _refuse(wrong: Bools, tracks: Tracks, rule: str) -> None:
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
         a, b = (

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from zfcal.behaviour.sampling import sample, sample_range
 from zfcal.errors import InputError
+from zfcal.sampling import sample, sample_range
 from zfcal.tracks import FISH, ROBOT, Tracks
 
 
