@@ -24,11 +24,16 @@ if TYPE_CHECKING:
     from zfcal.stages.streams import Work
 
 
-@click.command("diagnose")
+def _listed(name: str) -> str:
+    """Return the name by which help lists an option; an earlier one goes on working."""
+    return "null-replicates" if name == "null" else name
+
+
+@click.command("diagnose", context_settings={"token_normalize_func": _listed})
 @takes_trials
 @click.option("--model", type=EXISTING, help="Another model than that of the newest round.")
 @click.option(
-    "--null",
+    "--null-replicates",
     "n_null",
     type=click.Choice(["39", "199"]),
     default="39",
