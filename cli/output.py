@@ -107,7 +107,7 @@ class Output:
         trace: TracebackType | None,
     ) -> None:
         logging.getLogger("zfcal").removeHandler(self._handler)
-        self._bars.close()
+        self._bars.clear()
         if isinstance(error, BrokenPipeError):
             raise ReaderGoneError from error
         if error is not None:
