@@ -26,7 +26,6 @@ from zfcal.online.watch_events import (
     WatchTell,
     told_by,
 )
-from zfcal.online.watch_running import Running, begin
 from zfcal.online.watch_stages import (
     ANALYSE,
     CALIBRATE,
@@ -34,8 +33,10 @@ from zfcal.online.watch_stages import (
     NICENESS,
     TRACK,
     Outcome,
+    Running,
     Turn,
     WatchOptions,
+    begin,
     has_ended,
 )
 from zfcal.online.worker import Done, Failure, Worker

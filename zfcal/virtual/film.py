@@ -28,8 +28,8 @@ from zfcal.cameras.camera import Camera, Homography
 from zfcal.cameras.frames import Image
 from zfcal.cameras.rig import below_camera, overhead_camera
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.camera.cameras import read_camera, write_camera
-from zfcal.stages.camera.messages import calibration_of
+from zfcal.stages.camera.cameras import calibration_of, read_camera, write_camera
+from zfcal.stages.camera.rig import BELOW, OVERHEAD
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
 from zfcal.stages.segments import STEP_S, segment_path, segment_starts
 from zfcal.stages.stage import settled
@@ -42,7 +42,6 @@ from zfcal.virtual.images.render import OverheadPainter
 from zfcal.virtual.images.render_below import BelowPainter
 from zfcal.virtual.images.swimming import Moment, Swimming, swimming
 
-OVERHEAD, BELOW = "overhead", "below"
 COMMAND = "simulate"
 
 _TOLD_EVERY = 15

@@ -22,10 +22,11 @@ from zfcal.artifacts.reading.contents import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.cameras.frames import Image
 from zfcal.errors import DamagedError, InputError, StorageError
+from zfcal.stages.camera.rig import BELOW
 from zfcal.stages.events import Made, Planned, Progress, Tell, UpToDate
 from zfcal.stages.stage import settled
 from zfcal.stages.trial_context import Task
-from zfcal.virtual.film import BELOW, camera_names, frames_folder
+from zfcal.virtual.film import camera_names, frames_folder
 
 SCHEMA = "zfcal.video/1"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from zfcal.artifacts.cameras import CameraFile, read_camera_file, write_camera_file
+from zfcal.artifacts.frame_files import Calibration
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
-from zfcal.cameras.camera import Camera, Homography
+from zfcal.cameras.camera import FISHEYE, Camera, Homography
 from zfcal.cameras.lens import Floats, Lens
 from zfcal.errors import DamagedError, InputError
 
 HOMOGRAPHY = "homography"
+_PLUMB_BOB, _RATIONAL = 5, 8
 
 SIDE_KEY = "seen_from"
 """Option in the lineage of a camera that looks from another side than its name says."""
@@ -172,3 +175,32 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{path}: {error}", hint=error.hint) from error
+
+
+def calibration_of(camera: Camera | Homography | None) -> Calibration | None:
+    """Return a camera's calibration in the viewers' words.
+
+    Returns
+    -------
+    Calibration or None
+        None for a camera that they have no word for: a homography, or a lens of
+        12 or 14 coefficients of which the last ones are not zero.
+    """
+    if not isinstance(camera, Camera):
+        return None
+    matrix = tuple(float(value) for value in itertools.chain.from_iterable(camera.matrix))
+    said = list(camera.distortion)
+    if camera.model == FISHEYE:
+        model = "kannala_brandt"
+    elif len(said) <= _PLUMB_BOB:
+        model, said = "plumb_bob", said + [0.0] * (_PLUMB_BOB - len(said))
+    elif not any(said[_RATIONAL:]):
+        model, said = "rational_polynomial", said[:_RATIONAL]
+    else:
+        return None
+    return Calibration(
+        size_px=camera.size_px,
+        distortion_model=model,
+        distortion=tuple(map(float, said)),
+        matrix=matrix,
+    )
