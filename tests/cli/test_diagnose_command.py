@@ -7,11 +7,10 @@ import pytest
 
 from zfcal.artifacts.validation import check
 from zfcal.diagnose.findings import Note
-from zfcal.stages.diagnose.diagnose import KnownNoise
 
 
 @pytest.fixture
-def answered(monkeypatch, make_diagnosis):
+def answered(monkeypatch, plain, make_diagnosis):
     """Answer every question with a diagnosis made by hand, without noise and pictures."""
     questions = []
 
@@ -20,16 +19,6 @@ def answered(monkeypatch, make_diagnosis):
         return make_diagnosis(question.arena, question.model)
 
     monkeypatch.setattr("zfcal.stages.diagnose.diagnose._engine", engine)
-    monkeypatch.setattr(
-        "zfcal.stages.diagnose.diagnose._estimate",
-        lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
-    )
-    monkeypatch.setattr(
-        "zfcal.report.diagnosis.drawing.png_of", lambda picture: picture.title.encode()
-    )
-    monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
-    # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)
     return questions
 
 
