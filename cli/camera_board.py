@@ -14,7 +14,7 @@ from .options import EXISTING, PLACE, POSITIVE, adds, makes_artifacts, speaks
 from .output import Output
 
 
-def corners(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
+def _corners(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
     """Return columns and rows from ``9x6``."""
     match = re.fullmatch(r"(\d+)x(\d+)", text.strip())
     if match is None:
@@ -35,7 +35,7 @@ def _place_in_tank(
 _board_options = adds(
     click.option(
         "--board",
-        callback=corners,
+        callback=_corners,
         required=True,
         metavar="CxR",
         help="Inner corners, such as 9x6 for 10 by 7 squares.",

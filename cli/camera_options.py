@@ -33,7 +33,7 @@ def numbers(text: str, count: int) -> tuple[float, ...]:
     return values
 
 
-def size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
     """Return width and height from ``640x480``."""
     if text is None:
         return None
@@ -50,7 +50,7 @@ def box(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float,
 
 image_options = adds(
     click.option(
-        "--size", callback=size, metavar="WxH", help="Of the camera's images, such as 640x480."
+        "--size", callback=_size, metavar="WxH", help="Of the camera's images, such as 640x480."
     ),
     click.option("--image", type=EXISTING, help="A picture of the tank by that camera."),
 )

@@ -32,7 +32,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-class Fours(click.IntRange):
+class _Fours(click.IntRange):
     """Whole numbers from four on that four divides: two tournaments of two make one pair."""
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ takes_trials = click.argument("trials", nargs=-1, required=True, metavar="TRIAL.
 
 
 population_option = click.option(
-    "--population", type=Fours(), default=60, show_default=True, help="A multiple of four."
+    "--population", type=_Fours(), default=60, show_default=True, help="A multiple of four."
 )
 
 workers_option = click.option(

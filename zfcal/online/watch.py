@@ -88,7 +88,7 @@ def watch(root: Path, options: WatchOptions, tell: WatchTell) -> list[of.LeftOut
         polls = reason_to_poll(root, asked=options.poll)
         hints = Hints(root, polls=polls is not None)
         stack.callback(hints.close)
-        loop = Watch(root, options, tell, hints=hints)
+        loop = _Watch(root, options, tell, hints=hints)
         stack.callback(loop.close)
         loop.begin(polls)
         while not loop.is_over():
@@ -97,7 +97,7 @@ def watch(root: Path, options: WatchOptions, tell: WatchTell) -> list[of.LeftOut
 
 
 @final
-class Watch:
+class _Watch:
     """One run of a watch.
 
     Parameters

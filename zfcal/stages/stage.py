@@ -145,7 +145,7 @@ class Draft:
     write: Write
 
 
-def nothing() -> None:
+def _nothing() -> None:
     """Do nothing: for things that are finished when their files are there."""
 
 
@@ -169,7 +169,7 @@ class Item:
 
     outputs: Sequence[Output]
     compute: Callable[[], Iterable[Draft]]
-    finish: Callable[[], None] = nothing
+    finish: Callable[[], None] = _nothing
     apart: bool = False
 
 

@@ -48,7 +48,7 @@ from zfcal.virtual.trial import (
     robot_of,
 )
 
-ROUND_S = 55.0
+_ROUND_S = 55.0
 """After so many seconds a rig has analysed and calibrated a window that has ended."""
 
 _TOLD_EVERY = 150
@@ -89,7 +89,7 @@ def closed_loop(
     clear(experiment)
     with rounds_beside(experiment, tell) as rounds:
         with robot_of(experiment, stepped=True) as robot:
-            driver = LockstepDriver(experiment.trial, robot.port, tell, after_s=ROUND_S)
+            driver = _LockstepDriver(experiment.trial, robot.port, tell, after_s=_ROUND_S)
             try:
                 _run(_Parts(experiment, robot, driver, rounds), tell)
             finally:
@@ -100,7 +100,7 @@ def closed_loop(
 
 
 @final
-class LockstepDriver:
+class _LockstepDriver:
     """Does at each frame what ``zfcal drive --clock poses`` does, and logs it likewise.
 
     It is handed each frame in turn: no waiting, no watchdog, the poses' clock.
@@ -163,16 +163,20 @@ class _Parts(NamedTuple):
 
     experiment: Experiment
     robot: VirtualProcess
-    driver: LockstepDriver
+    driver: _LockstepDriver
     rounds: RoundsBeside
 
 
 def _run(parts: _Parts, tell: Tell) -> None:
     experiment, robot, driver, rounds = parts
     options, fish = experiment.options, fish_of(experiment)
-    with eyes_of(experiment, fish) as eyes:
+    with _eyes_of(experiment, fish) as eyes:
         files = Files(experiment, fish, eyes)
-        n_frames, ended_s, due_s = round(options.duration_s * FPS), 2 * STEP_S, 2 * STEP_S + ROUND_S
+        n_frames, ended_s, due_s = (
+            round(options.duration_s * FPS),
+            2 * STEP_S,
+            2 * STEP_S + _ROUND_S,
+        )
         for number in range(n_frames):
             at = robot.control.ask("advance", to_s=number / FPS, received=driver.n_sent)
             where = np.array([at["x_m"], at["y_m"], at["heading_rad"]])
@@ -190,7 +194,7 @@ def _run(parts: _Parts, tell: Tell) -> None:
 
 
 @contextlib.contextmanager
-def eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
+def _eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
     """Give who tracks: cameras and a tracker, or the truth with noise."""
     if not experiment.options.video:
         yield Noisy(fish)

@@ -17,7 +17,7 @@ from zfcal.cameras.camera import FISHEYE, Camera, Homography
 from zfcal.cameras.lens import Floats, Lens
 from zfcal.errors import DamagedError, InputError
 
-HOMOGRAPHY = "homography"
+_HOMOGRAPHY = "homography"
 _PLUMB_BOB, _RATIONAL = 5, 8
 
 SIDE_KEY = "seen_from"
@@ -42,13 +42,13 @@ def read_camera(path: Path) -> Camera | Homography:
         It is empty or not TOML.
     """
     found = read_camera_file(path)
-    if found.model != HOMOGRAPHY and found.rotation_rad is None:
+    if found.model != _HOMOGRAPHY and found.rotation_rad is None:
         raise InputError(
             f"{path}: holds a lens alone, it does not say where the camera stands.",
             hint=f"Add the pose with: zfcal camera points POINTS.csv --lens {path} -o CAMERA.toml",
         )
     with _named(path):
-        return camera_of(found)
+        return _camera_of(found)
 
 
 def read_lens(path: Path) -> Lens:
@@ -60,7 +60,7 @@ def read_lens(path: Path) -> Lens:
         As `read_camera`; or it is a homography, which has no lens.
     """
     found = read_camera_file(path)
-    if found.model == HOMOGRAPHY:
+    if found.model == _HOMOGRAPHY:
         raise InputError(
             f"{path}: is a homography, which has no lens.",
             hint="Calibrate the lens with: zfcal camera board IMAGE... -o LENS.toml",
@@ -109,10 +109,10 @@ def write_camera(
     StorageError
         The file cannot be written.
     """
-    write_camera_file(path, file_of(camera, result=result or {}, points=points), lineage)
+    write_camera_file(path, _file_of(camera, result=result or {}, points=points), lineage)
 
 
-def camera_of(found: CameraFile) -> Camera | Homography:
+def _camera_of(found: CameraFile) -> Camera | Homography:
     """Return the camera of a file that has a pose, or its homography.
 
     Raises
@@ -120,14 +120,14 @@ def camera_of(found: CameraFile) -> Camera | Homography:
     InputError
         The numbers make no camera.
     """
-    if found.model == HOMOGRAPHY:
+    if found.model == _HOMOGRAPHY:
         return Homography(size_px=found.size_px, matrix=found.matrix)
     if found.rotation_rad is None or found.translation_m is None:
         raise InputError("A lens alone does not say where the camera stands.")
     return Camera.of(_lens_of(found), np.array(found.rotation_rad), np.array(found.translation_m))
 
 
-def file_of(
+def _file_of(
     camera: Camera | Homography | Lens,
     *,
     result: Mapping[str, JSON],
@@ -143,7 +143,7 @@ def file_of(
         "points_m": tuple(_plain(point) for point in m),
     }
     if isinstance(camera, Homography):
-        return CameraFile(model=HOMOGRAPHY, **values)
+        return CameraFile(model=_HOMOGRAPHY, **values)
     values |= {"model": camera.model, "distortion": _plain(camera.distortion)}
     if isinstance(camera, Camera):
         values["rotation_rad"] = _plain(camera.rotation_rad)

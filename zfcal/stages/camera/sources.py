@@ -29,7 +29,7 @@ def source_of(text: str, *, fps: float, clock: ArrivalClock) -> Source:
     """Return the source that words name: as `open_source`, or MCAP files."""
     path = Path(text)
     if not is_live(text) and (path.suffix == ".mcap" or any(path.glob("*.mcap"))):
-        return RecordedFrames(path)
+        return _RecordedFrames(path)
     return open_source(text, fps=fps, clock=clock)
 
 
@@ -50,7 +50,7 @@ def files_of(root: Path, text: str) -> dict[str, str]:
 
 
 @final
-class RecordedFrames:
+class _RecordedFrames:
     """Camera images in an MCAP file, or in a folder of them such as ``frames/overhead``.
 
     Parameters

@@ -24,7 +24,7 @@ from zfcal.virtual.images.ripples import Ripples
 from zfcal.virtual.images.swimming import Moment
 from zfcal.virtual.images.tank import overhead_tank, photographed
 
-OVERHEAD = 21
+_OVERHEAD = 21
 """Tells the random numbers of overhead images from others of the same seed."""
 
 _SECTIONS = ((1, 9), (8, 16), (15, 21))
@@ -103,7 +103,7 @@ class OverheadPainter:
         ndarray of uint8, shape (height, width)
         """
         look = self._look
-        rng = np.random.default_rng([self._seed, OVERHEAD, moment.number])
+        rng = np.random.default_rng([self._seed, _OVERHEAD, moment.number])
         image = self._ripples.add_to(self._empty, moment.time_s)
         if look.flicker > 0:
             light = 1.0 + look.flicker * rng.standard_normal()

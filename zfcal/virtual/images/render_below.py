@@ -21,7 +21,7 @@ from zfcal.virtual.images.painting import Fill, Noise, darken, patch_of
 from zfcal.virtual.images.swimming import Moment
 from zfcal.virtual.images.tank import below_tank
 
-BELOW = 22
+_BELOW = 22
 """Tells the random numbers of images from below from others of the same seed."""
 
 _BRIGHTEST = 250.0
@@ -72,7 +72,7 @@ class BelowPainter:
         ndarray of uint8, shape (height, width, 3)
             Blue, green, red.
         """
-        rng = np.random.default_rng([self._seed, BELOW, moment.number])
+        rng = np.random.default_rng([self._seed, _BELOW, moment.number])
         image = self._empty.copy()
         robots = np.flatnonzero(moment.is_robot)
         for number, body in enumerate(robots):

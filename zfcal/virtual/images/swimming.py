@@ -16,7 +16,7 @@ from zfcal.tracks import ROBOT, Tracks
 from zfcal.virtual.images.bodies import Bodies
 from zfcal.virtual.images.look import Look
 
-TURN_S = 0.08
+_TURN_S = 0.08
 """Standard deviation in time of the smoothing of headings: a fish turns within 0.2 s."""
 
 _BEND_S = 0.11
@@ -183,7 +183,7 @@ def _headings(xy_m: Floats, stated: Floats, velocity: Floats, fps: float) -> Flo
     last = np.maximum.accumulate(np.where(known, np.arange(len(angle))[:, None], 0), axis=0)
     pointer = np.take_along_axis(pointer, last, axis=0)
     pointer = np.where(np.isfinite(xy_m).all(axis=-1), pointer, 0.0)
-    width = TURN_S * fps
+    width = _TURN_S * fps
     smooth = gaussian_filter1d(pointer.real, width, axis=0, mode="nearest") + 1j * (
         gaussian_filter1d(pointer.imag, width, axis=0, mode="nearest")
     )
