@@ -15,7 +15,7 @@ the same everywhere:
 * A damaged input, or a folder in the place of a file, keeps that thing away and no other.
 * What happened is told.
 
-What a trial is and what bears on a run is in `opening`, what is told in `events`.
+What a trial is and what bears on a run is in `trial_context`, what is told in `events`.
 """
 
 from __future__ import annotations
