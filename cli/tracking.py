@@ -13,7 +13,7 @@ from .options import EXISTING, PLACE, adds
 if TYPE_CHECKING:
     from zfcal.stages.track.plan import TrackOptions
 
-_METHODS = ("shi-tomasi", "silhouette")
+METHODS = ("shi-tomasi", "silhouette")
 
 tracking_options = adds(
     click.option("--overhead", metavar="SRC", help="The camera that sees the fish."),
@@ -41,8 +41,8 @@ tracking_options = adds(
     click.option("--background", type=EXISTING, help="Image of the empty tank; default: learnt."),
     click.option(
         "--method",
-        type=click.Choice(_METHODS),
-        default=_METHODS[0],
+        type=click.Choice(METHODS),
+        default=METHODS[0],
         show_default=True,
         help="shi-tomasi is the published one.",
     ),
