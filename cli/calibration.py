@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .durations import seconds
-from .options import Command, Fours, seed_option
+from .options import Decorator, adds, population_option, seed_option, workers_option
 
 if TYPE_CHECKING:
     from zfcal.stages.calibrate.searching import CalibrateOptions
@@ -18,10 +17,10 @@ if TYPE_CHECKING:
     MakeTask = Callable[[frozenset[int] | None], Task]
 
 
-def round_options(*, generations: str = "", budget: str = "") -> Callable[[Command], Command]:
+def round_options(*, generations: str = "", budget: str = "") -> Decorator:
     """Add how a round is done; the texts say which of generations and budget is the default."""
     optimisers = click.Choice(["zfcal", "deap"])
-    options = (
+    return adds(
         click.option("--generations", type=click.IntRange(min=0), help=f"Per round.{generations}"),
         click.option(
             "--budget",
@@ -30,9 +29,7 @@ def round_options(*, generations: str = "", budget: str = "") -> Callable[[Comma
             metavar="TIME",
             help=f"Wall-clock time per round, such as 50s.{budget}",
         ),
-        click.option(
-            "--population", type=Fours(), default=60, show_default=True, help="A multiple of four."
-        ),
+        population_option,
         click.option(
             "--runs",
             type=click.IntRange(min=1),
@@ -71,12 +68,7 @@ def round_options(*, generations: str = "", budget: str = "") -> Callable[[Comma
             "--baselines", is_flag=True, help="Score random search and the last model too."
         ),
         seed_option("Seed of the random numbers.  [default: the trial's]"),
-        click.option(
-            "--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]"
-        ),
-    )
-    return lambda command: functools.reduce(
-        lambda made, option: option(made), reversed(options), command
+        workers_option,
     )
 
 

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from .camera_options import aim_of, numbers, place_options
-from .options import EXISTING, PLACE, FiniteRange, makes_artifacts, speaks
+from .options import EXISTING, PLACE, POSITIVE, adds, makes_artifacts, speaks
 from .output import Output
 
-Command = Callable[..., None]
 
-
-def corners(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
+def _corners(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
     """Return columns and rows from ``9x6``."""
     match = re.fullmatch(r"(\d+)x(\d+)", text.strip())
     if match is None:
@@ -25,7 +22,7 @@ def corners(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]
     return int(match[1]), int(match[2])
 
 
-def place_in_tank(
+def _place_in_tank(
     _: click.Context, __: click.Parameter, text: str | None
 ) -> tuple[float, ...] | None:
     """Return metres and radians from ``X,Y,DEGREES``."""
@@ -35,33 +32,24 @@ def place_in_tank(
     return x_m, y_m, math.radians(degrees)
 
 
-def board_options(command: Command) -> Command:
-    """Add what describes a board."""
-    for option in reversed(
-        (
-            click.option(
-                "--board",
-                callback=corners,
-                required=True,
-                metavar="CxR",
-                help="Inner corners, such as 9x6 for 10 by 7 squares.",
-            ),
-            click.option(
-                "--square-mm",
-                type=FiniteRange(min=0, min_open=True),
-                required=True,
-                help="Side of a square, in millimetres.",
-            ),
-            click.option("--charuco", is_flag=True, help="The white squares hold markers."),
-        )
-    ):
-        command = option(command)
-    return command
+_board_options = adds(
+    click.option(
+        "--board",
+        callback=_corners,
+        required=True,
+        metavar="CxR",
+        help="Inner corners, such as 9x6 for 10 by 7 squares.",
+    ),
+    click.option(
+        "--square-mm", type=POSITIVE, required=True, help="Side of a square, in millimetres."
+    ),
+    click.option("--charuco", is_flag=True, help="The white squares hold markers."),
+)
 
 
 @click.command("board")
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=EXISTING)
-@board_options
+@_board_options
 @click.option(
     "--model",
     type=click.Choice(["pinhole", "fisheye"]),
@@ -70,7 +58,7 @@ def board_options(command: Command) -> Command:
 @click.option("--lies", type=EXISTING, metavar="IMAGE", help="The board lying in the tank.")
 @click.option(
     "--at",
-    callback=place_in_tank,
+    callback=_place_in_tank,
     metavar="X,Y,DEGREES",
     help="Its first inner corner in metres of the arena, and which way its rows run.",
 )
@@ -125,7 +113,7 @@ def board(
 
 
 @click.command("sheet")
-@board_options
+@_board_options
 @click.option("-o", "--out", "path", type=PLACE, required=True, help="The PNG file to write.")
 @speaks
 def sheet(

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import EXISTING, PLACE
+from .options import EXISTING, PLACE, adds
 
 if TYPE_CHECKING:
     from zfcal.stages.camera.making import CameraTask, Found, Place
-
-Command = Callable[..., None]
 
 SIDES = ("above", "below")
 
@@ -35,7 +33,7 @@ def numbers(text: str, count: int) -> tuple[float, ...]:
     return values
 
 
-def size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
     """Return width and height from ``640x480``."""
     if text is None:
         return None
@@ -50,39 +48,31 @@ def box(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float,
     return None if text is None else numbers(text, 4)
 
 
-def image_options(command: Command) -> Command:
-    """Add --size and --image."""
-    command = click.option("--image", type=EXISTING, help="A picture of the tank by that camera.")(
-        command
-    )
-    return click.option(
-        "--size", callback=size, metavar="WxH", help="Of the camera's images, such as 640x480."
-    )(command)
+image_options = adds(
+    click.option(
+        "--size", callback=_size, metavar="WxH", help="Of the camera's images, such as 640x480."
+    ),
+    click.option("--image", type=EXISTING, help="A picture of the tank by that camera."),
+)
 
-
-def place_options(command: Command) -> Command:
-    """Add -o, --trial, --camera, --seen-from and --figure: what `aim_of` takes."""
-    for option in reversed(
-        (
-            click.option("-o", "--out", "place", type=PLACE, help="The camera file to write."),
-            click.option("--trial", type=PLACE, help="A trial that is to use the camera."),
-            click.option(
-                "--camera",
-                "name",
-                type=click.Choice(["overhead", "below"]),
-                help="Which one of the trial it is.",
-            ),
-            click.option(
-                "--seen-from",
-                "side",
-                type=click.Choice(SIDES),
-                help="Where it looks from; default: below for --camera below, else above.",
-            ),
-            figure_option,
-        )
-    ):
-        command = option(command)
-    return command
+place_options = adds(
+    click.option("-o", "--out", "place", type=PLACE, help="The camera file to write."),
+    click.option("--trial", type=PLACE, help="A trial that is to use the camera."),
+    click.option(
+        "--camera",
+        "name",
+        type=click.Choice(["overhead", "below"]),
+        help="Which one of the trial it is.",
+    ),
+    click.option(
+        "--seen-from",
+        "side",
+        type=click.Choice(SIDES),
+        help="Where it looks from; default: below for --camera below, else above.",
+    ),
+    figure_option,
+)
+"""What `aim_of` takes."""
 
 
 def aim_of(where: Mapping[str, Any], image: Path | None = None) -> tuple[Place, CameraTask]:

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from .camera_options import aim_of, image_options, place_options
-from .options import EXISTING, makes_artifacts, speaks
+from .options import EXISTING, adds, makes_artifacts, speaks
 from .output import Output
 
-Command = Callable[..., None]
-
-
-def fit_options(command: Command) -> Command:
-    """Add --model and --robust."""
-    command = click.option(
-        "--robust", is_flag=True, help="Let points that are far off weigh less."
-    )(command)
-    return click.option(
+_fit_options = adds(
+    click.option(
         "--model",
         type=click.Choice(["pinhole", "fisheye"]),
         help="Of the lens; default: what foretells points left out best.",
-    )(command)
+    ),
+    click.option("--robust", is_flag=True, help="Let points that are far off weigh less."),
+)
 
 
 @click.command("points")
 @click.argument("file", metavar="POINTS.csv", type=EXISTING)
 @click.option("--lens", type=EXISTING, help="A camera file with this camera's lens.")
-@fit_options
+@_fit_options
 @image_options
 @place_options
 @makes_artifacts
@@ -69,7 +63,7 @@ def points(
 
 @click.command("import")
 @click.argument("file", metavar="OLD.xml", type=EXISTING)
-@fit_options
+@_fit_options
 @place_options
 @makes_artifacts
 @speaks

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .durations import seconds
-from .options import Command, FiniteRange
+from .options import POSITIVE, Command, FiniteRange, adds
 
 _PRESENT = (
     "real_time", "no_video", "duration_s", "generations", "champion", "budget_s", "robot", "seed",
@@ -22,29 +22,7 @@ _FLAGS = {name: f"--{name.replace('_', '-')}" for name in _PRESENT} | {
 }
 
 
-def closed_loop_options(command: Command) -> Command:
-    """Add --closed-loop and what goes with it, handed over as ``loop``; None without it."""
-
-    @functools.wraps(command)
-    def run(*args: Any, closed_loop: bool, **options: Any) -> None:
-        asked = {name: options.pop(name) for name in _PRESENT}
-        if not closed_loop:
-            given = [name for name, value in asked.items() if value not in (None, False)]
-            if given:
-                raise click.UsageError(f"{_FLAGS[given[0]]} is for --closed-loop.")
-        if asked["real_time"] and asked["generations"] is not None:
-            raise click.UsageError("--real-time gives rounds a --budget, not --generations.")
-        if asked["budget_s"] is not None and not asked["real_time"]:
-            raise click.UsageError("--budget is for --real-time: time stands still in lock-step.")
-        command(*args, loop=asked if closed_loop else None, **options)
-
-    decorated: Command = run
-    for option in reversed(_OPTIONS):
-        decorated = option(decorated)
-    return decorated
-
-
-_OPTIONS = (
+_OPTIONS = adds(
     click.option(
         "--closed-loop",
         is_flag=True,
@@ -90,12 +68,27 @@ _OPTIONS = (
         type=FiniteRange(min=0),
         help="How parameters drift, sd of logs.  [default: 0.1]",
     ),
-    click.option(
-        "--drift-s",
-        type=FiniteRange(min=0, min_open=True),
-        help="Correlation time of the drift.  [default: 600]",
-    ),
+    click.option("--drift-s", type=POSITIVE, help="Correlation time of the drift.  [default: 600]"),
     click.option(
         "--noise-mm", type=FiniteRange(min=0), help="Position noise of the tracker.  [default: 0.4]"
     ),
 )
+
+
+def closed_loop_options(command: Command) -> Command:
+    """Add --closed-loop and what goes with it, handed over as ``loop``; None without it."""
+
+    @functools.wraps(command)
+    def run(*args: Any, closed_loop: bool, **options: Any) -> None:
+        asked = {name: options.pop(name) for name in _PRESENT}
+        if not closed_loop:
+            given = [name for name, value in asked.items() if value not in (None, False)]
+            if given:
+                raise click.UsageError(f"{_FLAGS[given[0]]} is for --closed-loop.")
+        if asked["real_time"] and asked["generations"] is not None:
+            raise click.UsageError("--real-time gives rounds a --budget, not --generations.")
+        if asked["budget_s"] is not None and not asked["real_time"]:
+            raise click.UsageError("--budget is for --real-time: time stands still in lock-step.")
+        command(*args, loop=asked if closed_loop else None, **options)
+
+    return _OPTIONS(run)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,19 +15,22 @@ from .options import (
     seed_option,
     speaks,
     takes_trials,
+    workers_option,
 )
 from .output import Output
-from .streams import each_trial
-
-if TYPE_CHECKING:
-    from zfcal.stages.streams import Work
+from .streams import roots_of
 
 
-@click.command("diagnose")
+def _listed(name: str) -> str:
+    """Return the name by which help lists an option; an earlier one goes on working."""
+    return "null-replicates" if name == "null" else name
+
+
+@click.command("diagnose", context_settings={"token_normalize_func": _listed})
 @takes_trials
 @click.option("--model", type=EXISTING, help="Another model than that of the newest round.")
 @click.option(
-    "--null",
+    "--null-replicates",
     "n_null",
     type=click.Choice(["39", "199"]),
     default="39",
@@ -39,7 +41,7 @@ if TYPE_CHECKING:
 @click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate.")
 @click.option("--window", "window_s", type=span, metavar="START:END", help="Only this stretch.")
 @seed_option("Seed of the random numbers.  [default: the trial's]")
-@click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
+@workers_option
 @click.option("-o", "--out", "out_dir", type=PLACE, help="Folder.  [default: TRIAL/diagnosis]")
 @makes_artifacts
 @speaks
@@ -60,10 +62,4 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
 
     chosen, task = choose(options, trials)
     out.bare = len(trials) == 1
-    roots: dict[Path, None] = {}
-
-    def collect(found: Work) -> None:
-        roots[found.root] = None
-
-    each_trial(out, trials, collect)
-    diagnose_all(out, roots, chosen, task)
+    diagnose_all(out, roots_of(out, trials), chosen, task)

@@ -48,7 +48,9 @@ def choose(options: Mapping[str, Any], trials: tuple[str, ...]) -> tuple[Diagnos
 def _check_together(options: Mapping[str, Any], trials: tuple[str, ...]) -> None:
     source = click.get_current_context().get_parameter_source("n_null")
     if options["quick"] and source is not ParameterSource.DEFAULT:
-        raise click.UsageError("--quick simulates no null: leave out --null, or --quick.")
+        raise click.UsageError(
+            "--quick simulates no null: leave out --null-replicates, or --quick."
+        )
     if options["out_dir"] is not None and (len(trials) != 1 or trials[0] == STDIN):
         raise click.UsageError("-o is for one trial: its findings would overwrite each other's.")
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import functools
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,17 +11,15 @@ from .durations import seconds
 from .options import (
     EXISTING,
     PLACE,
-    Fours,
     makes_artifacts,
+    population_option,
     seed_option,
     speaks,
     takes_trials,
+    workers_option,
 )
 from .output import Output
-from .streams import each_trial
-
-if TYPE_CHECKING:
-    from zfcal.stages.streams import Work
+from .streams import roots_of
 
 
 @click.command("extend")
@@ -37,11 +34,9 @@ if TYPE_CHECKING:
 @click.option("--findings", type=EXISTING, help="Take these.  [default: diagnosis/findings.json]")
 @click.option("--generations", type=click.IntRange(min=0), help="Per model.  [default: 15]")
 @click.option("--budget", "budget_s", type=seconds, metavar="TIME", help="Per model, such as 50s.")
-@click.option(
-    "--population", type=Fours(), default=60, show_default=True, help="A multiple of four."
-)
+@population_option
 @seed_option("Seed of the random numbers.  [default: the trial's]")
-@click.option("--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]")
+@workers_option
 @click.option("-o", "--out", "output", type=PLACE, help="Model.  [default: models/extended.toml]")
 @makes_artifacts
 @speaks
@@ -62,11 +57,5 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
 
     chosen, task = choose(options, trials)
     out.bare = len(trials) == 1
-    roots: dict[Path, None] = {}
-
-    def collect(found: Work) -> None:
-        roots[found.root] = None
-
-    each_trial(out, trials, collect)
-    for root in roots:
+    for root in roots_of(out, trials):
         out.attempt(functools.partial(extend_one, out, root, chosen, task))

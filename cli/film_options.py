@@ -3,18 +3,44 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import EXISTING, PLACE
+from .options import EXISTING, PLACE, Command, adds
 
 if TYPE_CHECKING:
     from zfcal.virtual.images.look import Look
 
-Command = Callable[..., None]
+_OPTIONS = adds(
+    click.option("--video", is_flag=True, help="Also draw what the cameras see."),
+    click.option(
+        "--video-file",
+        "video_file",
+        type=PLACE,
+        metavar="FILE",
+        help="Also as a plain video: .avi and .mkv are lossless, .mp4 is small.",
+    ),
+    click.option(
+        "--look",
+        type=click.Choice(["clean", "usual", "hard"]),
+        help="How easy the images are.  [default: usual]",
+    ),
+    click.option(
+        "--draw",
+        "changes",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Change a value of the look, such as noise_grey=4; see docs/video.md.",
+    ),
+    click.option(
+        "--photograph",
+        type=EXISTING,
+        metavar="FILE",
+        help="Of the empty tank from above, instead of a drawn one.",
+    ),
+)
 
 
 def film_options(command: Command) -> Command:
@@ -46,39 +72,7 @@ def film_options(command: Command) -> Command:
             raise click.UsageError(f"{name} is about images: add --video.")
         command(*args, film=film, **options)
 
-    decorated: Command = run
-    for option in reversed(
-        (
-            click.option("--video", is_flag=True, help="Also draw what the cameras see."),
-            click.option(
-                "--video-file",
-                "video_file",
-                type=PLACE,
-                metavar="FILE",
-                help="Also as a plain video: .avi and .mkv are lossless, .mp4 is small.",
-            ),
-            click.option(
-                "--look",
-                type=click.Choice(["clean", "usual", "hard"]),
-                help="How easy the images are.  [default: usual]",
-            ),
-            click.option(
-                "--draw",
-                "changes",
-                multiple=True,
-                metavar="NAME=VALUE",
-                help="Change a value of the look, such as noise_grey=4; see docs/video.md.",
-            ),
-            click.option(
-                "--photograph",
-                type=EXISTING,
-                metavar="FILE",
-                help="Of the empty tank from above, instead of a drawn one.",
-            ),
-        )
-    ):
-        decorated = option(decorated)
-    return decorated
+    return _OPTIONS(run)
 
 
 def _look(preset: str | None, changes: tuple[str, ...]) -> Look:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import click
 
-from .options import Command, FiniteRange
+from .options import POSITIVE, FiniteRange, adds
 
 # Written out, since the library that knows them is heavy; a test compares the two.
 FORMATS = (
@@ -52,15 +52,9 @@ def _body_axis(text: str) -> tuple[str, str]:
     return parts[0], parts[1]
 
 
-_OPTIONS: tuple[Callable[[Command], Command], ...] = (
-    click.option(
-        "--fps",
-        type=FiniteRange(min=0, min_open=True),
-        help="Frame rate; must be that of trial.toml.",
-    ),
-    click.option(
-        "--mm-per-px", type=FiniteRange(min=0, min_open=True), help="Scale of a file in pixels."
-    ),
+foreign_options = adds(
+    click.option("--fps", type=POSITIVE, help="Frame rate; must be that of trial.toml."),
+    click.option("--mm-per-px", type=POSITIVE, help="Scale of a file in pixels."),
     click.option(
         "--origin", type=_pair, metavar="X,Y", help="Point of the file that becomes (0, 0)."
     ),
@@ -78,13 +72,6 @@ _OPTIONS: tuple[Callable[[Command], Command], ...] = (
         "--min-confidence", type=FiniteRange(min=0), help="Positions below it count as missing."
     ),
 )
-
-
-def foreign_options(command: Command) -> Command:
-    """Add the options that say how to read a foreign file."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
 
 
 def import_options(given: Mapping[str, Any]) -> dict[str, object]:

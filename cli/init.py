@@ -8,7 +8,7 @@ import click
 
 from .options import (
     PLACE,
-    FiniteRange,
+    POSITIVE,
     arena_options,
     count_robots,
     makes_artifacts,
@@ -23,16 +23,12 @@ from .output import Output
 @arena_options
 @click.option(
     "--fps",
-    type=FiniteRange(min=0, min_open=True),
+    type=POSITIVE,
     default=15.0,
     show_default=True,
     help="Frame rate of the tracks.",
 )
-@click.option(
-    "--dt-s",
-    type=FiniteRange(min=0, min_open=True),
-    help="The model's step; default: frames nearest to 0.2 s.",
-)
+@click.option("--dt-s", type=POSITIVE, help="The model's step; default: frames nearest to 0.2 s.")
 @seed_option("All random numbers of the trial derive from it.  [default: 0]")
 @click.option("--source", default="", help="Where the data come from, in words.")
 @makes_artifacts

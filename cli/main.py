@@ -44,8 +44,8 @@ COMMANDS = {
 }
 """Each command and the module that holds it, in the order of a day's work."""
 
-EXIT_USAGE = 2
-EXIT_READER_GONE = 141
+_EXIT_USAGE = 2
+_EXIT_READER_GONE = 141
 _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What says how many threads a product of matrices takes; read when numpy is loaded."""
@@ -62,7 +62,7 @@ class Terminated(BaseException):
     exit_code = 143
 
 
-class LazyGroup(click.Group):
+class _LazyGroup(click.Group):
     """A group that imports a subcommand when it is asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
@@ -105,7 +105,7 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
         ctx.exit()
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
@@ -198,7 +198,7 @@ def _terminate(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG00
 def _reader_gone() -> int:
     """Leave quietly when nobody reads standard output any more."""
     _drop_output()
-    return EXIT_READER_GONE
+    return _EXIT_READER_GONE
 
 
 def _drop_output() -> None:
@@ -210,7 +210,7 @@ def _explain_usage(error: click.ClickException) -> int:
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "zfcal"
     complain(error.format_message(), hint=f"See: {path} --help")
-    return EXIT_USAGE
+    return _EXIT_USAGE
 
 
 def _explain(error: Exception, argv: Sequence[str]) -> int:

@@ -13,6 +13,7 @@ import click
 from .output import Output
 
 Command = Callable[..., None]
+Decorator = Callable[[Command], Command]
 
 EXISTING = click.Path(exists=True, path_type=Path)
 PLACE = click.Path(path_type=Path)
@@ -31,7 +32,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-class Fours(click.IntRange):
+class _Fours(click.IntRange):
     """Whole numbers from four on that four divides: two tournaments of two make one pair."""
 
     def __init__(self) -> None:
@@ -46,12 +47,22 @@ class Fours(click.IntRange):
         return number
 
 
+POSITIVE = FiniteRange(min=0, min_open=True)
+
+
 def names(text: str) -> tuple[str, ...]:
     """Return the names that stand between commas."""
     found = tuple(name.strip() for name in text.split(","))
     if not all(found):
         raise click.BadParameter(f"{text!r} holds an empty name; give them as D,W,O,T.")
     return found
+
+
+def adds(*options: Decorator) -> Decorator:
+    """Return what gives a command options, in the order in which its help lists them."""
+    return lambda command: functools.reduce(
+        lambda made, option: option(made), reversed(options), command
+    )
 
 
 def laid_out(command: Command) -> Command:
@@ -86,54 +97,55 @@ def speaks(command: Command, *, as_json: str = "One JSON document instead of pat
     return laid_out(run)
 
 
-def makes_artifacts(command: Command) -> Command:
-    """Add --dry-run and --force."""
-    command = click.option(
-        "--force", is_flag=True, help="Make it again, even if it is up to date."
-    )(command)
-    return click.option(
+makes_artifacts = adds(
+    click.option(
         "-n", "--dry-run", is_flag=True, help="Say what would be made and why; write nothing."
-    )(command)
+    ),
+    click.option("--force", is_flag=True, help="Make it again, even if it is up to date."),
+)
+
+takes_trials = click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")
+"""Trials, or - for paths of artifacts on standard input."""
 
 
-def takes_trials(command: Command) -> Command:
-    """Add the argument TRIAL..., or - for paths of artifacts on standard input."""
-    return click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")(command)
+population_option = click.option(
+    "--population", type=_Fours(), default=60, show_default=True, help="A multiple of four."
+)
+
+workers_option = click.option(
+    "--workers", type=click.IntRange(min=1), help="Threads.  [default: one per core]"
+)
 
 
-def seed_option(text: str) -> Callable[[Command], Command]:
+def seed_option(text: str) -> Decorator:
     """Add --seed, a non-negative whole number."""
     return click.option("--seed", type=click.IntRange(min=0), default=None, help=text)
 
 
-def arena_options(command: Command) -> Command:
-    """Add what describes the tank and who swims in it."""
-    for option in reversed(
-        (
-            click.option(
-                "--arena",
-                metavar="NAME|FILE",
-                help="An arena by name, or a GeoJSON file in metres.",
-            ),
-            click.option(
-                "--radius-m",
-                type=FiniteRange(min=0, min_open=True),
-                help="Radius of a circular arena, in metres.",
-            ),
-            click.option(
-                "--side-m",
-                type=FiniteRange(min=0, min_open=True),
-                help="Side of an open-square arena, in metres.",
-            ),
-            click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Number of fish."),
-            click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
-            click.option(
-                "--robots", "n_robots", type=click.IntRange(min=0), help="Number of robots."
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+arena_options = adds(
+    click.option(
+        "--arena",
+        metavar="NAME|FILE",
+        help="An arena by name, or a GeoJSON file in metres.",
+    ),
+    click.option("--radius-m", type=POSITIVE, help="Radius of a circular arena, in metres."),
+    click.option("--side-m", type=POSITIVE, help="Side of an open-square arena, in metres."),
+    click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Number of fish."),
+    click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
+    click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Number of robots."),
+)
+"""What describes the tank and who swims in it."""
+
+
+_NEW_TRIAL = adds(
+    click.option(
+        "--arena", metavar="NAME|FILE", help="Arena of a new trial; default: the model's."
+    ),
+    click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Its fish."),
+    click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
+    click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Its robots."),
+    click.option("--fps", type=POSITIVE, help="Its frame rate, in hertz."),
+)
 
 
 def new_trial_options(command: Command) -> Command:
@@ -153,22 +165,7 @@ def new_trial_options(command: Command) -> Command:
         new = {"arena": arena, "n_fish": n_fish, "n_robots": n_robots, "fps": fps}
         command(*args, new=new, **options)
 
-    decorated: Command = run
-    for option in reversed(
-        (
-            click.option(
-                "--arena", metavar="NAME|FILE", help="Arena of a new trial; default: the model's."
-            ),
-            click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Its fish."),
-            click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
-            click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Its robots."),
-            click.option(
-                "--fps", type=FiniteRange(min=0, min_open=True), help="Its frame rate, in hertz."
-            ),
-        )
-    ):
-        decorated = option(decorated)
-    return decorated
+    return _NEW_TRIAL(run)
 
 
 def count_robots(*, robot: bool, n_robots: int | None) -> int | None:

@@ -31,17 +31,17 @@ _SEVERITY = (0, EXIT_DAMAGED, 75, 1)
 
 def complain(message: str, *, hint: str = "") -> None:
     """Write an error, and what to do about it, to standard error."""
-    say(f"{paint('zfcal: error:', 'red')} {message}")
+    _say(f"{_paint('zfcal: error:', 'red')} {message}")
     if hint:
-        say(f"{paint('hint:', 'cyan')} {hint}")
+        _say(f"{_paint('hint:', 'cyan')} {hint}")
 
 
-def say(text: str) -> None:
+def _say(text: str) -> None:
     """Write a line to standard error."""
     click.echo(text, err=True)
 
 
-def paint(text: str, colour: str) -> str:
+def _paint(text: str, colour: str) -> str:
     """Return the text in a colour where standard error is a terminal that wants it."""
     wanted = sys.stderr.isatty() and not os.environ.get("NO_COLOR")
     return click.style(text, fg=colour, bold=True) if wanted else text
@@ -107,7 +107,7 @@ class Output:
         trace: TracebackType | None,
     ) -> None:
         logging.getLogger("zfcal").removeHandler(self._handler)
-        self._bars.close()
+        self._bars.clear()
         if isinstance(error, BrokenPipeError):
             raise ReaderGoneError from error
         if error is not None:
@@ -161,7 +161,7 @@ class Output:
         """Show what the library logs: of this start, not of the result, hence not in JSON."""
         if not self.quiet:
             self._bars.clear()
-            say(record.getMessage())
+            _say(record.getMessage())
 
     def _record(self, error: BaseException) -> None:
         """Put into the document what `main` will say to the person."""
@@ -193,7 +193,7 @@ class Output:
     def _plan(self, path: Path, reason: str) -> None:
         self._artifacts[path] = {"path": str(path), "state": "planned", "reason": reason}
         self._bars.clear()
-        say(f"would make {path}: {reason}")
+        _say(f"would make {path}: {reason}")
 
     def _leave_out(self, event: LeftOut) -> None:
         key = (str(event.path), event.problem)
@@ -203,9 +203,9 @@ class Output:
             return
         self._left_out[key] = {"path": key[0], "problem": key[1]}
         self._bars.clear()
-        say(f"{paint('zfcal: left out:', 'yellow')} {event.problem}")
+        _say(f"{_paint('zfcal: left out:', 'yellow')} {event.problem}")
         if event.hint:
-            say(f"{paint('hint:', 'cyan')} {event.hint}")
+            _say(f"{_paint('hint:', 'cyan')} {event.hint}")
 
     def _talk(self, level: str, text: str) -> None:
         if {"level": level, "text": text} in self._messages:
@@ -213,7 +213,7 @@ class Output:
         self._messages.append({"level": level, "text": text})
         if not self.quiet:
             self._bars.clear()
-            say(f"{paint('warning:', 'yellow')} {text}" if level == "warning" else text)
+            _say(f"{_paint('warning:', 'yellow')} {text}" if level == "warning" else text)
 
     def _artifact(self, path: Path, state: str, reason: str) -> None:
         known = self._artifacts.get(path)
@@ -224,7 +224,7 @@ class Output:
             return
         self._bars.clear()
         if self.verbose:
-            say(f"{path}: {state}" + (f" ({reason})" if reason else ""))
+            _say(f"{path}: {state}" + (f" ({reason})" if reason else ""))
         if not self.as_json:
             click.echo(str(path))
             sys.stdout.flush()
@@ -233,11 +233,11 @@ class Output:
         states = [artifact["state"] for artifact in self._artifacts.values()]
         made, fresh, planned = (states.count(s) for s in ("made", "up to date", "planned"))
         if planned:
-            say(f"{self.command}: {planned} to make, {fresh} up to date; nothing was written.")
+            _say(f"{self.command}: {planned} to make, {fresh} up to date; nothing was written.")
         elif made:
-            say(f"{self.command}: {made} made, {fresh} up to date.")
+            _say(f"{self.command}: {made} made, {fresh} up to date.")
         elif fresh and not self._errors:
-            say(f"{self.command}: nothing to do, {fresh} up to date.")
+            _say(f"{self.command}: nothing to do, {fresh} up to date.")
 
     def _print_document(self) -> None:
         document: Any = {

@@ -34,7 +34,7 @@ class Bars:
         if done >= total:
             progress.remove_task(self._tasks.pop(stage))
             if not self._tasks:
-                self.close()
+                self.clear()
 
     def clear(self) -> None:
         """Wipe the bars from the terminal before a line is written; the next step shows them."""
@@ -42,10 +42,6 @@ class Bars:
             self._progress.stop()
             self._progress = None
             self._tasks.clear()
-
-    def close(self) -> None:
-        """Wipe the bars for good."""
-        self.clear()
 
     def _start(self) -> Progress:
         from rich.console import Console

@@ -10,11 +10,10 @@ import click
 
 from .options import PLACE, makes_artifacts, speaks, takes_trials
 from .output import Output
-from .streams import each_trial
+from .streams import roots_of
 
 if TYPE_CHECKING:
     from zfcal.errors import DamagedError
-    from zfcal.stages.streams import Work
     from zfcal.stages.trial_context import Task
 
 _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
@@ -42,17 +41,12 @@ def command(
     """
     from zfcal.stages.trial_context import Task
 
-    roots: dict[Path, None] = {}
-
-    def collect(found: Work) -> None:
-        roots[found.root] = None
-
-    each_trial(out, trials, collect)
+    roots = roots_of(out, trials)
     if len(roots) > 1 and folder is None:
         folder = Path("report")
     if roots and not out.exit_code:
         task = Task(dry_run=dry_run, force=force)
-        out.attempt(lambda: write_page(out, list(roots), folder, task))
+        out.attempt(lambda: write_page(out, roots, folder, task))
 
 
 def write_page(out: Output, roots: list[Path], folder: Path | None, task: Task) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 STDIN = "-"
 
 
-def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], None]) -> None:
+def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], object]) -> None:
     """Work on each trial in turn; where one fails, the others still have theirs.
 
     Parameters
@@ -39,6 +39,13 @@ def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], None])
         return
     for trial in trials:
         out.attempt(functools.partial(_one, Path(trial), work))
+
+
+def roots_of(out: Output, trials: Sequence[str]) -> list[Path]:
+    """Return the directories that `each_trial` would work on, each once."""
+    roots: dict[Path, None] = {}
+    each_trial(out, trials, lambda found: roots.setdefault(found.root))
+    return list(roots)
 
 
 def trials_together(
@@ -62,24 +69,18 @@ def trials_together(
     places: dict[Path, Path] = {}
     for trial in trials:
         places.setdefault(Path(trial).resolve(), Path(trial))
-    jobs = [functools.partial(_one_of_many, place, work) for place in places.values()]
+    jobs = [functools.partial(_one, place, work) for place in places.values()]
     n_at_once = at_once(len(jobs), n_threads)
     side_by_side(jobs, out.tell, out.attempt, n_at_once=n_at_once)
 
 
-def _one_of_many(path: Path, work: Callable[[Work, Tell], None], tell: Tell) -> None:
+def _one(path: Path, work: Callable[..., object], *tell: Tell) -> None:
     from zfcal.stages.streams import work_at
 
-    work(work_at(path), tell)
+    work(work_at(path), *tell)
 
 
-def _one(path: Path, work: Callable[[Work], None]) -> None:
-    from zfcal.stages.streams import work_at
-
-    work(work_at(path))
-
-
-def _each_line(out: Output, stream: TextIO, work: Callable[[Work], None]) -> None:
+def _each_line(out: Output, stream: TextIO, work: Callable[[Work], object]) -> None:
     from zfcal.stages.streams import Work, work_of
 
     roots: dict[Path, None] = {}

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .camera_options import SIDES
 from .durations import seconds
-from .options import EXISTING, PLACE, Command
+from .options import EXISTING, PLACE, adds
 
 if TYPE_CHECKING:
     from zfcal.stages.track.plan import TrackOptions
 
 METHODS = ("shi-tomasi", "silhouette")
 
-_OPTIONS = (
+tracking_options = adds(
     click.option("--overhead", metavar="SRC", help="The camera that sees the fish."),
     click.option("--below", metavar="SRC", help="The camera that sees the robot's LEDs."),
     click.option("--camera", type=EXISTING, help="Calibration of the camera overhead."),
@@ -66,11 +65,6 @@ _OPTIONS = (
     click.option("--overlay", type=PLACE, help="Draw what was found into this video (.mp4)."),
     click.option("--contact-sheet", type=PLACE, help="Draw the worst frames into this PNG."),
 )
-
-
-def tracking_options(command: Command) -> Command:
-    """Add the options by which a recording or a camera is tracked."""
-    return functools.reduce(lambda made, option: option(made), reversed(_OPTIONS), command)
 
 
 def track_options(given: dict[str, Any]) -> TrackOptions:

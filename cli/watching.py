@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from zfcal.online.watch_stages import WatchOptions
     from zfcal.stages.calibrate.searching import CalibrateOptions
 
-DEFAULT_BUDGET_S = 50.0
+_DEFAULT_BUDGET_S = 50.0
 
 _OWN = {"trial", "stages", "poll", "once", "until_idle_s"}
 _OF_CALIBRATE = {
@@ -58,7 +58,7 @@ def watch_options(trial: Path, options: Mapping[str, Any]) -> WatchOptions:
 def _round(options: Mapping[str, Any]) -> CalibrateOptions:
     asked = {**options, **_NOT_HERE, "dry_run": False, "force": False}
     if asked["generations"] is None and asked["budget_s"] is None:
-        asked["budget_s"] = DEFAULT_BUDGET_S
+        asked["budget_s"] = _DEFAULT_BUDGET_S
     return choose(asked)[0]
 
 

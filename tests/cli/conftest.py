@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from zfcal.calibrate.task import Settings
+from zfcal.stages.diagnose.diagnose import KnownNoise
 from zfcal_cli.main import run
 
 BRIEF = Path(__file__).resolve().parents[1] / "brief.py"
@@ -172,3 +173,18 @@ def watching(repository):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return WatchTools(module)
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Have diagnoses take the noise as it is stated, and draw nothing."""
+    monkeypatch.setattr(
+        "zfcal.stages.diagnose.diagnose._estimate",
+        lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
+    )
+    monkeypatch.setattr(
+        "zfcal.report.diagnosis.drawing.png_of", lambda picture: picture.title.encode()
+    )
+    monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
+    # Processes of their own would draw all the same.
+    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)

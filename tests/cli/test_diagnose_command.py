@@ -7,11 +7,10 @@ import pytest
 
 from zfcal.artifacts.validation import check
 from zfcal.diagnose.findings import Note
-from zfcal.stages.diagnose.diagnose import KnownNoise
 
 
 @pytest.fixture
-def answered(monkeypatch, make_diagnosis):
+def answered(monkeypatch, plain, make_diagnosis):
     """Answer every question with a diagnosis made by hand, without noise and pictures."""
     questions = []
 
@@ -20,16 +19,6 @@ def answered(monkeypatch, make_diagnosis):
         return make_diagnosis(question.arena, question.model)
 
     monkeypatch.setattr("zfcal.stages.diagnose.diagnose._engine", engine)
-    monkeypatch.setattr(
-        "zfcal.stages.diagnose.diagnose._estimate",
-        lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
-    )
-    monkeypatch.setattr(
-        "zfcal.report.diagnosis.drawing.png_of", lambda picture: picture.title.encode()
-    )
-    monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
-    # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)
     return questions
 
 
@@ -109,7 +98,7 @@ def test_json_of_several_trials_holds_a_document_each(zfcal, trial, answered):
 
 def test_options_reach_the_question(zfcal, trial, answered):
     """Millimetres become metres, one place turns them."""
-    words = ["--noise-mm", "0.5", "--null", "199", "--seed", "3", "--workers", "1"]
+    words = ["--noise-mm", "0.5", "--null-replicates", "199", "--seed", "3", "--workers", "1"]
     assert zfcal("diagnose", "trial", *words, "--window", "0:60").code == 0
     (question,) = answered
     assert (question.noise_m, question.n_null, question.seed) == (0.0005, 199, 3)
@@ -118,13 +107,25 @@ def test_options_reach_the_question(zfcal, trial, answered):
     assert answered[1].quick
 
 
+@pytest.mark.parametrize("words", [["--null", "199"], ["--null=199"]])
+def test_the_earlier_name_of_the_replicates_goes_on_working(zfcal, trial, answered, words):
+    """Help lists the new one alone."""
+    assert zfcal("diagnose", "trial", *words).code == 0
+    assert answered[0].n_null == 199
+    listed = zfcal("diagnose", "--help").out
+    assert "--null-replicates [39|199]" in listed
+    assert "--null " not in listed
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        (["trial", "--quick", "--null-replicates", "39"], "leave out --null-replicates,"),
         (["trial", "--quick", "--null", "39"], "--quick simulates no null"),
         (["trial", "trial", "-o", "here"], "-o is for one trial"),
         (["-", "-o", "here"], "-o is for one trial"),
-        (["trial", "--null", "40"], "'40' is not one of"),
+        (["trial", "--null-replicates", "40"], "'40' is not one of"),
+        (["trial", "--null", "40"], "'--null-replicates': '40' is not one of"),
         (["trial", "--window", "60:0"], "no stretch START:END"),
         (["trial", "--noise-mm", "-1"], "not in the range"),
         (["trial", "--model", "nowhere.toml"], "does not exist"),

@@ -5,28 +5,17 @@ import json
 import pytest
 
 from zfcal.artifacts.validation import check
-from zfcal.stages.diagnose.diagnose import KnownNoise
 
 ROUND = ["--generations", "0", "--population", "4", "--workers", "1"]
 
 
 @pytest.fixture
-def answered(monkeypatch, make_diagnosis):
+def answered(monkeypatch, plain, make_diagnosis):
     """Answer every question with a diagnosis made by hand; draw nothing."""
     monkeypatch.setattr(
         "zfcal.stages.diagnose.diagnose._engine",
         lambda question, _: make_diagnosis(question.arena, question.model, names=()),
     )
-    monkeypatch.setattr(
-        "zfcal.stages.diagnose.diagnose._estimate",
-        lambda _case, _stretch, stated_m, source: KnownNoise(sd_m=stated_m, source=source),
-    )
-    monkeypatch.setattr(
-        "zfcal.report.diagnosis.drawing.png_of", lambda picture: picture.title.encode()
-    )
-    monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
-    # Processes of their own would draw all the same.
-    monkeypatch.setattr("zfcal.report.diagnosis.render_pool.RenderPool.prepare", lambda _pool: None)
 
 
 def test_no_effect_is_nothing_to_do(zfcal, trial, answered):

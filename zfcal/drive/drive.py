@@ -34,7 +34,7 @@ from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial
 from zfcal.tracks import FramePoses
 from zfcal.units import SEGMENT_S
 
-VIRTUAL = "virtual"
+_VIRTUAL = "virtual"
 """The port behind which a virtual robot is started."""
 
 NICENESS = -10
@@ -212,7 +212,7 @@ def _robot(
     opened: OpenTrial, options: DriveOptions, stack: contextlib.ExitStack
 ) -> tuple[FishBot, VirtualProcess | None]:
     port, virtual = options.port, None
-    if port == VIRTUAL:
+    if port == _VIRTUAL:
         rings = json.dumps([ring.tolist() for ring in opened.arena.rings_m])
         x, y = opened.arena.outline.representative_point().coords[0]
         words = ["--robot", options.manner.letter, "--seed", str(opened.trial.seed)]

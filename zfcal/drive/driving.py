@@ -30,7 +30,7 @@ from zfcal.tracks import ROBOT, FramePoses
 _MOST_HISTORIES = 5
 """Looks at which more than one step is due, after which ticks begin even so: poses come in lots."""
 
-IMPLAUSIBLE = "implausible-pose"
+_IMPLAUSIBLE = "implausible-pose"
 
 _SAYS = {
     "stale-pose": "The robot has not been seen for 0.5 s: it was stopped.",
@@ -238,11 +238,11 @@ class Driver:
         if robots:
             if math.isinf(self._doubted_s):
                 says = f"The robot's pose is implausible and not driven by: {robots[0].says}."
-                self._fault(time_s, IMPLAUSIBLE, says)
+                self._fault(time_s, _IMPLAUSIBLE, says)
             self._doubted_s = time_s
         elif time_s - self._doubted_s > PATIENCE_S and not math.isinf(self._doubted_s):
             self._doubted_s = -math.inf
-            self._fault(time_s, IMPLAUSIBLE, f"No more {IMPLAUSIBLE}.", ended=True)
+            self._fault(time_s, _IMPLAUSIBLE, f"No more {_IMPLAUSIBLE}.", ended=True)
         for agent, doubt in self.pilot.doubts:
             if agent.kind != ROBOT and doubt.kind not in self._doubted:
                 self._doubted.add(doubt.kind)

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from zfcal.stages.events import Event, Note, as_line
 
-EVENT = "zfcal.drive-event/1"
+_EVENT = "zfcal.drive-event/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,4 +56,4 @@ def line_of(event: Event, at_s: float) -> dict[str, Any] | None:
     kind, values = as_line(event)
     if isinstance(event, Note) and event.kind:
         kind, values = event.kind, {**event.values, "text": event.text}
-    return {"schema": EVENT, "at_s": round(at_s, 3), "event": kind, **values} if kind else None
+    return {"schema": _EVENT, "at_s": round(at_s, 3), "event": kind, **values} if kind else None

@@ -50,9 +50,9 @@ class DriveModels:
         InputError
             There is none that can be used, and why.
         """
-        if self.look() or self._force is not None:
-            assert self._force is not None  # noqa: S101 - for the type checker
-            return self._force
+        found = self.look() or self._force
+        if found is not None:
+            return found
         raise InputError(
             self.problem or f"{self._folder}: holds no numbered model.",
             hint=f"Make one with: zfcal calibrate {self._opened.trial.root}",

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeAlias, final
+from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.kernels.state import Packed
 from zfcal.model.robot_agent import Among, Move
@@ -27,15 +27,13 @@ from zfcal.robot.plausible import Doubt, Plausibility, Reach
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
-Floats: TypeAlias = NDArray[np.float64]
-
-DRAWS = 0x64726976
+_DRAWS = 0x64726976
 """Key of the driver's random numbers among those that derive from a trial's seed."""
 
 _SPARE = 4
 """Places beyond the number of agents, for ids that change while others still are there."""
 
-TURNING = "obstacle"
+_TURNING = "obstacle"
 """The one reason for which the robot still turns; for all others it stands."""
 
 STALE_TARGET = "stale-target"
@@ -192,7 +190,7 @@ class Pilot:
         for step in range(2):
             time_s = step * self._dt_s
             spare.see(FramePoses(time_s=time_s, frame=step * self._stride, agents=agents), model)
-            for held in ("", TURNING, "stale-pose"):
+            for held in ("", _TURNING, "stale-pose"):
                 spare.tick(time_s, held)
 
     def see(self, poses: FramePoses, model: InForce) -> Target | None:
@@ -238,9 +236,9 @@ class Pilot:
         elif not held and self._seen_s - target.time_s > self._dt_s + PATIENCE_S:
             # A step's target holds until the next step's; none has come for long.
             held = STALE_TARGET
-        elif held in {"", TURNING}:
+        elif held in {"", _TURNING}:
             try:
-                wheels = self._wheels(pose, target.goal, time_s, turning=held == TURNING)
+                wheels = self._wheels(pose, target.goal, time_s, turning=held == _TURNING)
                 message = self._robot.frame_for(wheels)
             except InputError:
                 wheels, held = Wheels(), "refused"
@@ -303,7 +301,7 @@ class Pilot:
         return True
 
     def _aim(self, poses: FramePoses, step: int, model: InForce) -> Target | None:
-        key = np.random.SeedSequence(self._seed, spawn_key=(DRAWS, step))
+        key = np.random.SeedSequence(self._seed, spawn_key=(_DRAWS, step))
         move = self._among.step(model.packed, int(key.generate_state(1, np.uint64)[0]))
         if move is None or not all(map(math.isfinite, (move.x_m, move.y_m, move.speed_m_s))):
             return None
@@ -373,7 +371,7 @@ def target_item(target: Target) -> dict[str, Any]:
 
 def command_item(command: Command, letter: str) -> dict[str, Any]:
     """Return a command as it stands in the log, but for whether it was sent."""
-    stands = command.held not in {"", TURNING}
+    stands = command.held not in {"", _TURNING}
     return {
         "what": "command",
         "time_s": command.time_s,

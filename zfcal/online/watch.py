@@ -27,7 +27,6 @@ from zfcal.online.watch_events import (
     WatchTell,
     told_by,
 )
-from zfcal.online.watch_running import Running, begin
 from zfcal.online.watch_stages import (
     ANALYSE,
     CALIBRATE,
@@ -35,8 +34,10 @@ from zfcal.online.watch_stages import (
     NICENESS,
     TRACK,
     Outcome,
+    Running,
     Turn,
     WatchOptions,
+    begin,
     has_ended,
 )
 from zfcal.online.worker import Done, Failure, Worker
@@ -87,7 +88,7 @@ def watch(root: Path, options: WatchOptions, tell: WatchTell) -> list[of.LeftOut
         polls = reason_to_poll(root, asked=options.poll)
         hints = Hints(root, polls=polls is not None)
         stack.callback(hints.close)
-        loop = Watch(root, options, tell, hints=hints)
+        loop = _Watch(root, options, tell, hints=hints)
         stack.callback(loop.close)
         loop.begin(polls)
         while not loop.is_over():
@@ -96,7 +97,7 @@ def watch(root: Path, options: WatchOptions, tell: WatchTell) -> list[of.LeftOut
 
 
 @final
-class Watch:
+class _Watch:
     """One run of a watch.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from zfcal.stages import events as of
 
-EVENT = "zfcal.watch-event/1"
+_EVENT = "zfcal.watch-event/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +121,7 @@ class Happened:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        head: dict[str, Any] = {"schema": EVENT, "at_s": round(self.at_s, 3), "event": self.kind}
+        head: dict[str, Any] = {"schema": _EVENT, "at_s": round(self.at_s, 3), "event": self.kind}
         return {**head, **({"stage": self.stage} if self.stage else {}), **self.values}
 
 

@@ -1,4 +1,6 @@
-"""What the stages of a watch do with an order; the functions are those of the commands.
+"""What the stages of a watch do with an order, and what its loop knows of each.
+
+The functions are those of the commands.
 
 Each loads what it needs when it begins: a process that analyses has no use for a compiler.
 """
@@ -13,9 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from zfcal.artifacts.segments import segment_path, segment_starts
+from zfcal.online.arrivals import Signature
 from zfcal.online.scheduling import Overruns, budget_of, choose
-from zfcal.online.watch_events import Skipped, Takes
-from zfcal.online.worker import Job
+from zfcal.online.watch_events import Skipped, StageStatus, Takes
+from zfcal.online.worker import Job, Worker
 from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
 from zfcal.stages.recording import starts_between, stretch_of
 from zfcal.stages.segments import Segments
@@ -242,6 +245,47 @@ class WatchOptions:
         if self.calibrate is not None:
             jobs[CALIBRATE] = CalibrateStage(root=root, options=self.calibrate)
         return jobs
+
+
+@dataclass(slots=True, kw_only=True)
+class Running:
+    """A stage as the loop knows it.
+
+    Parameters
+    ----------
+    name, job, worker
+        Which stage, what it does, and its process.
+    asked_for, done_for
+        What the trial looked like at its last order, and when it had nothing more to do.
+    failures, retry_s, said
+        Failures in a row, when it is tried again, and what it said.
+    is_over
+        Whether a tracker has come to the end.
+    taken_s
+        When it began with a window.
+    left_out
+        What its last order had to leave out.
+    status
+        For the status line.
+    """
+
+    name: str
+    job: Job
+    worker: Worker
+    asked_for: Signature = frozenset()
+    done_for: Signature | None = None
+    failures: int = 0
+    retry_s: float = 0.0
+    said: str = ""
+    is_over: bool = False
+    taken_s: float = 0.0
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
+    status: StageStatus = field(default_factory=StageStatus)
+
+
+def begin(name: str, job: Job) -> Running:
+    """Start the process of a stage."""
+    return Running(name=name, job=job, worker=Worker(name, job, niceness=NICENESS[name]))
 
 
 def has_ended(root: Path, whole: Mapping[int, float]) -> bool:

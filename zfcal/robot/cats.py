@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 Settings: TypeAlias = Mapping[str, tuple[float, ...]]
 
-PORT = 5557
+_PORT = 5557
 DT = "robots/fishModel/simulation/dt"
 _ZONE = "robots/fishModel/ZonedBM/zone_{number}/{name}"
 _RIG = "cats"
 
-RETRY_S = 0.25
+_RETRY_S = 0.25
 """What the rig has not confirmed is sent again so often."""
 
-PATIENCE_S = 10.0
+_PATIENCE_S = 10.0
 """After so long without confirmation that is said; what is confirmed is asked for so often."""
 
 _DIGITS = 2e-5
@@ -52,7 +52,7 @@ class Address:
     """
 
     host: str
-    port: int = PORT
+    port: int = _PORT
 
     @classmethod
     def parse(cls, text: str) -> Self:
@@ -63,10 +63,10 @@ class Address:
         InputError
             It is no such address.
         """
-        hint = f"Such as cats2://rig or cats2://10.0.0.5:{PORT}."
+        hint = f"Such as cats2://rig or cats2://10.0.0.5:{_PORT}."
         try:
             parts = urlsplit(text)
-            host, port = parts.hostname, parts.port or PORT
+            host, port = parts.hostname, parts.port or _PORT
         except ValueError as error:
             raise InputError(f"{text!r} is no address of a rig: {error}.", hint=hint) from error
         if parts.scheme != "cats2" or not host or parts.path.strip("/") or not port < 65535:
@@ -233,8 +233,8 @@ class OlderRig:
         if not self._wanted:
             return []
         self._hear()
-        late = bool(self.missing) and now_s - self._offered_s > PATIENCE_S
-        pause_s = RETRY_S if self.missing and not late else PATIENCE_S
+        late = bool(self.missing) and now_s - self._offered_s > _PATIENCE_S
+        pause_s = _RETRY_S if self.missing and not late else _PATIENCE_S
         if now_s - self._asked_s >= pause_s:
             self._asked_s = now_s
             self._send()

@@ -22,7 +22,7 @@ LIST_NODES, GET_DESCRIPTION, GET_NODE_DESCRIPTION = 0xA011, 0xA000, 0xA010
 NODE_PRESENT, DESCRIPTION, NAMED_VARIABLE_DESCRIPTION = 0x900C, 0x9000, 0x9001
 SET_VARIABLES, DISCONNECTED = 0xA00C, 0x9004
 
-PROTOCOL_VERSION = 5
+_PROTOCOL_VERSION = 5
 _FIRST_NODE = 30
 _WORD = range(-(2**15), 2**15)
 
@@ -74,17 +74,17 @@ def obstacle_avoidance(letter: str, mode: int) -> Frame:
 
 def list_nodes() -> Frame:
     """Return the question who is there, which nodes answer by NODE_PRESENT."""
-    return Frame(type=LIST_NODES, payload=struct.pack("<H", PROTOCOL_VERSION))
+    return Frame(type=LIST_NODES, payload=struct.pack("<H", _PROTOCOL_VERSION))
 
 
 def get_description() -> Frame:
     """Return the question that nodes with older firmware answer by DESCRIPTION."""
-    return Frame(type=GET_DESCRIPTION, payload=struct.pack("<H", PROTOCOL_VERSION))
+    return Frame(type=GET_DESCRIPTION, payload=struct.pack("<H", _PROTOCOL_VERSION))
 
 
 def get_node_description(node: int) -> Frame:
     """Return the question that one node answers by DESCRIPTION."""
-    payload = struct.pack("<HH", node, PROTOCOL_VERSION)
+    payload = struct.pack("<HH", node, _PROTOCOL_VERSION)
     return Frame(type=GET_NODE_DESCRIPTION, payload=payload)
 
 
@@ -96,14 +96,14 @@ def set_variables(node: int, start: int, values: list[int]) -> Frame:
 
 def node_present(node: int) -> Frame:
     """Return a node's answer to LIST_NODES."""
-    return Frame(type=NODE_PRESENT, source=node, payload=struct.pack("<H", PROTOCOL_VERSION))
+    return Frame(type=NODE_PRESENT, source=node, payload=struct.pack("<H", _PROTOCOL_VERSION))
 
 
 def description(node: int, name: str) -> Frame:
     """Return a node's answer to a question for its description, without variables."""
     said = name.encode()
     # Version, then sizes of bytecode, stack and variables, then counts of what is described apart.
-    rest = struct.pack("<7H", PROTOCOL_VERSION, 0, 0, 0, 0, 0, 0)
+    rest = struct.pack("<7H", _PROTOCOL_VERSION, 0, 0, 0, 0, 0, 0)
     return Frame(type=DESCRIPTION, source=node, payload=bytes([len(said)]) + said + rest)
 
 

@@ -7,10 +7,10 @@ from typing import final
 
 from zfcal.robot.events import Said
 
-OBSTACLE_S = 0.5
+_OBSTACLE_S = 0.5
 """An obstacle that is not met again has gone after so long."""
 
-STARVED_S = 3.0
+_STARVED_S = 3.0
 """PowerDown that comes again and again for so long means that the supply is lost."""
 
 _PAUSE_S = 1.0
@@ -46,6 +46,6 @@ class Complaints:
 
     def fault(self, now_s: float) -> str:
         """Return ``power-down``, ``obstacle`` or nothing."""
-        if now_s - self._low_s <= _PAUSE_S and now_s - self._low_from_s >= STARVED_S:
+        if now_s - self._low_s <= _PAUSE_S and now_s - self._low_from_s >= _STARVED_S:
             return "power-down"
-        return "obstacle" if now_s - self._obstacle_s < OBSTACLE_S else ""
+        return "obstacle" if now_s - self._obstacle_s < _OBSTACLE_S else ""

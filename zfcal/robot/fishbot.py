@@ -116,10 +116,6 @@ class FishBot:
             self._until_s = until_s
             self.line.beat(until_s)
 
-    def avoid_obstacles(self, mode: int) -> None:
-        """Set what the robot does at obstacles by itself: 0 nothing, 1 Braitenberg, 2 turn."""
-        self.line.write(events.obstacle_avoidance(self.letter, mode).encode())
-
     def listen(self) -> list[Said]:
         """Return what was said since; over a new connection the robot is asked who it is."""
         if self.line.n_opened != self._opened and self.line.is_open:

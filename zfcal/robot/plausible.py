@@ -23,10 +23,10 @@ radius. Cameras are off by millimetres; whoever is farther out is not in the tan
 CONSISTENT_FRAMES = 5
 """After so many frames at a place that it cannot have driven to the robot is there all the same."""
 
-LATEST_S = 1e9
+_LATEST_S = 1e9
 """Seconds since a trial began, some thirty years: no frame is later."""
 
-OFF_S, OFF = 1.0, 0.02
+_OFF_S, _OFF = 1.0, 0.02
 """So far a frame's number may be from its time: a second and 2 %, cameras are a little off."""
 
 
@@ -58,9 +58,9 @@ def is_frame(time_s: float, frame: int, fps: float) -> bool:
     fps
         Frames a second, in the trial.
     """
-    if not (0.0 <= time_s <= LATEST_S and frame >= 0):
+    if not (0.0 <= time_s <= _LATEST_S and frame >= 0):
         return False
-    return abs(frame / fps - time_s) <= OFF_S + OFF * time_s
+    return abs(frame / fps - time_s) <= _OFF_S + _OFF * time_s
 
 
 @final

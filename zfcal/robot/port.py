@@ -35,8 +35,8 @@ from zfcal.robot.stop_guard import (
 
 T = TypeVar("T")
 
-BAUD = 115200
-RETRY_S = 0.25
+_BAUD = 115200
+_RETRY_S = 0.25
 _WRITE_S = 0.05
 """A line that takes no byte for longer has nobody at the other end."""
 
@@ -107,7 +107,7 @@ class SerialLine:
         self._lock = threading.Lock()
         self._serial: serial.Serial | None = None
         self._output: Output | None = None
-        self._helper: Helper | None = None
+        self._helper: _Helper | None = None
         self._full_since_s = float("inf")
         self._until_s = float("inf") if is_lossless else 0.0
         self._closing = threading.Event()
@@ -192,14 +192,14 @@ class SerialLine:
                 return
             self._wanted.clear()
             if not (self._replace_helper() if self.is_open else self._open()):
-                self._closing.wait(RETRY_S)
+                self._closing.wait(_RETRY_S)
                 self._wanted.set()
 
     def _open(self) -> bool:
         slate = Slate.shared()
         slate.until_s = self._until_s
         try:
-            opened = serial.Serial(self.port, BAUD, timeout=0, write_timeout=0, exclusive=True)
+            opened = serial.Serial(self.port, _BAUD, timeout=0, write_timeout=0, exclusive=True)
         except (*_BREAKS, ValueError) as error:
             self.problem = str(error)
             return False
@@ -209,7 +209,7 @@ class SerialLine:
             # Before all else: what drove the robot before may have left its wheels turning.
             if not output.begin():
                 raise serial.SerialTimeoutException("it takes no STOP")
-            helper = Helper(opened.fileno(), slate, is_lossless=lossless)
+            helper = _Helper(opened.fileno(), slate, is_lossless=lossless)
         except _BREAKS as error:
             self.problem = str(error)
             opened.close()
@@ -239,7 +239,7 @@ class SerialLine:
                 return False
             before.slate.put(HELPER, STATE, WHOLE)
             try:
-                made = Helper(port.fileno(), before.slate, is_lossless=self._is_lossless)
+                made = _Helper(port.fileno(), before.slate, is_lossless=self._is_lossless)
             except OSError as error:
                 self.problem = str(error)
                 return False
@@ -289,7 +289,7 @@ class SerialLine:
 
 
 @final
-class Helper:
+class _Helper:
     """The process that stops the robot when this one cannot.
 
     Parameters

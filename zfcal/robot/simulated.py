@@ -92,7 +92,6 @@ class SimulatedFishBot:
         self.traits = traits
         self.pose = pose
         self.wheels = Wheels()
-        self.avoidance = 0
         self.way_m = 0.0
         self.n_received = 0
         self._steps = 0
@@ -200,8 +199,6 @@ class SimulatedFishBot:
             self._asked = _accepted(arguments[0] * M_PER_CM, arguments[1] * M_PER_CM)
         elif frame.type == events.FISH_BEHAVIOR + own and len(arguments) == 3:
             self._begin(*arguments)
-        elif frame.type == events.OBSTACLE_AVOIDANCE + own and arguments:
-            self.avoidance = arguments[0]
 
     def _begin(self, turn_deg: int, ticks: int, speed_cm_s: int) -> None:
         """Turn, go so far, then glide: each part ends when nothing is left of it."""

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from zfcal.errors import InputError
 from zfcal.robot.stop_guard import DRIVER, Descriptor, Output, Slate
 
-PATIENCE_S = 0.7
+_PATIENCE_S = 0.7
 """After so long it is said that STOP has not gone yet: where the radio link is up it has."""
 
 LONGEST_S = 15.0
@@ -35,7 +35,7 @@ def stop_at(port: str, tell: Callable[[str], None], *, resync: bool = False) -> 
     port
         A serial port, such as ``/dev/rfcomm5``; 115200 baud, 8N1.
     tell
-        Hears after `PATIENCE_S` that STOP waits for the link, if it does.
+        Hears after 0.7 s that STOP waits for the link, if it does.
     resync
         Whether bytes follow by which a receiver that has lost one finds its place again, and STOP.
 
@@ -121,7 +121,7 @@ def _send(descriptor: Descriptor, tell: Callable[[str], None], *, resync: bool) 
             if is_said and not descriptor.unsent():
                 return ""
             problem = "it does not leave the port" if is_said else "it is full"
-        if time.monotonic() - began_s > PATIENCE_S and not is_told:
+        if time.monotonic() - began_s > _PATIENCE_S and not is_told:
             is_told = True
             tell(f"STOP waits for the link ({problem}); Ctrl-C gives up.")
         time.sleep(_PAUSE_S)

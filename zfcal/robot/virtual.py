@@ -34,7 +34,7 @@ _HEARD = 100_000
 
 
 @final
-class Terminal:
+class _Terminal:
     """The robot's end of the line."""
 
     def __init__(self, link: Path) -> None:
@@ -84,7 +84,7 @@ class Terminal:
 
 
 @final
-class VirtualRobot:
+class _VirtualRobot:
     """Serves one simulated robot to a line and to those who watch it.
 
     Parameters
@@ -102,7 +102,7 @@ class VirtualRobot:
     ) -> None:
         self._robot = robot
         self._stepped = stepped
-        self._terminal = Terminal(link)
+        self._terminal = _Terminal(link)
         self._control = control
         self._server = socket.socket(socket.AF_UNIX)
         control.unlink(missing_ok=True)
@@ -276,7 +276,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         seed=given.seed,
         confines=confines,
     )
-    served = VirtualRobot(robot, given.link, given.control, stepped=given.stepped)
+    served = _VirtualRobot(robot, given.link, given.control, stepped=given.stepped)
     print(json.dumps({"port": str(given.link)}), flush=True)  # noqa: T201 - it is ready
     with contextlib.suppress(KeyboardInterrupt):
         served.serve(until_eof=given.until_eof)

@@ -83,8 +83,8 @@ def _recording(run: Run, source: Source, name: str) -> Item:
 
     def record() -> Recording:
         tracks = _read(source, name, options, run.tell)
-        tell_outside(opened, tracks, run.tell)
-        tell_missing(opened, tracks, run.tell)
+        _tell_outside(opened, tracks, run.tell)
+        _tell_missing(opened, tracks, run.tell)
         return Recording(
             tracks=tracks,
             end_s=float(tracks.time_s[-1]) + 1 / opened.trial.fps,
@@ -155,7 +155,7 @@ def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Trac
     return concatenate([found.tracks, robots])
 
 
-def tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
+def _tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
     """Warn of fish or robots that trial.toml states and no frame of the tracks shows."""
     trial = opened.trial
     for kind, word, stated in ((FISH, "fish", trial.n_fish), (ROBOT, "robots", trial.n_robots)):
@@ -170,7 +170,7 @@ def tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
             tell(Note(text=text, warning=True))
 
 
-def tell_outside(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
+def _tell_outside(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
     """Say how many positions lie outside the arena.
 
     Raises

@@ -29,9 +29,9 @@ from zfcal.stages.trial_context import Task
 from zfcal.trial import Trial
 from zfcal.units import default_dt_s
 
-ARENA_FILE = "arena.geojson"
+_ARENA_FILE = "arena.geojson"
 
-MIN_FPS, MAX_FPS = 1e-3, 1e6
+_MIN_FPS, _MAX_FPS = 1e-3, 1e6
 """Frame rates outside these, in hertz, are no camera's."""
 
 
@@ -100,9 +100,9 @@ def create_trial(
     """
     task = task or Task()
     arena, name, document = _arena(root, new)
-    if not MIN_FPS <= new.fps <= MAX_FPS:
+    if not _MIN_FPS <= new.fps <= _MAX_FPS:
         raise InputError(
-            f"{root}: fps must be {MIN_FPS:g} to {MAX_FPS:g} Hz, got {new.fps!r}.",
+            f"{root}: fps must be {_MIN_FPS:g} to {_MAX_FPS:g} Hz, got {new.fps!r}.",
             hint="Give the frame rate of the tracks with --fps.",
         )
     dt_s = default_dt_s(new.fps) if new.dt_s is None else new.dt_s
@@ -122,7 +122,7 @@ def create_trial(
             tell(Planned(path=path, reason=reason))
         return trial
     if reason and document is not None:
-        write_text_whole(root / ARENA_FILE, document)
+        write_text_whole(root / _ARENA_FILE, document)
     _write_model(trial, arena, model, tell)
     # Last, since a directory is a trial from here on.
     if reason:
@@ -143,11 +143,11 @@ def _reason(trial: Trial, document: str | None, task: Task) -> str | None:
         if field.name not in {"root", "cameras", "model"}
         and getattr(found, field.name) != getattr(trial, field.name)
     ]
-    place = trial.root / ARENA_FILE
+    place = trial.root / _ARENA_FILE
     if document is not None and not (
         is_regular(place) and read_limited(place) == document.encode()
     ):
-        changed.append(f"its {ARENA_FILE} is another")
+        changed.append(f"its {_ARENA_FILE} is another")
     if changed:
         raise InputError(
             f"{trial.root}: is a trial already, and differs: {'; '.join(changed)}.",
@@ -167,7 +167,7 @@ def _arena(root: Path, new: NewTrial) -> tuple[Arena, str, str | None]:
         _check_alone(new, "open-square", "side_m")
         made = rectangle_document(new.side_m, new.side_m)
     if made is not None:
-        return arena_of(made), ARENA_FILE, json.dumps(made, indent=1) + "\n"
+        return arena_of(made), _ARENA_FILE, json.dumps(made, indent=1) + "\n"
     if new.arena is None:
         raise InputError(
             f"{root}: a trial needs an arena.",
@@ -176,7 +176,7 @@ def _arena(root: Path, new: NewTrial) -> tuple[Arena, str, str | None]:
     arena = load_arena(new.arena, Path())
     if new.arena in shipped_arenas():
         return arena, new.arena, None
-    return arena, ARENA_FILE, Path(new.arena).read_text("utf-8")
+    return arena, _ARENA_FILE, Path(new.arena).read_text("utf-8")
 
 
 def _check_alone(new: NewTrial, name: str, key: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from zfcal.artifacts.reading.contents import hash_of, hold_steady
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, write_tracks
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.events import Note, Progress
+from zfcal.stages.events import Note, Progress, Tell
 from zfcal.stages.segments import END_KEY, STEP_S
 from zfcal.stages.stage import Draft, Item, Output, Run, Write
 from zfcal.stages.taken import unless_taken
@@ -111,13 +111,9 @@ def starts_of_recording(root: Path) -> list[int]:
     killed half-way is known to be unfinished. Empty where no segment says so.
     """
     for start in segment_starts(root):
-        try:
-            stretch = read_extra(segment_path(root, start)).get(STRETCH_KEY)
-        except (DamagedError, InputError):
-            continue
-        if isinstance(stretch, list):
-            first_s, end_s = (float(str(edge)) for edge in stretch)
-            return starts_between(first_s, end_s)
+        stretch = stretch_of(segment_path(root, start))
+        if stretch is not None:
+            return starts_between(*stretch)
     return []
 
 
@@ -190,19 +186,34 @@ def _parts(run: Run, lineage: Lineage, recording: Recording) -> Iterator[Draft]:
         output = Output(path=segment_path(run.root, start), lineage=lineage)
         yield Draft(output=output, write=_writer(tracks, extra))
         run.tell(Progress(stage="segments", done=number, total=len(parts)))
-    _remove_others(run, {start for start, _ in parts})
+    others = set(segment_starts(run.root)) - {start for start, _ in parts}
+    remove_surplus([segment_path(run.root, start) for start in others], run.tell, run.task)
 
 
-def _remove_others(run: Run, starts: set[int]) -> None:
-    why = "the recording does not reach there any more."
-    for start in set(segment_starts(run.root)) - starts:
-        path = segment_path(run.root, start)
-        if run.task.dry_run:
-            run.tell(Note(text=f"would remove {path}: {why}"))
+def remove_surplus(
+    paths: Iterable[Path], tell: Tell, task: Task, *, of: str = "recording does"
+) -> None:
+    """Remove the files of minutes that are not reached any more, and tell each.
+
+    Parameters
+    ----------
+    paths
+        The files.
+    tell
+        Hears of them.
+    task
+        A dry run says what it would remove.
+    of
+        What does not reach there, with its verb.
+    """
+    why = f"the {of} not reach there any more."
+    for path in paths:
+        if task.dry_run:
+            tell(Note(text=f"would remove {path}: {why}"))
             continue
-        with unless_taken(path, run.tell):
+        with unless_taken(path, tell):
             remove(path)
-            run.tell(Note(text=f"{path}: removed, {why}"))
+            tell(Note(text=f"{path}: removed, {why}"))
 
 
 def _writer(tracks: Tracks, extra: Mapping[str, JSON]) -> Write:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
@@ -23,8 +23,6 @@ from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, s
 from zfcal.stages.stage import Item, OneThing, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

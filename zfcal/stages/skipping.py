@@ -17,18 +17,18 @@ from zfcal.artifacts.reading.places import is_regular
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.trial_context import Task
 
-SKIPPED = "zfcal.skipped/1"
-ENDING = ".skipped.json"
+_SKIPPED = "zfcal.skipped/1"
+_ENDING = ".skipped.json"
 
 
 def skipped_path(root: Path, end_s: int) -> Path:
     """Return where it stands that a window has no model."""
-    return root / "models" / f"{end_s:06d}{ENDING}"
+    return root / "models" / f"{end_s:06d}{_ENDING}"
 
 
 def skipped_ends(root: Path) -> set[int]:
     """Return the ends of the windows that were passed over, in seconds."""
-    return {end for end, path in numbered_of(root / "models", ENDING).items() if is_regular(path)}
+    return {end for end, path in numbered_of(root / "models", _ENDING).items() if is_regular(path)}
 
 
 def without_skipped(root: Path, ends: list[int], task: Task, tell: Tell) -> list[int]:
@@ -74,10 +74,10 @@ def write_skipped(root: Path, end_s: int, *, went_on_with_s: int, because: str) 
     """
     stats = root / "stats" / f"{end_s:06d}.parquet"
     inputs = hash_inputs(root, [stats] if is_regular(stats) else [])
-    origin = Lineage(schema=SKIPPED, command="watch", inputs=inputs).as_dict()
+    origin = Lineage(schema=_SKIPPED, command="watch", inputs=inputs).as_dict()
     del origin["schema"]
     document = {
-        "schema": SKIPPED,
+        "schema": _SKIPPED,
         "window_end_s": end_s,
         "went_on_with_s": went_on_with_s,
         "because": because,

@@ -15,7 +15,7 @@ the same everywhere:
 * A damaged input, or a folder in the place of a file, keeps that thing away and no other.
 * What happened is told.
 
-What a trial is and what bears on a run is in `opening`, what is told in `events`.
+What a trial is and what bears on a run is in `trial_context`, what is told in `events`.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class Draft:
     write: Write
 
 
-def nothing() -> None:
+def _nothing() -> None:
     """Do nothing: for things that are finished when their files are there."""
 
 
@@ -169,7 +169,7 @@ class Item:
 
     outputs: Sequence[Output]
     compute: Callable[[], Iterable[Draft]]
-    finish: Callable[[], None] = nothing
+    finish: Callable[[], None] = _nothing
     apart: bool = False
 
 

@@ -13,17 +13,25 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, final
 
 import numpy as np
 
+from zfcal.drive.clock import PoseClock
+from zfcal.drive.drive import DriveOptions, lineage_of
+from zfcal.drive.driving import Crew, Driver
+from zfcal.drive.log import DriveLog
+from zfcal.drive.models import DriveModels
+from zfcal.errors import InputError
+from zfcal.robot.fishbot import FishBot
+from zfcal.robot.port import SerialLine
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import Progress, Tell
 from zfcal.stages.segments import STEP_S
-from zfcal.stages.trial_context import Task
+from zfcal.stages.trial_context import OpenTrial, Task
+from zfcal.tracks import FramePoses
 from zfcal.virtual.eyes import VirtualEyes
 from zfcal.virtual.fish import VirtualFish
-from zfcal.virtual.lockstep import LockstepDriver
 from zfcal.virtual.rounds import RoundsBeside, Windows, do_rounds, rounds_beside
 from zfcal.virtual.trial import (
     FPS,
@@ -40,10 +48,11 @@ from zfcal.virtual.trial import (
     robot_of,
 )
 
-ROUND_S = 55.0
+_ROUND_S = 55.0
 """After so many seconds a rig has analysed and calibrated a window that has ended."""
 
 _TOLD_EVERY = 150
+_OPENING_S = 5.0
 
 
 def closed_loop(
@@ -80,9 +89,9 @@ def closed_loop(
     clear(experiment)
     with rounds_beside(experiment, tell) as rounds:
         with robot_of(experiment, stepped=True) as robot:
-            driver = LockstepDriver(experiment.trial, robot.port, tell, after_s=ROUND_S)
+            driver = _LockstepDriver(experiment.trial, robot.port, tell, after_s=_ROUND_S)
             try:
-                _run(Parts(experiment, robot, driver, rounds), tell)
+                _run(_Parts(experiment, robot, driver, rounds), tell)
             finally:
                 driver.close()
         keep(experiment)
@@ -90,21 +99,84 @@ def closed_loop(
     return experiment.root
 
 
-class Parts(NamedTuple):
+@final
+class _LockstepDriver:
+    """Does at each frame what ``zfcal drive --clock poses`` does, and logs it likewise.
+
+    It is handed each frame in turn: no waiting, no watchdog, the poses' clock.
+
+    Parameters
+    ----------
+    opened
+        The trial, whose newest model drives.
+    port
+        The robot's serial port.
+    tell
+        Hears of models and faults.
+    after_s
+        So many seconds after its window has ended a model drives.
+
+    Raises
+    ------
+    InputError
+        The port cannot be opened.
+    """
+
+    def __init__(self, opened: OpenTrial, port: Path, tell: Tell, *, after_s: float) -> None:
+        options = DriveOptions(port=str(port), clock="poses")
+        line = SerialLine(str(port), is_lossless=True)
+        if not line.wait(_OPENING_S):
+            line.close()
+            raise InputError(f"{port}: the port cannot be opened ({line.problem or 'no answer'}).")
+        self._robot = FishBot(options.manner.letter, line)
+        self._log = DriveLog(opened.trial, lineage_of(opened, options), tell)
+        crew = Crew(
+            robot=self._robot,
+            clock=PoseClock(opened.trial.fps),
+            models=DriveModels(opened, after_s=after_s),
+            log=self._log,
+            tell=tell,
+        )
+        self._driver = Driver(opened, options.manner, crew)
+        self._driver.warm_up()
+
+    @property
+    def n_sent(self) -> int:
+        """Events that went to the robot until now."""
+        return self._robot.n_sent
+
+    def take(self, poses: FramePoses) -> None:
+        """Do all that is due at a frame."""
+        self._driver.listen()
+        self._driver.take([poses])
+        self._driver.tick()
+        self._log.flush()
+
+    def close(self) -> None:
+        """Stop the robot and close the log."""
+        self._robot.close()
+        self._log.close()
+
+
+class _Parts(NamedTuple):
     """What makes up a loop."""
 
     experiment: Experiment
     robot: VirtualProcess
-    driver: LockstepDriver
+    driver: _LockstepDriver
     rounds: RoundsBeside
 
 
-def _run(parts: Parts, tell: Tell) -> None:
+def _run(parts: _Parts, tell: Tell) -> None:
     experiment, robot, driver, rounds = parts
     options, fish = experiment.options, fish_of(experiment)
-    with eyes_of(experiment, fish) as eyes:
+    with _eyes_of(experiment, fish) as eyes:
         files = Files(experiment, fish, eyes)
-        n_frames, ended_s, due_s = round(options.duration_s * FPS), 2 * STEP_S, 2 * STEP_S + ROUND_S
+        n_frames, ended_s, due_s = (
+            round(options.duration_s * FPS),
+            2 * STEP_S,
+            2 * STEP_S + _ROUND_S,
+        )
         for number in range(n_frames):
             at = robot.control.ask("advance", to_s=number / FPS, received=driver.n_sent)
             where = np.array([at["x_m"], at["y_m"], at["heading_rad"]])
@@ -122,7 +194,7 @@ def _run(parts: Parts, tell: Tell) -> None:
 
 
 @contextlib.contextmanager
-def eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
+def _eyes_of(experiment: Experiment, fish: VirtualFish) -> Iterator[Eyes]:
     """Give who tracks: cameras and a tracker, or the truth with noise."""
     if not experiment.options.video:
         yield Noisy(fish)

@@ -24,10 +24,10 @@ from zfcal.virtual.film import FilmOptions, film, frames_folder
 
 DURATION_S = 180.0
 FPS = 15.0
-TANK_SEED = 27
+_TANK_SEED = 27
 """With this one the fish visit both rooms, and the corridor 9 % of the time, within six minutes."""
 
-TRIAL_SEED = 1
+_TRIAL_SEED = 1
 
 SETTINGS = Settings(
     population=40, generations=10, steps=1500, n_confirmed=4, long_runs=4, n_windows=100
@@ -58,12 +58,12 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
     """
     task = task or Task()
     tank, trial = folder / "tank", folder / "trial"
-    new = NewTrial(n_fish=4, n_robots=1, fps=FPS, arena="two-rooms", seed=TANK_SEED)
+    new = NewTrial(n_fish=4, n_robots=1, fps=FPS, arena="two-rooms", seed=_TANK_SEED)
     made = create_trial(tank, new, tell, task=task)
     swim = SimulateOptions(model=tank / made.model, duration_s=DURATION_S)
     simulate(tank, swim, tell, task=task)
     film(tank, FilmOptions(), tell, task=task)
-    seen = dataclasses.replace(new, seed=TRIAL_SEED, source="zfcal demo: images of a drawn tank")
+    seen = dataclasses.replace(new, seed=_TRIAL_SEED, source="zfcal demo: images of a drawn tank")
     create_trial(trial, seen, tell, task=task)
     track(trial, _cameras(tank, folder / "contact-sheet.png"), tell, task=task)
     analyse(trial, AnalyseOptions(), tell, task=task)

@@ -35,7 +35,7 @@ _PAST = 12
 
 
 @final
-class Postures:
+class _Postures:
     """How everybody lies in each frame.
 
     Parameters
@@ -55,19 +55,19 @@ class Postures:
         return swum.at(len(swum) - 1)
 
 
-def above_of(opened: OpenTrial) -> OverheadPainter:
+def _above_of(opened: OpenTrial) -> OverheadPainter:
     """Return what draws for the camera over the tank of a trial."""
     arena, seed = opened.arena, opened.trial.seed
     return OverheadPainter(arena, overhead_camera(arena), look_of(USUAL), seed=seed)
 
 
-def below_of(opened: OpenTrial) -> BelowPainter:
+def _below_of(opened: OpenTrial) -> BelowPainter:
     """Return what draws for the camera under the tank of a trial."""
     arena, seed = opened.arena, opened.trial.seed
     return BelowPainter(arena, below_camera(arena), look_of(USUAL), seed=seed)
 
 
-def photo_of(painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
+def _photo_of(painter: OverheadPainter | BelowPainter, moment: Moment) -> bytes:
     """Return a moment as a camera would take it, as a JPEG file."""
     return encoded(painter.paint(moment), look_of(USUAL).jpeg_quality)
 
@@ -92,24 +92,24 @@ class Drawn:
     def __init__(self, opened: OpenTrial) -> None:
         # In real time no frame has to wait for a compiler.
         prepare()
-        self._postures = Postures(opened)
-        self._above, self._under = above_of(opened), below_of(opened)
-        self.nobody = (photo_of(self._above, _nobody()), photo_of(self._under, _nobody()))
-        self.empty = decoded(self.nobody[0])
+        self._postures = _Postures(opened)
+        self._above, self._under = _above_of(opened), _below_of(opened)
+        self.nobody = (_photo_of(self._above, _nobody()), _photo_of(self._under, _nobody()))
+        self.empty = _decoded(self.nobody[0])
 
     def images(self, truth: FramePoses) -> tuple[bytes, bytes]:
         """Return the images of a frame from above and from below, as JPEG files."""
         moment = self._postures.moment(truth)
-        return photo_of(self._above, moment), photo_of(self._under, moment)
+        return _photo_of(self._above, moment), _photo_of(self._under, moment)
 
 
-def decoded(data: bytes) -> Image:
+def _decoded(data: bytes) -> Image:
     """Return an image from its file."""
     return np.asarray(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
 
 
 @final
-class EyeBelow:
+class _EyeBelow:
     """Draws each frame as the camera below would take it, and finds the robot in it.
 
     It is the job of a `Worker`: both cameras have nothing to do with each other.
@@ -129,14 +129,14 @@ class EyeBelow:
         painter, finder = self._ready = self._ready or self._prepared()
         if moment is None:
             return None
-        image = decoded(photo_of(painter, moment))
+        image = _decoded(_photo_of(painter, moment))
         return finder.step(Frame(number=moment.number, time_s=moment.time_s, image=image))
 
     def _prepared(self) -> tuple[BelowPainter, RobotFinder]:
         opened = open_trial(self._root)
         under = below_camera(opened.arena)
         mask = (region_of(opened.arena, under) * np.uint8(255)).astype(np.uint8)
-        return below_of(opened), RobotFinder(LedOptions(), under, mask=mask)
+        return _below_of(opened), RobotFinder(LedOptions(), under, mask=mask)
 
 
 @final
@@ -151,14 +151,14 @@ class VirtualEyes:
 
     def __init__(self, opened: OpenTrial) -> None:
         trial, arena = opened.trial, opened.arena
-        self._beside = Worker("camera-below", EyeBelow(trial.root))
+        self._beside = Worker("camera-below", _EyeBelow(trial.root))
         self._beside.order(None)
         above = overhead_camera(arena)
-        self._postures, self._above = Postures(opened), above_of(opened)
+        self._postures, self._above = _Postures(opened), _above_of(opened)
         self._tracker = FishTracker(
             TrackerOptions(n_agents=trial.n_agents),
             above,
-            background=background_of(decoded(photo_of(self._above, _nobody()))),
+            background=background_of(_decoded(_photo_of(self._above, _nobody()))),
             region=region_of(arena, above),
         )
         self._fuser = Fuser(keeps=True, break_s=trial.longest_step_s)
@@ -174,7 +174,7 @@ class VirtualEyes:
         """Return what the tracker makes of the images of a frame."""
         moment = self._postures.moment(truth)
         self._beside.order(moment)
-        image = decoded(photo_of(self._above, moment))
+        image = _decoded(_photo_of(self._above, moment))
         seen = self._tracker.step(Frame(number=truth.frame, time_s=truth.time_s, image=image))
         self._revision.exchange(self._fuser.named(self._tracker.take_exchanges()), truth.time_s)
         robot: RobotSeen = self._beside.answer(say_nothing)

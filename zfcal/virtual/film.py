@@ -15,7 +15,7 @@ from typing import final
 
 import cv2
 
-from zfcal.artifacts.atomic import check_free, remove, write_whole
+from zfcal.artifacts.atomic import check_free, write_whole
 from zfcal.artifacts.cameras import SCHEMA as CAMERA
 from zfcal.artifacts.frame_files import FRAMES, FrameWriter, frame_segments
 from zfcal.artifacts.freshness import hash_inputs
@@ -29,9 +29,10 @@ from zfcal.cameras.camera import Camera, Homography
 from zfcal.cameras.frames import Image
 from zfcal.cameras.rig import below_camera, overhead_camera
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.camera.cameras import read_camera, write_camera
-from zfcal.stages.camera.messages import calibration_of
+from zfcal.stages.camera.cameras import calibration_of, read_camera, write_camera
+from zfcal.stages.camera.rig import BELOW, OVERHEAD
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
+from zfcal.stages.recording import remove_surplus
 from zfcal.stages.segments import STEP_S
 from zfcal.stages.stage import settled
 from zfcal.stages.taken import unless_taken
@@ -43,8 +44,7 @@ from zfcal.virtual.images.render import OverheadPainter
 from zfcal.virtual.images.render_below import BelowPainter
 from zfcal.virtual.images.swimming import Moment, Swimming, swimming
 
-OVERHEAD, BELOW = "overhead", "below"
-COMMAND = "simulate"
+_COMMAND = "simulate"
 
 _TOLD_EVERY = 15
 _QUICK_PNG = 1
@@ -52,7 +52,7 @@ _QUICK_PNG = 1
 _SLACK_S = 1e-6
 """A time this little before a minute's start is the start, but for rounding."""
 
-Painter = OverheadPainter | BelowPainter
+_Painter = OverheadPainter | BelowPainter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ def film(root: Path, options: FilmOptions, tell: Tell, *, task: Task | None = No
     read_trial(root)
     if not segment_starts(root):
         raise InputError(f"{root}: has no tracks to draw.", hint="Simulate some without --dry-run.")
-    with at_work(root, COMMAND, task):
+    with at_work(root, _COMMAND, task):
         settled(lambda: _film(root, options, tell, task), tell)
 
 
@@ -169,9 +169,9 @@ class _Scene:
         inputs = hash_inputs(self.root, files)
         if options.photograph is not None and name == OVERHEAD:
             inputs[options.photograph.name] = hash_of(options.photograph)
-        return Lineage(schema=FRAMES, command=COMMAND, options=said, seed=self.seed, inputs=inputs)
+        return Lineage(schema=FRAMES, command=_COMMAND, options=said, seed=self.seed, inputs=inputs)
 
-    def painter(self, name: str, camera: Camera | Homography) -> Painter:
+    def painter(self, name: str, camera: Camera | Homography) -> _Painter:
         """Return what draws a camera's images."""
         arena, look = self.opened.arena, self.options.look
         if name == BELOW:
@@ -199,7 +199,10 @@ def _film_one(scene: _Scene, name: str, camera_file: Path, tell: Tell, task: Tas
                 write_whole(paths[start], drawer.writer_of(start, total, tell))
                 tell(Made(path=paths[start], reason=reason))
         tell(Progress(stage=f"{name} images", done=total, total=total))
-    _remove_others(scene, name, tell, task)
+    there = frame_segments(frames_folder(scene.root, name))
+    gone = [path for path in there if second_of(path, ".mcap") not in scene.starts]
+    # An earlier, longer simulation left them.
+    remove_surplus(gone, tell, task, of="tracks do")
 
 
 def photograph_of(options: FilmOptions) -> Image | None:
@@ -277,7 +280,7 @@ def _camera(opened: OpenTrial, name: str, tell: Tell, task: Task) -> Path:
         )
     lineage = Lineage(
         schema=CAMERA,
-        command=COMMAND,
+        command=_COMMAND,
         options={"camera": name, "arena": opened.trial.arena},
         inputs=hash_inputs(root, opened.arena_files),
     )
@@ -293,7 +296,7 @@ def _camera(opened: OpenTrial, name: str, tell: Tell, task: Task) -> Path:
 
 def _is_ours(path: Path) -> bool:
     try:
-        return read_lineage(path).command == COMMAND
+        return read_lineage(path).command == _COMMAND
     except (DamagedError, InputError):
         return False
 
@@ -311,21 +314,8 @@ def _check_drawn(root: Path, name: str, task: Task) -> None:
             made_by = read_lineage(path).command
         except (DamagedError, InputError):
             continue
-        if made_by != COMMAND and not task.force:
+        if made_by != _COMMAND and not task.force:
             raise InputError(
                 f"{path}: was recorded by {made_by}, expected none or drawn images.",
                 hint="Draw into another trial, or replace these images with --force.",
             )
-
-
-def _remove_others(scene: _Scene, name: str, tell: Tell, task: Task) -> None:
-    """Remove the images that an earlier, longer simulation left."""
-    for path in frame_segments(frames_folder(scene.root, name)):
-        if second_of(path, ".mcap") in scene.starts:
-            continue
-        if task.dry_run:
-            tell(Note(text=f"would remove {path}: the tracks do not reach there any more."))
-            continue
-        with unless_taken(path, tell):
-            remove(path)
-            tell(Note(text=f"{path}: removed, the tracks do not reach there any more."))

@@ -22,14 +22,15 @@ from zfcal.artifacts.reading.contents import hold_steady
 from zfcal.artifacts.settings import read_trial
 from zfcal.cameras.frames import Image
 from zfcal.errors import DamagedError, InputError, StorageError
+from zfcal.stages.camera.rig import BELOW
 from zfcal.stages.events import Made, Planned, Progress, Tell, UpToDate
 from zfcal.stages.stage import settled
 from zfcal.stages.trial_context import Task
-from zfcal.virtual.film import BELOW, camera_names, frames_folder
+from zfcal.virtual.film import camera_names, frames_folder
 
-SCHEMA = "zfcal.video/1"
+_SCHEMA = "zfcal.video/1"
 
-CODECS = {".avi": "FFV1", ".mkv": "FFV1", ".mp4": "mp4v"}
+_CODECS = {".avi": "FFV1", ".mkv": "FFV1", ".mp4": "mp4v"}
 
 _TOLD_EVERY = 50
 
@@ -40,12 +41,12 @@ def exported_paths(video: Path, cameras: Iterable[str]) -> dict[str, Path]:
     Raises
     ------
     InputError
-        The name ends in none of `CODECS`.
+        The name ends in none of .avi, .mkv and .mp4.
     """
-    if video.suffix not in CODECS:
+    if video.suffix not in _CODECS:
         raise InputError(
             f"{video}: is no video file that can be written.",
-            hint=f"Let its name end in {', '.join(CODECS)}; the first two are lossless.",
+            hint=f"Let its name end in {', '.join(_CODECS)}; the first two are lossless.",
         )
     below = video.with_name(f"{video.stem}-below{video.suffix}")
     return {camera: below if camera == BELOW else video for camera in cameras}
@@ -90,9 +91,9 @@ def _export(root: Path, video: Path, tell: Tell, *, task: Task) -> None:
             # Its images are read one by one while the video is written.
             hold_steady(segment)
         lineage = Lineage(
-            schema=SCHEMA,
+            schema=_SCHEMA,
             command="simulate",
-            options={"camera": camera, "fps": trial.fps, "codec": CODECS[path.suffix]},
+            options={"camera": camera, "fps": trial.fps, "codec": _CODECS[path.suffix]},
             inputs=hash_inputs(root, segments),
         )
         note = path.with_name(path.name + ".json")
@@ -104,7 +105,7 @@ def _export(root: Path, video: Path, tell: Tell, *, task: Task) -> None:
             tell(Planned(path=path, reason=reason))
         else:
             _write(path, segments, trial.fps, tell)
-            document = {"schema": SCHEMA, "lineage": lineage.as_dict()}
+            document = {"schema": _SCHEMA, "lineage": lineage.as_dict()}
             write_text_whole(note, json.dumps(document, indent=1) + "\n")
             tell(Made(path=path, reason=reason))
 
@@ -132,12 +133,12 @@ def _encode(named: Path, path: Path, segments: list[Path], fps: float, tell: Tel
         for image, share in _images(segments):
             if writer is None:
                 size, coloured = (image.shape[1], image.shape[0]), image.ndim == 3
-                codec = cv2.VideoWriter.fourcc(*CODECS[path.suffix])
+                codec = cv2.VideoWriter.fourcc(*_CODECS[path.suffix])
                 writer = cv2.VideoWriter(str(named), codec, fps, size, coloured)
                 if not writer.isOpened():
                     raise StorageError(
-                        f"{path}: OpenCV cannot write {CODECS[path.suffix]} into {path.suffix}.",
-                        hint=f"Try another of {', '.join(CODECS)}.",
+                        f"{path}: OpenCV cannot write {_CODECS[path.suffix]} into {path.suffix}.",
+                        hint=f"Try another of {', '.join(_CODECS)}.",
                     )
             writer.write(image)
             n_frames += 1

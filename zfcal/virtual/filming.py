@@ -15,7 +15,7 @@ from zfcal.stages.trial_context import Task
 from zfcal.virtual.film import FilmOptions, camera_names, film, frames_path, photograph_of
 from zfcal.virtual.film_export import export_video, exported_paths
 
-RIG_FPS = 15.0
+_RIG_FPS = 15.0
 """Frame rate of the rig's cameras, in hertz."""
 
 
@@ -76,7 +76,7 @@ def rig_fps(dt_s: float) -> float:
     >>> rig_fps(0.2)
     15.0
     """
-    return max(1, round(RIG_FPS * dt_s)) / dt_s
+    return max(1, round(_RIG_FPS * dt_s)) / dt_s
 
 
 def _plan(root: Path, options: SimulateOptions, tell: Tell, *, video: Path | None) -> None:

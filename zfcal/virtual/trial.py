@@ -35,8 +35,8 @@ from zfcal.trial import LOOP_NAME
 from zfcal.virtual.fish import FishOptions, VirtualFish
 
 FPS = 15.0
-ARENA = "two-rooms"
-N_FISH = 4
+_ARENA = "two-rooms"
+_N_FISH = 4
 
 _KAPPA_0, _KAPPA_F, _KAPPA_W = 6.3, 20.0, 20.0
 _ALPHA = {False: 55.0, True: 20.0}
@@ -149,7 +149,7 @@ def prepare(folder: Path, options: LoopOptions, tell: Tell, task: Task) -> Exper
     """Return an experiment whose trials are made where they are missing."""
     source = f"zfcal demo --closed-loop: virtual fish, a {options.robot} robot"
     new = NewTrial(
-        n_fish=N_FISH, n_robots=1, fps=FPS, arena=ARENA, seed=options.seed, source=source
+        n_fish=_N_FISH, n_robots=1, fps=FPS, arena=_ARENA, seed=options.seed, source=source
     )
     made = create_trial(folder / "tank", new, tell, task=task)
     arena = open_trial(made.root).arena
@@ -159,7 +159,7 @@ def prepare(folder: Path, options: LoopOptions, tell: Tell, task: Task) -> Exper
     return Experiment(tank=tank, trial=rig, options=options)
 
 
-def lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
+def _lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
     """Return where the files of a virtual experiment come from."""
     said: dict[str, JSON] = {
         "robot": options.robot,
@@ -188,7 +188,7 @@ def is_whole(experiment: Experiment) -> bool:
     if not place.is_file():
         return False
     said = read_json(place).get("options")
-    asked = lineage_of_loop(LOOP_NAME, experiment.options).options
+    asked = _lineage_of_loop(LOOP_NAME, experiment.options).options
     there: dict[str, JSON] = said if isinstance(said, dict) else {}
     other = [name for name, value in asked.items() if there.get(name) != value]
     if other:
@@ -203,7 +203,7 @@ def is_whole(experiment: Experiment) -> bool:
 
 def keep(experiment: Experiment) -> None:
     """Write down that the experiment has ended."""
-    text = to_json(lineage_of_loop(LOOP_NAME, experiment.options).as_dict())
+    text = to_json(_lineage_of_loop(LOOP_NAME, experiment.options).as_dict())
     write_text_whole(experiment.root / LOOP_NAME, text + "\n")
 
 
@@ -264,7 +264,7 @@ class Noisy:
         Whose options say how much.
     """
 
-    next_agent = N_FISH + 1
+    next_agent = _N_FISH + 1
 
     def __init__(self, fish: VirtualFish) -> None:
         self._fish = fish
@@ -302,7 +302,7 @@ class Files:
         self._tracked = None if eyes is None else self._minutes(experiment.trial, eyes.revise)
 
     def _minutes(self, opened: OpenTrial, revise: Revise = list) -> Minutes:
-        tracks = lineage_of_loop(TRACKS, self._experiment.options)
+        tracks = _lineage_of_loop(TRACKS, self._experiment.options)
         origins = Origins(
             tracks=tracks, poses=dataclasses.replace(tracks, schema=POSES), is_live=True
         )
@@ -319,9 +319,9 @@ class Files:
         """Write a frame, and return what the tracker makes of it; nothing for one elsewhere."""
         if truth.frame and truth.frame % round(STEP_S * FPS) == 0:
             path = self._experiment.tank.trial.path("models", round(truth.time_s), ".toml")
-            lineage = lineage_of_loop(MODEL, self._experiment.options)
+            lineage = _lineage_of_loop(MODEL, self._experiment.options)
             write_model(path, self._fish.truth.parameters, lineage)
-        self._exact.add(truth, next_agent=N_FISH + 1)
+        self._exact.add(truth, next_agent=_N_FISH + 1)
         if self._eyes is None or self._tracked is None:
             return truth
         seen = self._eyes.see(truth)

@@ -390,6 +390,22 @@ def test_a_live_recording_tells_how_long_a_frame_takes(new, images, streaming, h
 
 
 @pytest.mark.slow
+def test_a_folder_in_the_place_of_recorded_images_ends_no_tracking(new, images, streaming, heard):
+    """It is named, and the minute has its poses and tracks."""
+    root = new(fps=15.0)
+    taken = root / "frames" / "overhead" / "000000.mcap"
+    taken.mkdir(parents=True)
+    data = [cv2.imencode(".jpg", image)[1].tobytes() for image in images[:60]]
+    with streaming.Camera(data) as camera:
+        options = asked(camera.url, duration_s=3.0, record="png")
+        options = replace(options, tracker=replace(options.tracker, learn_frames=10))
+        track(root, options, heard.append)
+    assert [event.path for event in heard if isinstance(event, LeftOut)] == [taken]
+    made = [event.path for event in heard if isinstance(event, Made)]
+    assert made == [root / "tracks" / "000000.parquet", root / "poses" / "000000.mcap"]
+
+
+@pytest.mark.slow
 def test_pictures_are_drawn_where_they_are_asked_for(new, film, tmp_path, heard):
     """A video as long as the tracks; a sheet of the worst frames, if there were any."""
     root = new(n_fish=4)

@@ -9,7 +9,7 @@ from zfcal.cameras.camera import Homography
 from zfcal.cameras.rig import overhead_camera, side_m
 from zfcal.virtual.images.bodies import Bodies, outlines_of
 from zfcal.virtual.images.look import CLEAN, HARD, USUAL, look_of
-from zfcal.virtual.images.render import OverheadPainter, render_overhead
+from zfcal.virtual.images.render import OverheadPainter
 from zfcal.virtual.images.swimming import Moment
 
 SEED = 5
@@ -152,8 +152,9 @@ def test_the_same_moment_gives_the_same_image(square):
     moment = moment_of([(0.2, 0.3), (0.25, 0.3)], number=7)
     painter.paint(moment_of([(0.9, 0.9)], number=6))
     first = painter.paint(moment)
-    assert np.array_equal(first, render_overhead(moment, square, camera, look=look, seed=SEED))
-    assert not np.array_equal(first, render_overhead(moment, square, camera, look=look, seed=6))
+    same, other = (OverheadPainter(square, camera, look, seed=seed) for seed in (SEED, 6))
+    assert np.array_equal(first, same.paint(moment))
+    assert not np.array_equal(first, other.paint(moment))
 
 
 def test_noise_is_as_strong_as_asked_for(square):
@@ -237,6 +238,6 @@ def test_any_projection_serves(square):
         size_px=(200, 200),
         matrix=((side / 200, 0, -0.06), (0, -side / 200, 1.06), (0, 0, 1)),
     )
-    image = render_overhead(moment_of([(0.5, 0.5)]), square, grid, look=look_of(CLEAN), seed=1)
+    image = OverheadPainter(square, grid, look_of(CLEAN), seed=1).paint(moment_of([(0.5, 0.5)]))
     assert image.shape == (200, 200)
     assert image[90:110, 90:110].min() < 140

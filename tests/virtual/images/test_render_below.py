@@ -11,7 +11,7 @@ from zfcal.arena import make_arena
 from zfcal.cameras.rig import below_camera
 from zfcal.virtual.images.bodies import Bodies
 from zfcal.virtual.images.look import CLEAN, HARD, USUAL, look_of
-from zfcal.virtual.images.render_below import BelowPainter, led_places, render_below
+from zfcal.virtual.images.render_below import BelowPainter, led_places
 from zfcal.virtual.images.swimming import Moment
 
 ARENA = make_arena(name="square", outline=shapely.box(0, 0, 1, 1))
@@ -62,7 +62,7 @@ def test_leds_project_back(seed):
     """Their midpoint is the position to 0.1 mm, their axis the heading to a degree or two."""
     rng = np.random.default_rng(seed)
     place, heading = rng.uniform(0.05, 0.95, 2), rng.uniform(-np.pi, np.pi)
-    image = render_below(robots_at(place, heading), ARENA, CAMERA, look=look_of(CLEAN), seed=1)
+    image = BelowPainter(ARENA, CAMERA, look_of(CLEAN), seed=1).paint(robots_at(place, heading))
     blobs_m = CAMERA.to_metres(green_blobs(image, 8))
     assert len(blobs_m) == 2
     np.testing.assert_allclose(blobs_m.mean(axis=0), place, atol=1e-4)
@@ -110,9 +110,8 @@ def test_further_robots_have_another_colour():
 def test_a_robot_at_the_edge_breaks_nothing():
     """Nor does one outside the image."""
     places = CAMERA.to_metres(np.array([[2.0, 2.0], [320.0, 478.0]]))
-    image = render_below(
-        robots_at([*places, (4.0, 4.0)], np.zeros(3)), ARENA, CAMERA, look=look_of(HARD), seed=1
-    )
+    painter = BelowPainter(ARENA, CAMERA, look_of(HARD), seed=1)
+    image = painter.paint(robots_at([*places, (4.0, 4.0)], np.zeros(3)))
     assert image.shape == (480, 640, 3)
     assert image.dtype == np.uint8
 
@@ -121,7 +120,7 @@ def test_the_same_moment_gives_the_same_image():
     """Another frame has other noise."""
     look = look_of(USUAL)
     moment = robots_at((0.4, 0.4), 0.3, number=9)
-    first = render_below(moment, ARENA, CAMERA, look=look, seed=2)
-    assert np.array_equal(first, render_below(moment, ARENA, CAMERA, look=look, seed=2))
+    first = BelowPainter(ARENA, CAMERA, look, seed=2).paint(moment)
+    assert np.array_equal(first, BelowPainter(ARENA, CAMERA, look, seed=2).paint(moment))
     other = robots_at((0.4, 0.4), 0.3, number=10)
-    assert not np.array_equal(first, render_below(other, ARENA, CAMERA, look=look, seed=2))
+    assert not np.array_equal(first, BelowPainter(ARENA, CAMERA, look, seed=2).paint(other))

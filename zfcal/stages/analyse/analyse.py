@@ -30,8 +30,8 @@ from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.stages.windows import starts_of, whole_segments, window_ends
 
-STATS = "zfcal.stats/1"
-SCORES = "zfcal.scores/1"
+_STATS = "zfcal.stats/1"
+_SCORES = "zfcal.scores/1"
 
 POOLED_FROM_S = 300
 """The robot is judged from here on: the first minutes are getting used to it."""
@@ -95,10 +95,10 @@ class _Shared:
     def stats_lineage(self, hashes: dict[int, str]) -> Lineage:
         # Statistics of before there were further ones stay up to date.
         names = self.options.further
-        return self._lineage(STATS, hashes, {"features": list(names)} if names else {})
+        return self._lineage(_STATS, hashes, {"features": list(names)} if names else {})
 
     def scores_lineage(self, hashes: dict[int, str]) -> Lineage:
-        return self._lineage(SCORES, hashes, {"scoring": self.options.scoring})
+        return self._lineage(_SCORES, hashes, {"scoring": self.options.scoring})
 
     def _lineage(self, schema: str, hashes: dict[int, str], more: dict[str, JSON]) -> Lineage:
         inputs = {segment_name(start): digest for start, digest in hashes.items()}
@@ -285,7 +285,7 @@ def _write_stats(shared: _Shared, window: Window, path: Path, lineage: Lineage) 
         "n_settled": {case: counts.n_settled for case, counts in cases.items()},
         "n_void": {case: counts.n_void for case, counts in cases.items()},
     }
-    write_table(path, make_table(STATS, rows), lineage, extra=extra)
+    write_table(path, make_table(_STATS, rows), lineage, extra=extra)
     return _void_notes(shared, window)
 
 
@@ -294,7 +294,7 @@ def _write_scores(
 ) -> list[Event]:
     rows = scores_of(window, shared.options.scoring)
     extra: dict[str, JSON] = {"robot_pooled_from_s": pooled_from_s}
-    write_table(path, make_table(SCORES, rows), lineage, extra=extra)
+    write_table(path, make_table(_SCORES, rows), lineage, extra=extra)
     columns = (rows[name] for name in ("compared", "feature", "value", "ceiling"))
     return [
         Result(

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Ints
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.segments import segment_path
@@ -52,7 +52,7 @@ class ControlGroup:
     parts: tuple[tuple[OpenTrial, tuple[int, ...]], ...]
     segments: Segments
     _legacy: dict[float, LegacyStatistics] = field(default_factory=dict)
-    _further: dict[tuple[str, ...], dict[str, NDArray[np.int64]]] = field(default_factory=dict)
+    _further: dict[tuple[str, ...], dict[str, Ints]] = field(default_factory=dict)
 
     @classmethod
     def read(

@@ -32,7 +32,7 @@ from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker, follow
 from zfcal.trial import Trial
 
-ALIGNED = "below-aligned.toml"
+_ALIGNED = "below-aligned.toml"
 _SURE = 0.5
 _LATE_S = 0.02
 _MM = 1000.0
@@ -78,7 +78,7 @@ def align_cameras(root: Path, recording: Recording, tell: Tell, *, task: CameraT
     InputError
         A camera is not calibrated, there are no images, or the robot is not to be found.
     """
-    place = Place(path=root / "cameras" / ALIGNED, root=root, name=BELOW)
+    place = Place(path=root / "cameras" / _ALIGNED, root=root, name=BELOW)
     make_camera(place, lambda: _align(place, root, recording), tell, task=task)
 
 
@@ -95,8 +95,8 @@ def _align(place: Place, root: Path, recording: Recording) -> Recipe:
         arena = load_arena(trial.arena, root)
         check_view(overhead, overhead_file, OVERHEAD, arena)
         check_view(below, below_file, BELOW, arena)
-        blobs = overhead_spots(trial, sources["overhead"], overhead, recording)
-        leds = below_spots(trial, sources["below"], below, recording)
+        blobs = _overhead_spots(trial, sources["overhead"], overhead, recording)
+        leds = _below_spots(trial, sources["below"], below, recording)
         alignment = align_spots(blobs, leds)
         return _calibration(below, alignment)
 
@@ -109,7 +109,7 @@ def _align(place: Place, root: Path, recording: Recording) -> Recipe:
     )
 
 
-def overhead_spots(
+def _overhead_spots(
     trial: Trial, source: str, projection: Projection, recording: Recording
 ) -> Spots:
     """Return where the camera overhead sees somebody.
@@ -129,7 +129,7 @@ def overhead_spots(
     return _spots(rows)
 
 
-def below_spots(trial: Trial, source: str, projection: Projection, recording: Recording) -> Spots:
+def _below_spots(trial: Trial, source: str, projection: Projection, recording: Recording) -> Spots:
     """Return where the camera below sees both LEDs of the robot.
 
     Raises
@@ -209,7 +209,7 @@ def _camera_file(trial: Trial, name: str) -> Path:
         )
     path = trial.root / file
     # What was aligned before is aligned anew from the calibration that it corrects.
-    return path.with_name("below.toml") if path.name == ALIGNED else path
+    return path.with_name("below.toml") if path.name == _ALIGNED else path
 
 
 def _recorded(root: Path, name: str) -> str:

@@ -28,7 +28,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.making import CameraTask, Found, Place, Recipe, make_camera
 from zfcal.stages.events import LeftOut, Made, Note, Progress, Tell
 
-PX_PER_M = 10_000.0
+_PX_PER_M = 10_000.0
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"}
 
 
@@ -127,7 +127,7 @@ def write_sheet(path: Path, board: Board, tell: Tell) -> None:
     StorageError
         It cannot be written.
     """
-    image = draw_board(board, square_px=round(board.square_m * PX_PER_M))
+    image = draw_board(board, square_px=round(board.square_m * _PX_PER_M))
     write_bytes_whole(path, encoded(image, "png"))
     tell(Made(path=path, reason="asked for"))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,12 +12,14 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.artifacts.cameras import CameraFile, read_camera_file, write_camera_file
+from zfcal.artifacts.frame_files import Calibration
 from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
-from zfcal.cameras.camera import Camera, Homography
+from zfcal.cameras.camera import FISHEYE, Camera, Homography
 from zfcal.cameras.lens import Lens
 from zfcal.errors import DamagedError, InputError
 
-HOMOGRAPHY = "homography"
+_HOMOGRAPHY = "homography"
+_PLUMB_BOB, _RATIONAL = 5, 8
 
 SIDE_KEY = "seen_from"
 """Option in the lineage of a camera that looks from another side than its name says."""
@@ -40,13 +43,13 @@ def read_camera(path: Path) -> Camera | Homography:
         It is empty or not TOML.
     """
     found = read_camera_file(path)
-    if found.model != HOMOGRAPHY and found.rotation_rad is None:
+    if found.model != _HOMOGRAPHY and found.rotation_rad is None:
         raise InputError(
             f"{path}: holds a lens alone, it does not say where the camera stands.",
             hint=f"Add the pose with: zfcal camera points POINTS.csv --lens {path} -o CAMERA.toml",
         )
     with _named(path):
-        return camera_of(found)
+        return _camera_of(found)
 
 
 def read_lens(path: Path) -> Lens:
@@ -58,7 +61,7 @@ def read_lens(path: Path) -> Lens:
         As `read_camera`; or it is a homography, which has no lens.
     """
     found = read_camera_file(path)
-    if found.model == HOMOGRAPHY:
+    if found.model == _HOMOGRAPHY:
         raise InputError(
             f"{path}: is a homography, which has no lens.",
             hint="Calibrate the lens with: zfcal camera board IMAGE... -o LENS.toml",
@@ -107,10 +110,10 @@ def write_camera(
     StorageError
         The file cannot be written.
     """
-    write_camera_file(path, file_of(camera, result=result or {}, points=points), lineage)
+    write_camera_file(path, _file_of(camera, result=result or {}, points=points), lineage)
 
 
-def camera_of(found: CameraFile) -> Camera | Homography:
+def _camera_of(found: CameraFile) -> Camera | Homography:
     """Return the camera of a file that has a pose, or its homography.
 
     Raises
@@ -118,14 +121,14 @@ def camera_of(found: CameraFile) -> Camera | Homography:
     InputError
         The numbers make no camera.
     """
-    if found.model == HOMOGRAPHY:
+    if found.model == _HOMOGRAPHY:
         return Homography(size_px=found.size_px, matrix=found.matrix)
     if found.rotation_rad is None or found.translation_m is None:
         raise InputError("A lens alone does not say where the camera stands.")
     return Camera.of(_lens_of(found), np.array(found.rotation_rad), np.array(found.translation_m))
 
 
-def file_of(
+def _file_of(
     camera: Camera | Homography | Lens,
     *,
     result: Mapping[str, JSON],
@@ -141,7 +144,7 @@ def file_of(
         "points_m": tuple(_plain(point) for point in m),
     }
     if isinstance(camera, Homography):
-        return CameraFile(model=HOMOGRAPHY, **values)
+        return CameraFile(model=_HOMOGRAPHY, **values)
     values |= {"model": camera.model, "distortion": _plain(camera.distortion)}
     if isinstance(camera, Camera):
         values["rotation_rad"] = _plain(camera.rotation_rad)
@@ -173,3 +176,32 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{path}: {error}", hint=error.hint) from error
+
+
+def calibration_of(camera: Camera | Homography | None) -> Calibration | None:
+    """Return a camera's calibration in the viewers' words.
+
+    Returns
+    -------
+    Calibration or None
+        None for a camera that they have no word for: a homography, or a lens of
+        12 or 14 coefficients of which the last ones are not zero.
+    """
+    if not isinstance(camera, Camera):
+        return None
+    matrix = tuple(float(value) for value in itertools.chain.from_iterable(camera.matrix))
+    said = list(camera.distortion)
+    if camera.model == FISHEYE:
+        model = "kannala_brandt"
+    elif len(said) <= _PLUMB_BOB:
+        model, said = "plumb_bob", said + [0.0] * (_PLUMB_BOB - len(said))
+    elif not any(said[_RATIONAL:]):
+        model, said = "rational_polynomial", said[:_RATIONAL]
+    else:
+        return None
+    return Calibration(
+        size_px=camera.size_px,
+        distortion_model=model,
+        distortion=tuple(map(float, said)),
+        matrix=matrix,
+    )

@@ -21,7 +21,7 @@ from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, make_alone, r
 from zfcal.stages.trial_context import Task
 from zfcal.trial import CONFIG_NAME
 
-NAMES = ("overhead", "below")
+_NAMES = ("overhead", "below")
 
 Found: TypeAlias = Calibration | LensCalibration
 """A camera with its errors, or a lens alone."""
@@ -138,9 +138,9 @@ def place_for(
         if out is None or out.suffix != ".toml":
             raise InputError(f"{out}: a camera file is TOML.", hint="Let its name end in .toml.")
         return Place(path=out, stated_side=stated_side)
-    if name not in NAMES:
+    if name not in _NAMES:
         raise InputError(
-            f"Which camera of {trial} is it?", hint=f"Give --camera with {' or '.join(NAMES)}."
+            f"Which camera of {trial} is it?", hint=f"Give --camera with {' or '.join(_NAMES)}."
         )
     read_trial(trial)
     path = trial / "cameras" / f"{name}.toml"
@@ -199,7 +199,7 @@ def _told(found: Found, draw: Draw | None) -> Iterator[Event]:
     result = found.result() if isinstance(found, Calibration) else found.result
     for note in result.get("notes", ()):
         yield Note(text=note, warning=True)
-    yield Note(text=in_words(result))
+    yield Note(text=_in_words(result))
     yield Result(value=result)
 
 
@@ -226,7 +226,7 @@ def _write(place: Place, found: Found, lineage: Lineage) -> None:
         write_camera(place.path, found.lens, lineage, result=found.result)
 
 
-def in_words(result: Mapping[str, Any]) -> str:
+def _in_words(result: Mapping[str, Any]) -> str:
     """Return the errors of a calibration as a sentence."""
     parts = [f"{result['method']}, {result['n_points']} points"]
     if "seen_from" in result:

@@ -68,7 +68,7 @@ def _from_points(place: Place, points: Points) -> Recipe:
     def work() -> Calibration:
         try:
             pairs = Pairs(px=found.px, m=found.m, size_px=size_px)
-            return calibrate(pairs, lens, points)
+            return _calibrate(pairs, lens, points)
         except InputError as error:
             raise InputError(f"{points.path}: {error}", hint=error.hint) from error
 
@@ -104,7 +104,7 @@ def _from_older(place: Place, points: Points) -> Recipe:
     def work() -> Calibration:
         try:
             pairs = Pairs(px=found.px, m=found.m, size_px=found.size_px)
-            return calibrate(pairs, lens, points)
+            return _calibrate(pairs, lens, points)
         except InputError as error:
             raise InputError(f"{points.path}: {error}", hint=error.hint) from error
 
@@ -114,7 +114,7 @@ def _from_older(place: Place, points: Points) -> Recipe:
     )
 
 
-def calibrate(pairs: Pairs, lens: Lens | None, points: Points) -> Calibration:
+def _calibrate(pairs: Pairs, lens: Lens | None, points: Points) -> Calibration:
     """Return the pose of a lens that is known, or all of the camera."""
     if lens is not None:
         return calibrate_pose(lens, pairs, robust=points.robust)

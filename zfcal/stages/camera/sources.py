@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import final
 
+from zfcal.artifacts.atomic import check_free
 from zfcal.artifacts.frame_files import FrameWriter, read_frames
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import Lineage
@@ -15,8 +16,10 @@ from zfcal.cameras.sequence import images_of
 from zfcal.cameras.stamps import Problem, Shot, Source
 from zfcal.cameras.video import decoded, encoded, is_live, open_source
 from zfcal.errors import InputError
+from zfcal.stages.events import Tell
 from zfcal.stages.recording import hash_sources
 from zfcal.stages.segments import STEP_S
+from zfcal.stages.taken import unless_taken
 
 _EPOCH_S = 1e8
 """Later than this since the start of a trial: the times count from 1970."""
@@ -26,7 +29,7 @@ def source_of(text: str, *, fps: float, clock: ArrivalClock) -> Source:
     """Return the source that words name: as `open_source`, or MCAP files."""
     path = Path(text)
     if not is_live(text) and (path.suffix == ".mcap" or any(path.glob("*.mcap"))):
-        return RecordedFrames(path)
+        return _RecordedFrames(path)
     return open_source(text, fps=fps, clock=clock)
 
 
@@ -47,7 +50,7 @@ def files_of(root: Path, text: str) -> dict[str, str]:
 
 
 @final
-class RecordedFrames:
+class _RecordedFrames:
     """Camera images in an MCAP file, or in a folder of them such as ``frames/overhead``.
 
     Parameters
@@ -104,6 +107,8 @@ class RecordedFrames:
 class Recorder:
     """Writes the images of a live camera as ``frames/CAMERA/NNNNNN.mcap``, minute by minute.
 
+    A minute in whose place a folder stands is left out.
+
     Parameters
     ----------
     root
@@ -114,14 +119,17 @@ class Recorder:
         ``jpeg`` or ``png``.
     lineage
         Where the images come from.
+    tell
+        Hears of minutes that are left out.
     """
 
-    def __init__(self, root: Path, camera: str, form: str, lineage: Lineage) -> None:
+    def __init__(self, root: Path, camera: str, form: str, lineage: Lineage, tell: Tell) -> None:
         self.paths: list[Path] = []
         self._folder = root / "frames" / camera
         self._camera = camera
         self._form = form
         self._lineage = lineage
+        self._tell = tell
         self._writer: FrameWriter | None = None
         self._start_s = -1
 
@@ -130,20 +138,22 @@ class Recorder:
         start_s = int((shot.time_s + 1e-6) // STEP_S) * STEP_S
         if start_s != self._start_s:
             self.close()
-            self._begin(start_s)
+            self._start_s = start_s
+            path = self._folder / f"{start_s:06d}.mcap"
+            with unless_taken(path, self._tell):
+                check_free(path)
+                self._begin(path)
         data = encoded(shot.image, self._form)
-        assert self._writer is not None  # noqa: S101 - for the type checker
-        self._writer.add(shot.time_s, data)
+        if self._writer is not None:
+            self._writer.add(shot.time_s, data)
         image = decoded(data)
         return shot if image is None else Shot(time_s=shot.time_s, image=image)
 
-    def _begin(self, start_s: int) -> None:
+    def _begin(self, path: Path) -> None:
         """Open the file of a minute; what an interrupted run left of it comes first."""
-        path = self._folder / f"{start_s:06d}.mcap"
         part = path.with_name(f".{path.name}.taken-up")
         part.unlink(missing_ok=True)
         self._writer = FrameWriter(part, self._camera, lineage=self._lineage)
-        self._start_s = start_s
         if path.exists():
             for time_s, data in read_frames(path):
                 self._writer.add(time_s, data)

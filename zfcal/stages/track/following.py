@@ -258,7 +258,7 @@ class Following:
             return None
         lineage = dataclasses.replace(self._origins.tracks, schema=FRAMES)
         root = self._plan.opened.trial.root
-        self._recorders[camera] = Recorder(root, camera, form, lineage)
+        self._recorders[camera] = Recorder(root, camera, form, lineage, self._tell)
         return self._recorders[camera]
 
     def _background(self, feed: Feed) -> Background | None:

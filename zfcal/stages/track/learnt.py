@@ -19,7 +19,7 @@ from zfcal.tracking.tracker import FishTracker
 LEARNT_KEY = "learnt"
 """Extra metadata of a segment: polarity and size of the animals, and how they are known."""
 
-FILM, OPTION, BEFORE, DEFAULT = "film", "option", "before", "default"
+_FILM, _OPTION, _BEFORE, _DEFAULT = "film", "option", "before", "default"
 """How a value is known: by the first images, by a person, by an earlier segment, or not at all."""
 
 _SMALL_PX = 15.0
@@ -74,13 +74,13 @@ def learnt_by(tracker: FishTracker, asked: TrackerOptions) -> dict[str, JSON]:
         return {}
     film = {"polarity": learnt.polarity, "min_blob_px": learnt.area_px > 0 or None}
     known = {
-        name: OPTION
+        name: _OPTION
         if getattr(asked, name) is not None
-        else BEFORE
+        else _BEFORE
         if getattr(tracker.options, name) is not None
-        else FILM
+        else _FILM
         if film[name]
-        else DEFAULT
+        else _DEFAULT
         for name in ("polarity", "min_blob_px")
     }
     return {
@@ -110,7 +110,12 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
         From `learnt_by`.
     """
     taken, film = str(learnt["polarity"]), learnt["film_polarity"]
-    how = {FILM: "as the film shows", OPTION: "as was said", BEFORE: "as before", DEFAULT: "untold"}
+    how = {
+        _FILM: "as the film shows",
+        _OPTION: "as was said",
+        _BEFORE: "as before",
+        _DEFAULT: "untold",
+    }
     size = "" if learnt["area_px"] is None else f", about {learnt['area_px']:.0f} px large"
     yield Note(
         text=f"{source}: animals are taken for {_SAYS[taken]} "
@@ -125,7 +130,7 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
             f"Leave --{taken} out, or give --{film}.",
             warning=True,
         )
-    if learnt["polarity_from"] == DEFAULT:
+    if learnt["polarity_from"] == _DEFAULT:
         yield Note(
             text=f"{source}: the first images do not tell whether animals are darker or lighter "
             "than the tank. Say it with --dark, --light or --either.",

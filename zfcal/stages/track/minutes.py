@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, final
 
-from zfcal.artifacts.atomic import remove
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
@@ -17,14 +16,14 @@ from zfcal.artifacts.reading.contents import check_contents, numbered_of, open_r
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.events import LeftOut, Made, Note, Tell, UpToDate
-from zfcal.stages.recording import STRETCH_KEY
+from zfcal.stages.events import LeftOut, Made, Tell, UpToDate
+from zfcal.stages.recording import STRETCH_KEY, remove_surplus
 from zfcal.stages.segments import END_KEY, STEP_S
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.trial_context import OpenTrial, Task, reason_to_make
 from zfcal.tracks import FramePoses, Tracks, tracks_of
 
-BAD_KEY = "bad_frames"
+_BAD_KEY = "bad_frames"
 """Extra metadata of a segment: frame numbers by what was wrong with them."""
 
 NEXT_KEY = "next_agent"
@@ -213,7 +212,7 @@ class Minutes:
             tracks = tracks_of(frames)
             extra: dict[str, JSON] = {
                 **self._measure(tracks),
-                BAD_KEY: dict(minute.bad),
+                _BAD_KEY: dict(minute.bad),
                 NEXT_KEY: minute.next_agent,
                 END_KEY: min(float(end_s), float(minute.start_s + STEP_S)),
             }
@@ -260,11 +259,7 @@ class Minutes:
         root = self._opened.trial.root
         gone = [segment_path(root, s) for s in set(segment_starts(root)) - self._seen]
         gone += [_poses_path(root, start) for start in set(pose_files(root)) - self._seen]
-        for path in sorted(gone):
-            with unless_taken(path, self._tell):
-                remove(path)
-                text = f"{path}: removed, the recording does not reach there any more."
-                self._tell(Note(text=text))
+        remove_surplus(sorted(gone), self._tell, self._task)
 
 
 def poses_reason(path: Path, lineage: Lineage) -> str | None:

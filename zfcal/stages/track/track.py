@@ -62,7 +62,7 @@ def _track(root: Path, options: TrackOptions, tell: Tell, *, task: Task) -> None
     poses = dataclasses.replace(tracks, schema=POSES)
     check_same_source(plan.opened.trial, tracks, task)
     origins = Origins(tracks=tracks, poses=poses, is_live=False)
-    if is_done(plan, origins, tell, task=task):
+    if _is_done(plan, origins, tell, task=task):
         return
     if task.dry_run:
         _tell_plan(plan, origins, tell, task=task)
@@ -70,7 +70,7 @@ def _track(root: Path, options: TrackOptions, tell: Tell, *, task: Task) -> None
     Following(plan, origins, tell, task=task).run()
 
 
-def is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
+def _is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
     """Return whether a recording has been tracked to its end; then all its files are told."""
     trial = plan.opened.trial
     starts = segment_starts(trial.root)

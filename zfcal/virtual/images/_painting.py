@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats, Ints
 from zfcal.cameras._kernels import kernel
 
-Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Grey = NDArray[np.uint8]
 Field = NDArray[np.int16]
@@ -44,7 +44,7 @@ def add_field(image: Grey, field: Field, top: int, left: int) -> Grey:
 
 
 @kernel
-def add_fields(image: Grey, one: Field, other: Field, places: NDArray[np.int64]) -> Grey:
+def add_fields(image: Grey, one: Field, other: Field, places: Ints) -> Grey:
     """Return an image with parts of two fields added together, from 0 to 255.
 
     Parameters

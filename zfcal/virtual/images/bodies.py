@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zfcal.arrays import Floats
 
 FIN_SHARE = 0.16
 """Length of the tail fin, as a share of the whole."""

@@ -8,14 +8,12 @@ from typing import final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from zfcal.arrays import Floats
 from zfcal.cameras.frames import Image
 from zfcal.virtual.images import _painting
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from zfcal.virtual.images._painting import Floats32
 
 FINE = 16
 """Fine pixels along the side of a pixel: an edge is right to a thirtieth of a pixel."""

@@ -12,9 +12,9 @@ from typing import final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Image
 from zfcal.virtual.images.bodies import Outlines, outlines_of
@@ -24,9 +24,7 @@ from zfcal.virtual.images.ripples import Ripples
 from zfcal.virtual.images.swimming import Moment
 from zfcal.virtual.images.tank import overhead_tank, photographed
 
-Floats = NDArray[np.float64]
-
-OVERHEAD = 21
+_OVERHEAD = 21
 """Tells the random numbers of overhead images from others of the same seed."""
 
 _SECTIONS = ((1, 9), (8, 16), (15, 21))
@@ -105,7 +103,7 @@ class OverheadPainter:
         ndarray of uint8, shape (height, width)
         """
         look = self._look
-        rng = np.random.default_rng([self._seed, OVERHEAD, moment.number])
+        rng = np.random.default_rng([self._seed, _OVERHEAD, moment.number])
         image = self._ripples.add_to(self._empty, moment.time_s)
         if look.flicker > 0:
             light = 1.0 + look.flicker * rng.standard_normal()
@@ -191,24 +189,6 @@ class OverheadPainter:
                 patch = patch_of([fill], blur_px=1.0 + look.defocus_px)
                 near = 1.0 - distance_m / look.reflection_reach_m
                 darken(image, patch, look.reflection * near, self._wall)
-
-
-def render_overhead(  # noqa: PLR0913 - one keyword for each thing that an image depends on
-    moment: Moment,
-    arena: Arena,
-    camera: Projection,
-    *,
-    look: Look,
-    seed: int,
-    photograph: Image | None = None,
-) -> Image:
-    """Draw one overhead image; for many, keep an `OverheadPainter`.
-
-    Returns
-    -------
-    ndarray of uint8, shape (height, width)
-    """
-    return OverheadPainter(arena, camera, look, seed=seed, photograph=photograph).paint(moment)
 
 
 def _fills(body: _Seen, look: Look) -> list[Fill]:

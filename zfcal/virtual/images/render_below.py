@@ -10,21 +10,18 @@ import math
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Image
-from zfcal.virtual.images._painting import add_light
+from zfcal.virtual.images._painting import Floats32, add_light
 from zfcal.virtual.images.look import Look
 from zfcal.virtual.images.painting import Fill, Noise, darken, patch_of
 from zfcal.virtual.images.swimming import Moment
 from zfcal.virtual.images.tank import below_tank
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-
-BELOW = 22
+_BELOW = 22
 """Tells the random numbers of images from below from others of the same seed."""
 
 _BRIGHTEST = 250.0
@@ -75,7 +72,7 @@ class BelowPainter:
         ndarray of uint8, shape (height, width, 3)
             Blue, green, red.
         """
-        rng = np.random.default_rng([self._seed, BELOW, moment.number])
+        rng = np.random.default_rng([self._seed, _BELOW, moment.number])
         image = self._empty.copy()
         robots = np.flatnonzero(moment.is_robot)
         for number, body in enumerate(robots):
@@ -122,19 +119,6 @@ def led_places(xy_m: Floats, heading_rad: float, distance_m: float) -> Floats:
     """
     ahead = distance_m / 2 * np.array([np.cos(heading_rad), np.sin(heading_rad)])
     return np.stack([xy_m + ahead, xy_m - ahead])
-
-
-def render_below(
-    moment: Moment, arena: Arena, camera: Projection, *, look: Look, seed: int
-) -> Image:
-    """Draw one image of the camera below; for many, keep a `BelowPainter`.
-
-    Returns
-    -------
-    ndarray of uint8, shape (height, width, 3)
-        Blue, green, red.
-    """
-    return BelowPainter(arena, camera, look, seed=seed).paint(moment)
 
 
 def _hull(xy_m: Floats, heading_rad: float) -> Floats:

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from zfcal.arrays import Bools, Floats, Ints
 from zfcal.tracks import ROBOT, Tracks
 from zfcal.virtual.images.bodies import Bodies
 from zfcal.virtual.images.look import Look
 
-Floats = NDArray[np.float64]
-
-TURN_S = 0.08
+_TURN_S = 0.08
 """Standard deviation in time of the smoothing of headings: a fish turns within 0.2 s."""
 
 _BEND_S = 0.11
@@ -53,7 +51,7 @@ class Moment:
 
     number: int
     time_s: float
-    is_robot: NDArray[np.bool_]
+    is_robot: Bools
     bodies: Bodies
     velocity_m_s: Floats
 
@@ -72,9 +70,9 @@ class Swimming:
     heading_rad, bend_rad, wave_rad, phase_rad : ndarray, shape (frame, agent)
     """
 
-    frame: NDArray[np.int64]
+    frame: Ints
     time_s: Floats
-    is_robot: NDArray[np.bool_]
+    is_robot: Bools
     length_m: Floats
     contrast: Floats
     xy_m: Floats
@@ -166,7 +164,7 @@ _LENGTHS, _SHADES = 1, 2
 """Tell the random numbers of bodies from those of images."""
 
 
-def _rate(values: Floats, frame: NDArray[np.int64], fps: float) -> Floats:
+def _rate(values: Floats, frame: Ints, fps: float) -> Floats:
     """Return the change of values a second, from neighbouring frames; 0 where there are none."""
     if len(frame) < 2:
         return np.zeros_like(values)
@@ -185,7 +183,7 @@ def _headings(xy_m: Floats, stated: Floats, velocity: Floats, fps: float) -> Flo
     last = np.maximum.accumulate(np.where(known, np.arange(len(angle))[:, None], 0), axis=0)
     pointer = np.take_along_axis(pointer, last, axis=0)
     pointer = np.where(np.isfinite(xy_m).all(axis=-1), pointer, 0.0)
-    width = TURN_S * fps
+    width = _TURN_S * fps
     smooth = gaussian_filter1d(pointer.real, width, axis=0, mode="nearest") + 1j * (
         gaussian_filter1d(pointer.imag, width, axis=0, mode="nearest")
     )
@@ -195,7 +193,7 @@ def _headings(xy_m: Floats, stated: Floats, velocity: Floats, fps: float) -> Flo
 def _strokes(
     heading: Floats,
     velocity: Floats,
-    frame: NDArray[np.int64],
+    frame: Ints,
     fps: float,
     rng: np.random.Generator,
 ) -> tuple[Floats, Floats, Floats]:

@@ -17,11 +17,9 @@ from zfcal.arena import Arena
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Image
 from zfcal.cameras.rig import WALL_M
+from zfcal.virtual.images._painting import Floats32
 from zfcal.virtual.images.look import Look
 from zfcal.virtual.images.painting import smooth_field
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _FINE = 4
 _SHIFT = 6
