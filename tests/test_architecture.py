@@ -1,16 +1,26 @@
 """The code stands where docs/architecture.md says, in rooms that one can overlook."""
 
+import ast
 import re
 
 import grimp
 import pytest
 
+from zfcal.model.effects import all_effects, generic_effects
+from zfcal.model.effects.generic import PREFIX
 from zfcal_cli.main import COMMANDS
 
 MOST_MODULES = 30
 MOST_IMPORTS = 6
 UNLIMITED = {"zfcal.diagnose"}
 DEEP = {"zfcal.diagnose"}
+EFFECTS = "zfcal/model/effects"
+HOMONYMS = {
+    "alignment": ("zfcal/cameras", "zfcal/stages/camera", "zfcal/diagnose/battery.py"),
+    "crowding": ("zfcal/calibrate",),
+}
+"""Names of effects that are the name of something else in other rooms: a camera's correction, a
+statistic of headings, a distance within a front of NSGA-II."""
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +91,67 @@ def test_no_room_is_deep(graph):
     chains = {room: deepest(graph, room) for room in rooms(graph) if room != "zfcal"}
     deep = {room: chain for room, chain in chains.items() if len(chain) - 1 > MOST_IMPORTS}
     assert set(deep) <= DEEP, deep
+
+
+def texts_and_names(source):
+    """Yield each string of a module but its docstrings, and each name, with its line."""
+    tree = ast.parse(source)
+    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant):
+            if isinstance(node.value, str) and id(node) not in said:
+                yield node.lineno, node.value
+            continue
+        for field in ("id", "attr", "arg", "name", "module"):
+            value = getattr(node, field, None)
+            if isinstance(value, str):
+                yield from ((node.lineno, part) for part in value.split("."))
+
+
+def effects_in(text, names):
+    """Return the effects that a text or name is, or that it holds where they are no plain word."""
+    plain = [name for name in names if name in (text, text.replace("_", "-"))]
+    words = re.findall(r"[\w:-]+", text.replace("_", "-"))
+    return {*plain, *(name for name in names if not name.isalpha() and name in words)}
+
+
+def test_no_module_names_an_effect(repository):
+    """Whoever needs to know something about an effect asks the effect: see "Add an effect"."""
+    names = [PREFIX, *(effect.name for effect in (*all_effects(), *generic_effects()))]
+    found = []
+    for path in sorted(
+        part for room in ("zfcal", "cli") for part in (repository / room).rglob("*.py")
+    ):
+        place = path.relative_to(repository).as_posix()
+        for line, text in texts_and_names(path.read_text(encoding="utf-8")):
+            known = {name for name in names if place.startswith(HOMONYMS.get(name, ()))}
+            found += [
+                f"{place}:{line}: {name}" for name in effects_in(text, names) if name not in known
+            ]
+    assert [each for each in found if not each.startswith(EFFECTS)] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '_BENDS_TO = {"place-preference": 1}',
+        "from zfcal.model.effects.place_preference import EFFECT",
+        "def f(place_preference): ...",
+        'f"effects.{x}.place-preference"',
+        'x = "freezing" in model.effects',
+        'x = name.startswith("generic:")',
+        '_BY_PLACE = ("generic:speed:place",)',
+    ],
+)
+def test_an_effect_that_is_named_is_seen(line):
+    """As a string, within one, and as a name; not in prose, a docstring or a longer name."""
+    names = [PREFIX, "place-preference", "freezing", "generic:speed:place"]
+    clean = (
+        '"""As place-preference."""\nx = "by freezing, or a place preference; generic:speed:places"'
+    )
+
+    def seen(source):
+        return {each for _, text in texts_and_names(source) for each in effects_in(text, names)}
+
+    assert len(seen(line)) == 1
+    assert seen(clean) == set()

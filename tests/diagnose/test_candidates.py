@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.candidates import (
-    FORMS,
     askable,
     candidates_of,
     company_of,
     in_model,
-    is_generic,
     not_forms_of,
 )
 from zfcal.model.effects import all_effects, find_effect
@@ -148,12 +146,3 @@ def test_other_forms_of_what_is_known_are_not_asked_for(tank):
     assert "generic:speed:wall" not in {
         each.name for each in not_forms_of(generic, {"generic:speed:wall"})
     }
-
-
-def test_every_form_is_that_of_a_listed_effect():
-    """By names that there are, and with the same response: headings or speed."""
-    for own, listed in FORMS.items():
-        assert is_generic(own)
-        assert not is_generic(listed)
-        pair = {find_effect(own).on_speed, find_effect(listed).on_speed}
-        assert len(pair) == 1 or listed == "speed-turn-coupling"

@@ -10,7 +10,8 @@ from zfcal.diagnose.findings import Note
 from zfcal.diagnose.notes import notes_of
 from zfcal.diagnose.omnibus import Omnibus
 
-SILENT = np.zeros(len(notes.NAMES))
+NAMES = notes.control_names()
+SILENT = np.zeros(len(NAMES))
 
 
 @pytest.fixture
@@ -44,7 +45,7 @@ def test_what_is_left_beside_an_effect_may_be_its_form(noted, effects, p, says):
 def test_a_control_that_fires_is_said(noted):
     """At five standard errors of the theory; of replicates that scatter as much it is none."""
     fired = np.where(np.arange(len(SILENT)) == 0, 5.0, 0.0)
-    assert f"FIRES: {notes.NAMES[0]}" in noted(controls=fired)["controls"].says
+    assert f"FIRES: {NAMES[0]}" in noted(controls=fired)["controls"].says
     drawn = [fired * sign for sign in (1.0, -1.0) * 5]
     assert "silent" in noted(controls=fired, replicates=drawn)["controls"].says
     assert "silent" in noted()["controls"].says

@@ -10,7 +10,6 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
-from zfcal.model.effects.generic import PREFIX
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
@@ -62,24 +61,12 @@ class Candidate:
     @property
     def is_slow(self) -> bool:
         """Whether it is a change with the hour."""
-        return self.effect.strength == "per_hour"
+        return self.effect.per_hour
 
-
-FORMS = {
-    "generic:heading:neighbour-heading": "alignment",
-    "generic:heading:place": "place-preference",
-    "generic:speed:neighbour-speed": "speed-matching",
-    "generic:speed:own-speed": "burst-and-coast",
-    "generic:speed:own-turn": "speed-turn-coupling",
-}
-"""Effects beyond the list that say what a listed one says, in another form: the same cue and
-the same response. (`generic:heading:own-turn` is none: without its share of the last turn fish
-keep their heading, which is no memory of turns, and what real fish do most.)"""
-
-
-def is_generic(name: str) -> bool:
-    """Return whether an effect is beyond the list."""
-    return name.startswith(PREFIX)
+    @property
+    def rest_s(self) -> float:
+        """Mean time for which it stops fish, in seconds; 0 where it stops none."""
+        return self.shape[self.effect.rests] if self.effect.rests else 0.0
 
 
 def not_forms_of(candidates: Iterable[Candidate], known: Collection[str]) -> tuple[Candidate, ...]:
@@ -92,9 +79,8 @@ def not_forms_of(candidates: Iterable[Candidate], known: Collection[str]) -> tup
     known
         Names of effects, listed or not.
     """
-    return tuple(
-        each for each in candidates if each.name not in known and FORMS.get(each.name) not in known
-    )
+    said = {form for name in known for form in (name, *find_effect(name).other_forms)}
+    return tuple(each for each in candidates if each.name not in said)
 
 
 def company_of(scene: Scene) -> Company:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, in_model, is_generic
+from zfcal.diagnose.candidates import Candidate, in_model
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.pulses import pulses
@@ -163,8 +163,7 @@ def _confirmed(
 
 
 def _lasts(candidate: Candidate) -> bool:
-    effect = candidate.effect
-    return not (effect.individual or effect.stops or is_generic(effect.name))
+    return candidate.effect.in_any_steps and not candidate.effect.generic
 
 
 def _judged_by(score: Score, scene: Scene) -> Moves:
@@ -174,7 +173,7 @@ def _judged_by(score: Score, scene: Scene) -> Moves:
 
 def _tells_apart(fitted: Fitted) -> bool:
     """Return whether individuals differ in a model."""
-    return any(find_effect(name).individual for name in fitted.parameters.effects)
+    return any(find_effect(name).by_trait for name in fitted.parameters.effects)
 
 
 def is_shared(score: Score, scene: Scene) -> bool:
@@ -190,8 +189,7 @@ def is_shared(score: Score, scene: Scene) -> bool:
     scene
         Whose steps the score is of.
     """
-    effect = score.candidate.effect
-    if effect.individual or effect.stops:
+    if not score.candidate.effect.in_any_steps:
         return True
     track = _judged_by(score, scene).track
     sums, information = by_track(track, score.steps)

@@ -15,16 +15,13 @@ from zfcal.diagnose.contexts import N_FIELDS, field_of
 from zfcal.model.kernels.state import X, Y
 from zfcal.model.scene import Scene
 
-_BY_PLACE = ("generic:speed:place", "generic:speed:wall")
-"""What such a lamp is: these are asked for across fields."""
-
 _LEAST_MOVES = 20
 """Moves of a field of its own; less their own mean, fewer would vary too little."""
 
 
 def is_within_fields(candidate: Candidate) -> bool:
     """Return whether an effect on speed is asked for within fields, rather than across them."""
-    return candidate.name not in _BY_PLACE
+    return not candidate.effect.by_place
 
 
 def fields_of(scene: Scene, kept: NDArray[np.bool_]) -> Ints:

@@ -44,7 +44,7 @@ def is_untouched(score: Score, added: Candidate) -> bool:
     them says nothing of the other, unless individuals differ.
     """
     pair = (score.candidate.effect, added.effect)
-    return pair[0].on_speed != pair[1].on_speed and not any(each.individual for each in pair)
+    return pair[0].on_speed != pair[1].on_speed and all(each.has_steps for each in pair)
 
 
 def foreseen(score: Score, added: Score) -> Score:
@@ -64,7 +64,7 @@ def foreseen(score: Score, added: Score) -> Score:
     effects = (score.candidate.effect, added.candidate.effect)
     known = float(added.steps @ added.steps)
     told = math.isfinite(score.z) and len(score.steps) == len(added.steps) and known > 0.0
-    if not told or any(each.individual or each.stops for each in effects):
+    if not (told and all(each.in_any_steps for each in effects)):
         return replace(score, z=math.inf)
     left = score.steps - (score.steps @ added.steps / known) * added.steps
     squares = float(left @ left)

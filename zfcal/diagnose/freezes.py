@@ -21,8 +21,7 @@ _LONG_RESTS_S = (1.0, 2.0)
 
 def rested_steps(candidate: Candidate) -> int:
     """Return after how many steps at rest it is asked whether one more follows."""
-    duration_s = candidate.shape.get("duration_s", 0.0)
-    return 1 + sum(duration_s > limit_s for limit_s in _LONG_RESTS_S)
+    return 1 + sum(candidate.rest_s > limit_s for limit_s in _LONG_RESTS_S)
 
 
 def rest_score(
@@ -79,8 +78,7 @@ class _Freezes:
     @classmethod
     def of(cls, candidate: Candidate, n_moves: int, dt_s: float) -> _Freezes:
         """Return them for an effect at its shape."""
-        duration_s = candidate.shape["duration_s"]
-        goes_on = math.exp(-dt_s / duration_s)
+        goes_on = math.exp(-dt_s / candidate.rest_s)
         n_freezes = candidate.faint * n_moves * dt_s
         rested = n_freezes * goes_on ** (rested_steps(candidate) - 1) / (1 - goes_on)
         return cls(at_rest=n_freezes / (1 - goes_on), rested=rested, after_rest=rested * goes_on)

@@ -113,7 +113,7 @@ def hopeful(
     least = z / math.sqrt(sampled.share) - _HOPE
     if sampled.share == 1 or least <= 0:
         return list(candidates)
-    told = [each for each in candidates if not (each.effect.individual or each.effect.stops)]
+    told = [each for each in candidates if each.effect.in_any_steps]
     scores = ask_all(sampled.part, told, n_workers)
     hopeless = {id(score.candidate) for score in scores if score.clearness <= least}
     return [each for each in candidates if id(each) not in hopeless]

@@ -107,15 +107,16 @@ def own_speeds(screen: Screen, template: Parameters, limits_m_s: tuple[float, fl
     """
     moves, parameters = screen.scene.moves, screen.fitted.parameters
     now, before = screen.still
-    stops = [values for name, values in parameters.effects.items() if find_effect(name).stops]
-    rows = ~before if stops else np.ones(len(moves), dtype=bool)
+    resting = [name for name in parameters.effects if find_effect(name).rests]
+    rows = ~before if resting else np.ones(len(moves), dtype=bool)
     zones = []
     for number, zone in enumerate(template.zones, start=1):
         here = rows & (moves.zone == number)
         counts = _histogram(screen.own_speeds[here], limits_m_s, len(zone.speed_frequency))
-        for values in stops:
+        for name in resting:
             # Of those that swam so many have stopped: they drew no speed.
-            rests = 1 - math.exp(-values["rate_per_s"] * screen.scene.dt_s)
+            rate_per_s = parameters.effects[name][find_effect(name).strength]
+            rests = 1 - math.exp(-rate_per_s * screen.scene.dt_s)
             counts[0] -= min(rests * here.sum(), float((now & here).sum()), counts[0])
         zones.append(_with_speeds(zone, counts) if here.sum() >= MIN_SPEEDS else zone)
     return replace(template, zones=tuple(zones))
@@ -231,9 +232,9 @@ def speed_gains(
     moves = base.scene.moves
     parts = []
     field = _field(base, [name for name in names if find_effect(name).on_speed])
-    if any(effect.on_speed and not effect.stops for effect in effects):
+    if any(effect.multiplies for effect in effects):
         parts.append(_factor_gains(model, base, field, random))
-    if any(effect.stops for effect in effects):
+    if any(effect.rests for effect in effects):
         parts.append(_stop_gains(model, trained))
     before = base.model_factor
     return Gains(
@@ -284,7 +285,7 @@ def _stop_gains(model: Screen, trained: Screen) -> tuple[Floats, Floats]:
 def _chain(trained: Screen) -> ChainFit:
     """Return the chain of the steps that a model was fitted on."""
     effects = trained.fitted.parameters.effects
-    (name,) = (name for name in effects if find_effect(name).stops)
+    (name,) = (name for name in effects if find_effect(name).rests)
     return chain_of(runs_of(trained), candidate_of(name, effects[name]), trained.scene.dt_s)
 
 
@@ -308,7 +309,7 @@ def effect_steps(screen: Screen, trained: Screen, name: str, values: Mapping[str
     """
     candidate = candidate_of(name, values)
     effect = candidate.effect
-    if effect.stops and name in screen.fitted.parameters.effects:
+    if effect.rests and name in screen.fitted.parameters.effects:
         # As where the model lacks it, with the chance of a still step that the chain gives.
         rested, (now, _) = screen.still_for(rested_steps(candidate)), screen.still
         chance = runs_of(screen).still_chance(_chain(trained).chain)

@@ -44,10 +44,10 @@ def outlasts(score: Score, screen: Screen, earlier: Sequence[Candidate]) -> bool
         nothing over in speeds, and the other way round.
     """
     asked = score.candidate.effect
-    if asked.individual or asked.stops:
+    if not asked.in_any_steps:
         return True
     alike = [
-        each for each in earlier if each.effect.on_speed == asked.on_speed and not each.effect.stops
+        each for each in earlier if each.effect.on_speed == asked.on_speed and not each.effect.rests
     ]
     if not alike:
         return True

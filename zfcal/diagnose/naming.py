@@ -41,9 +41,6 @@ _SURE = 2.0
 _RICHER = 2
 """Parameters more, by which a suspect follows whatever form another one has."""
 
-_BENDS_TO = {"place-preference": "directional-drift"}
-"""A place with a reach of its own bends to a drift of any form."""
-
 _OWN_SHARE = 0.5
 """Of what a suspect gains alone, it gains so much beside another if both are there."""
 
@@ -79,6 +76,17 @@ class Refit:
     def name(self) -> str:
         """Name of the effect."""
         return self.candidate.name
+
+    @property
+    def is_generic(self) -> bool:
+        """Whether it names no mechanism."""
+        return self.candidate.effect.generic
+
+    @property
+    def looks_like(self) -> str | None:
+        """Name of the effect that it may only seem to be, whatever form that one has."""
+        like = self.candidate.effect.looks_like
+        return None if like is None else like.name
 
     @property
     def nats(self) -> float:
@@ -126,7 +134,7 @@ def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers:
     if candidate.effect.on_speed:
         return _refit_speed(screen, score)
     scene = screen.scene
-    if candidate.effect.individual:
+    if candidate.effect.by_trait:
         scene = with_traits(scene, score)
     free = free_of(candidate)
     start = _start(scene, screen.fitted, score) if near is None else near.values
@@ -267,7 +275,7 @@ def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]
         # It gains as much. If it falls beside the best one, which stands beside it, then
         # it is a shadow; if both fall they say the same, and if both stand neither does all.
         # One that follows whatever form the other has stands beside it anyway: that says nothing.
-        follows = best.n_free - other.n_free >= _RICHER or _BENDS_TO.get(best.name) == other.name
+        follows = best.n_free - other.n_free >= _RICHER or best.looks_like == other.name
         if not follows and standing(best.candidate, other) and not standing(other.candidate, best):
             continue
         ties.append(other)

@@ -8,7 +8,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.case import is_suspicious
-from zfcal.diagnose.controls import NAMES, ask_controls
+from zfcal.diagnose.controls import ask_controls, control_names
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.null import from_replicates, theory
 from zfcal.diagnose.omnibus import Omnibus
@@ -77,8 +77,9 @@ def _controls_note(question: Question, final: Screen, replicates: Sequence[Float
     drawn = [controls for controls in replicates if controls is not None]
     null = from_replicates(np.array(drawn)) if drawn else theory(len(z))
     own = null.standardised(z)
-    fired = [name for name, value in zip(NAMES, own, strict=True) if abs(value) > _CONTROL]
+    names = control_names()
+    fired = [name for name, value in zip(names, own, strict=True) if abs(value) > _CONTROL]
     text = "Negative controls are silent, as they must be."
     if fired:
         text = f"NEGATIVE CONTROL FIRES: {', '.join(fired)}. Do not trust this diagnosis."
-    return Note(name="controls", says=text, values=dict(zip(NAMES, map(float, own), strict=True)))
+    return Note(name="controls", says=text, values=dict(zip(names, map(float, own), strict=True)))

@@ -32,9 +32,7 @@ def placebo_for(name: str, company: Company, *, without: Collection[str]) -> Eff
         if effect.on_speed == right.on_speed
         and effect.name not in {name, *without}
         and effect.lacks(company) is None
-        and effect.lag is None
-        and not effect.individual
-        and not effect.stops
+        and effect.may_be_placebo
     ]
     if not fitting:
         return None

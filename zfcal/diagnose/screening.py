@@ -38,6 +38,7 @@ from zfcal.diagnose.scores import (
     tables_of,
     tame,
 )
+from zfcal.model.effects import find_effect
 from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
 from zfcal.model.kernels.scores import (
@@ -141,7 +142,7 @@ class Screen:
         if effect.on_speed:
             return self._ask_speed(candidate)
         scene = self.scene
-        if effect.individual:
+        if effect.by_trait:
             # Scores by a trait of one; whoever has which shows in how they scatter.
             scene = replace(scene, states=scene.states.copy())
             scene.states[:, TRAIT] = 1.0
@@ -150,7 +151,7 @@ class Screen:
         if not (steps**2).sum() > _LEFT * (raw**2).sum():
             # What the model has already leaves but the error of its own approximation.
             steps = np.zeros_like(raw)
-        if effect.individual:
+        if effect.by_trait:
             return self._scatter(candidate, steps)
         return summed(candidate, steps)
 
@@ -330,7 +331,7 @@ class Screen:
 
     def _ask_speed(self, candidate: Candidate) -> Score:
         effect = candidate.effect
-        if effect.stops:
+        if effect.rests:
             rested = self.still_for(rested_steps(candidate))
             return rest_score(
                 candidate, self.still[0], rested, self.scene.moves.zone, self.scene.dt_s
@@ -358,7 +359,7 @@ class Screen:
     @cached_property
     def _swum(self) -> NDArray[np.bool_]:
         """Return which moves count for effects on speed."""
-        stopping = "freezing" in self.fitted.parameters.effects
+        stopping = any(find_effect(name).rests for name in self.fitted.parameters.effects)
         n = len(self.scene.moves)
         return ~(self.still[0] | self.still[1]) if stopping else np.ones(n, dtype=bool)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, is_generic
+from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.chances import least_of
 from zfcal.diagnose.foreseen import Known, unforeseen
 from zfcal.diagnose.heats import Heat, Sampled, ahead, hopeful, run_heats, unbeaten
@@ -166,8 +166,8 @@ def _least_beside(first: Refit | None, further: Refit) -> float:
     if first is None:
         return 0.0
     pair = (first.candidate.effect, further.candidate.effect)
-    guessed = is_generic(first.name) and pair[0].on_speed == pair[1].on_speed
-    return _GENERIC_SHARE * first.nats if guessed or is_generic(further.name) else 0.0
+    guessed = first.is_generic and pair[0].on_speed == pair[1].on_speed
+    return _GENERIC_SHARE * first.nats if guessed or further.is_generic else 0.0
 
 
 def _is_clearer(rival: Refit, listed: Refit) -> bool:
@@ -181,7 +181,7 @@ def _is_guessed(listed: Refit, guesses: Sequence[Refit]) -> bool:
     Where it gains too little to be named itself it is what an effect before it leaves over, and
     so is a listed one that explains less of the same.
     """
-    return not is_generic(listed.name) and any(_is_clearer(each, listed) for each in guesses)
+    return not listed.is_generic and any(_is_clearer(each, listed) for each in guesses)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -337,7 +337,7 @@ class Selector:
         if aside:
             worth += directions(made, worth)
         choice = self._choose(worth, aside)
-        guesses = [each for each in made if is_generic(each.name) and each not in worth]
+        guesses = [each for each in made if each.is_generic and each not in worth]
         if choice is None or _is_guessed(choice.best, guesses):
             return None, bool(aside)
         by_name = {best.score.candidate.name: best for best in (*suspects, *rivals)}
@@ -378,8 +378,8 @@ class Selector:
 
     def _choose(self, worth: Sequence[Refit], aside: Sequence[Refit]) -> Choice | None:
         """Return which it is of those that are worth it; those aside only must be beaten."""
-        generic = [each for each in worth if is_generic(each.name)]
-        listed = [each for each in worth if not is_generic(each.name) and each not in aside]
+        generic = [each for each in worth if each.is_generic]
+        listed = [each for each in worth if not each.is_generic and each not in aside]
         choice = choose(listed, self._stands) if listed else None
         beaten = aside if choice is None else (choice.best, *aside)
         for rival in sorted(generic, key=lambda each: -each.worth):

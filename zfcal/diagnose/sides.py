@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from zfcal.diagnose.heats import Heat
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import maximise
 from zfcal.model.kernels.state import X, Y
-
-_PLACE, _DIRECTION = "place-preference", "directional-drift"
 
 _ONE_SIDE = 0.8
 """Mean of the unit vectors to a place, weighed by its pull, from which on it lies on one side:
@@ -25,27 +21,18 @@ _CLEARLY = 1.5
 
 
 def one_sided(refit: Refit) -> float:
-    """Return how much one way a place pulls where fish were, from 0 to 1.
+    """Return how like a direction a place is where fish were, from 0 to 1; 0 for what is none.
 
     Parameters
     ----------
     refit
-        With the place in it: ``x_m``, ``y_m`` and ``reach_m`` of `place-preference`.
-
-    Returns
-    -------
-    float
-        Length of the mean of the unit vectors to the place, weighed by its pull (the mean
-        resultant length; Mardia and Jupp 2000, Directional Statistics, section 2.3).
+        With the place in it.
     """
-    scene, values = refit.screen.scene, refit.values
+    like, scene = refit.candidate.effect.looks_like, refit.screen.scene
+    if like is None:
+        return 0.0
     turns = scene.turns
-    dx = values["x_m"] - scene.states[turns.at, X, turns.who]
-    dy = values["y_m"] - scene.states[turns.at, Y, turns.who]
-    away = np.maximum(np.hypot(dx, dy), 1e-9)
-    pull = 1.0 / (1.0 + (away / values["reach_m"]) ** 4)
-    mean = np.average(np.column_stack([dx / away, dy / away]), axis=0, weights=pull)
-    return float(np.hypot(*mean))
+    return like.share(scene.states[turns.at, :, turns.who][:, [X, Y]], refit.values)
 
 
 def feigned(refits: Sequence[Refit], before: Screen) -> list[Refit]:
@@ -64,20 +51,22 @@ def feigned(refits: Sequence[Refit], before: Screen) -> list[Refit]:
     before
         The model without any of them.
     """
-    places = [each for each in refits if each.name == _PLACE]
-    if places and _DIRECTION in before.fitted.parameters.effects:
-        needed = (_CLEARLY - 1.0) * _gained(before)
-    else:
-        places = [each for each in places if one_sided(each) >= _ONE_SIDE]
-        needed = _CLEARLY * max((e.nats for e in refits if e.name == _DIRECTION), default=0.0)
-    return [each for each in places if each.nats <= needed]
+    return [each for each in refits if each.looks_like and _is_feigned(each, refits, before)]
 
 
-def _gained(screen: Screen) -> float:
+def _is_feigned(place: Refit, refits: Sequence[Refit], before: Screen) -> bool:
+    name = place.looks_like
+    if name in before.fitted.parameters.effects:
+        return place.nats <= (_CLEARLY - 1.0) * _gained(before, name)
+    direction = max((each.nats for each in refits if each.name == name), default=0.0)
+    return one_sided(place) >= _ONE_SIDE and place.nats <= _CLEARLY * direction
+
+
+def _gained(screen: Screen, direction: str) -> float:
     """Return what the direction that is in a model gains there, in nats."""
     fitted, model = screen.fitted, screen.fitted.parameters
-    rest = {name: values for name, values in model.effects.items() if name != _DIRECTION}
-    free = tuple(pair for pair in fitted.free if pair[0] != _DIRECTION)
+    rest = {name: values for name, values in model.effects.items() if name != direction}
+    free = tuple(pair for pair in fitted.free if pair[0] != direction)
     without = maximise(screen.scene, replace(model, effects=rest), free=free, start=fitted.x)
     return fitted.nats - without.nats - (len(fitted.free) - len(free))
 
@@ -87,7 +76,8 @@ def directions(refits: Sequence[Refit], without: Sequence[Refit]) -> list[Refit]
 
     Where a place is put aside for one, a direction is worth what the place is.
     """
-    return [each for each in refits if each.name == _DIRECTION and each not in without]
+    names = {each.looks_like for each in refits}
+    return [each for each in refits if each.name in names and each not in without]
 
 
 def with_direction(kept: Sequence[Heat], heats: Sequence[Heat]) -> list[Heat]:
@@ -100,8 +90,7 @@ def with_direction(kept: Sequence[Heat], heats: Sequence[Heat]) -> list[Heat]:
     heats
         All of them.
     """
-    names = {heat.score.candidate.name for heat in kept}
-    places = [heat.first for heat in kept if heat.score.candidate.name == _PLACE]
-    if _DIRECTION in names or not any(p is not None and one_sided(p) >= _ONE_SIDE for p in places):
-        return list(kept)
-    return [*kept, *(heat for heat in heats if heat.score.candidate.name == _DIRECTION)]
+    places = [heat.first for heat in kept if heat.first is not None]
+    sought = {place.looks_like for place in places if one_sided(place) >= _ONE_SIDE}
+    sought -= {heat.score.candidate.name for heat in kept}
+    return [*kept, *(heat for heat in heats if heat.score.candidate.name in sought)]

@@ -156,7 +156,7 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
     start
         A strength to start from.
     """
-    if candidate.effect.stops:
+    if candidate.effect.rests:
         return _fit_stops(screen, candidate)
     all_ = np.ones(len(screen.scene.moves), dtype=bool)
     likelihood = _Likelihood.of(screen, candidate, all_)
@@ -200,7 +200,7 @@ def held_out_gain(
     ndarray, shape (move,)
         In nats; NaN in fields of which too few steps are learnt from.
     """
-    if candidate.effect.stops:
+    if candidate.effect.rests:
         runs = runs_of(screen)
         found = chain_of(runs, candidate, screen.scene.dt_s, learnt)
         return runs.log_chance(found.chain) - runs.log_chance(found.alike)
@@ -272,7 +272,7 @@ def _fit_stops(screen: Screen, candidate: Candidate) -> SpeedFit:
     times = math.exp(min(1.96 * error * (1 - chain.begins), 700.0))
     low, high = bounds_of(candidate.name, candidate.effect.strength)
     return SpeedFit(
-        values=candidate.values(rate) | {"duration_s": -dt_s / math.log(chain.stays)},
+        values=candidate.values(rate) | {candidate.effect.rests: -dt_s / math.log(chain.stays)},
         interval=(max(low, rate / times), min(high, rate * times)),
         gain=runs.log_chance(chain) - runs.log_chance(found.alike),
     )
@@ -295,8 +295,9 @@ def chain_of(
         Moves that it is taken from; all by default.
     """
     rows = np.ones(len(runs.now), dtype=bool) if learnt is None else learnt
+    effect = candidate.effect
     (_, most), (least_s, most_s) = (
-        bounds_of(candidate.name, key) for key in (candidate.effect.strength, "duration_s")
+        bounds_of(effect.name, key) for key in (effect.strength, effect.rests)
     )
     begins = (_RAREST, 1 - math.exp(-most * dt_s))
     return fit_chain(

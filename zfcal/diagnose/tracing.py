@@ -11,13 +11,11 @@ from zfcal.diagnose.findings import Trace
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
+from zfcal.model.effects import Effect
 from zfcal.model.kernels.state import SPEED, WALL, ZONE, X, Y
 from zfcal.model.scene import Moves, Scene
 
 _BINS = 12
-_BY_TIME = ("fatigue", "habituation")
-_BY_SPEED = ("burst-and-coast", "freezing", "speed-turn-coupling")
-_BY_WALL = ("wall-persistence", "turning-bias", "turning-memory", "directional-drift")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +47,7 @@ def trace(score: Score, before: Screen, after: Refit) -> Trace:
     own = np.sign(score.z or 1.0) * score.steps / unit
     left = np.sign(score.z or 1.0) * after.screen.own_scores(score.candidate) / unit
     states = scene.states[steps.at, :, steps.who]
-    cue = _cue(score.candidate.name, scene, steps)
+    cue = _cue(score.candidate.effect, scene, steps)
     middle, observed = _binned(cue.values, own)
     _, rest = _binned(cue.values, left)
     return Trace(
@@ -68,13 +66,13 @@ def trace(score: Score, before: Screen, after: Refit) -> Trace:
     )
 
 
-def _cue(name: str, scene: Scene, steps: Moves) -> _Cue:
+def _cue(effect: Effect, scene: Scene, steps: Moves) -> _Cue:
     states = scene.states[steps.at, :, steps.who]
-    if name in _BY_TIME or name.endswith(":time"):
+    if effect.shown_against == "time":
         return _Cue(name="time (min)", values=scene.time_s(steps) / 60)
-    if name in _BY_SPEED or name.endswith("own-speed"):
+    if effect.shown_against == "speed":
         return _Cue(name="speed of the step before (cm/s)", values=100 * states[:, SPEED])
-    if name in _BY_WALL or "wall" in name or scene.n_fish + scene.n_robots < 2:
+    if effect.shown_against == "wall" or scene.n_fish + scene.n_robots < 2:
         return _Cue(name="distance to the wall (cm)", values=100 * states[:, WALL])
     return _Cue(name="distance to the nearest neighbour (cm)", values=100 * _nearest(scene, steps))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from zfcal.model.effects import all_effects, generic_effects
 from zfcal.model.effects.base import Effect, EffectParameter
 
@@ -10,9 +12,7 @@ _HEAD = """\
 
 What fish may do beyond the base model. Each effect can stand in a model file, with its parameters:
 
-    [effects.wall-persistence]
-    strength = 0.7
-
+{example}
 `zfcal diagnose` asks a recording for each of them, `zfcal extend` adds the one that is missing,
 and `zfcal simulate` and `calibrate` swim by it. The parameter in bold is the strength: at 0 the
 effect does nothing. Where it may be negative the second sentence holds. A parameter that the model
@@ -27,10 +27,7 @@ _GENERIC = """
 For what is on no list. None of these explains anything: each says to which cue the fish respond,
 and in which direction. A model file names them in quotation marks:
 
-    [effects."generic:heading:wall"]
-    strength = 0.5
-    reach_m = 0.05
-
+{example}
 Their strength tilts the heading toward the cue's direction or away from it, or it multiplies the
 speed.
 """
@@ -38,13 +35,24 @@ speed.
 
 def effects_page() -> str:
     """Return the page in Markdown: sentences, parameters with bounds and units, references."""
-    listed = "".join(_section(effect) for effect in all_effects())
-    generic = "".join(_section(effect) for effect in generic_effects())
-    return _HEAD + listed + _GENERIC + generic
+    return _part(_HEAD, all_effects()) + _part(_GENERIC, generic_effects())
+
+
+def _part(head: str, effects: Sequence[Effect]) -> str:
+    plainest = min(reversed(effects), key=lambda effect: len(effect.parameters))
+    sections = "".join(_section(effect) for effect in effects)
+    return head.format(example=_example(plainest)) + sections
+
+
+def _example(effect: Effect) -> str:
+    """Return the lines of a model file that give an effect its parameters' defaults."""
+    name = f'"{effect.name}"' if effect.generic else effect.name
+    rows = "".join(f"    {each.name} = {each.default:g}\n" for each in effect.parameters)
+    return f"    [effects.{name}]\n{rows}"
 
 
 def _section(effect: Effect) -> str:
-    level = "###" if ":" in effect.name else "##"
+    level = "###" if effect.generic else "##"
     opposite = f" *Negative:* {effect.opposite}" if effect.opposite else ""
     rows = "".join(_row(parameter, effect.strength) for parameter in effect.parameters)
     return (

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.errors import InputError
+from zfcal.model.effects import less_attention_to_robots
 from zfcal.model.fish_simulator import Shoal
 from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, Parameters, ZoneParameters
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 Floats = NDArray[np.float64]
-
-ATTENTION = "robot-avoidance"
-"""The effect by which virtual fish take the robot otherwise than a fish."""
 
 _SPECIES, _DRIFT, _MOVES, _NOISE = range(4)
 """Tell the random numbers of a tank from one another."""
@@ -116,7 +114,7 @@ class Truth:
         self._rng = np.random.default_rng([seed, _DRIFT])
         effects = dict(base.effects)
         if options.wariness:
-            effects[ATTENTION] = {"strength": options.wariness, "flight": 0.0}
+            effects |= less_attention_to_robots(options.wariness)
         self._base = dataclasses.replace(base, effects=effects)
         self._lasting = options.between_sd * own.standard_normal(size)
         self._drift = options.drift_sd * self._rng.standard_normal(size)

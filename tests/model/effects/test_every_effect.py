@@ -10,8 +10,16 @@ import numpy as np
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.model.effects import MAX_PARAMETERS, Company, all_effects, find_effect, generic_effects
+from zfcal.model.effects import (
+    MAX_PARAMETERS,
+    Company,
+    all_effects,
+    find_effect,
+    generic_effects,
+    less_attention_to_robots,
+)
 from zfcal.model.effects.places import places
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES
 from zfcal.model.packing import pack
 from zfcal.model.simulate import simulate_tracks
 
@@ -92,8 +100,10 @@ def test_the_generic_family_says_target_and_cue():
         else:
             assert target == ("speed" if effect.on_speed else "heading")
         assert cue
+        assert effect.generic
         assert find_effect(effect.name) is effect
         assert effect not in all_effects()
+    assert not any(effect.generic for effect in all_effects())
 
 
 def test_a_generic_effect_that_is_none_is_refused():
@@ -127,6 +137,57 @@ def test_it_says_what_it_means(effect):
     # A delay is a whole number of steps: no slope leads to it.
     may_be_fixed = set(effect.names) if effect.lag else set(effect.names) - {effect.strength}
     assert set(effect.fixed) <= may_be_fixed
+
+
+@EVERY
+def test_what_else_it_says_holds_together(effect):
+    """Times of rest are parameters of effects on speed; individuals differ in headings alone."""
+    assert not effect.rests or (effect.on_speed and effect.rests in effect.names)
+    assert not (effect.by_trait and effect.on_speed)
+    assert effect.multiplies == (effect.on_speed and not effect.rests)
+    assert effect.in_any_steps == (not effect.rests and not effect.by_trait)
+    assert effect.may_be_placebo <= effect.in_any_steps <= effect.has_steps
+
+
+def test_every_other_form_is_a_generic_effect_of_a_listed_one():
+    """By names that there are, of one effect each; with the same response, headings or speed."""
+    pairs = [(form, effect) for effect in all_effects() for form in effect.other_forms]
+    assert len({form for form, _ in pairs}) == len(pairs) == 5
+    for form, listed in pairs:
+        own = find_effect(form)
+        assert own.generic
+        assert not listed.generic
+        assert own.on_speed == listed.on_speed or listed.name == "speed-turn-coupling"
+
+
+def test_what_an_effect_looks_like_is_another_one():
+    """Of the list, and like it to a share where fish were: all of it from one side."""
+    found = [effect for effect in all_effects() if effect.looks_like]
+    assert [(effect.name, effect.looks_like.name) for effect in found] == [
+        ("place-preference", "directional-drift")
+    ]
+    values = {"x_m": 0.0, "y_m": 0.0, "reach_m": 1.0}
+    share = found[0].looks_like.share
+    assert share(np.array([[0.1, 0.0], [0.2, 0.0]]), values) == pytest.approx(1.0)
+    assert share(np.array([[0.1, 0.0], [-0.1, 0.0]]), values) == pytest.approx(0.0)
+
+
+def test_a_control_leaves_the_states_that_it_is_given():
+    """It makes others of the same shape, and those that an effect does not ask stay as they are."""
+    states = np.random.default_rng(4).normal(size=(100, STATES, 3))
+    before = states.copy()
+    controls = [effect.control for effect in all_effects() if effect.control]
+    assert [each.name for each in controls] == ["neighbours' heading 12 s ago", "a shuffled turn"]
+    for control, rows in zip(controls, ([HX, HY], [PAST_HX, PAST_HY]), strict=True):
+        other = control.states(states, 0.2, np.random.default_rng(1))
+        changed = np.flatnonzero((other != states).any(axis=(0, 2)))
+        assert changed.tolist() == rows
+        assert np.array_equal(states, before)
+
+
+def test_one_effect_takes_attention_from_robots():
+    """Its log is the strength, and fish do not flee."""
+    assert less_attention_to_robots(0.3) == {"robot-avoidance": {"strength": 0.3, "flight": 0.0}}
 
 
 @EVERY

@@ -23,6 +23,7 @@ __all__ = [
     "all_effects",
     "find_effect",
     "generic_effects",
+    "less_attention_to_robots",
 ]
 
 
@@ -51,6 +52,20 @@ def find_effect(name: str) -> Effect:
         f"There is no effect {name!r}.",
         hint=f"Did you mean {' or '.join(near)}?" if near else f"Known: {', '.join(known)}.",
     )
+
+
+def less_attention_to_robots(lost: float) -> dict[str, dict[str, float]]:
+    """Return the effect by which fish attend to a robot less than to a fish, at its parameters.
+
+    Parameters
+    ----------
+    lost
+        Log of the attention that the robot loses.
+    """
+    # Only here: an import compiles the effect, and a model has few of them.
+    from zfcal.model.effects.robot_avoidance import less_attention
+
+    return less_attention(lost)
 
 
 def _modules() -> list[pkgutil.ModuleInfo]:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.effects.base import Effect, EffectParameter
+import numpy as np
+
+from zfcal.arrays import Floats
+from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -83,6 +86,20 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     )
 
 
+LATE_S = 12.0
+"""Nobody turns toward a heading of so long ago."""
+
+
+def _late(states: Floats, dt_s: float, _random: np.random.Generator) -> Floats:
+    """Return states in which all have the heading of 12 s ago."""
+    late = min(max(1, round(LATE_S / dt_s)), len(states) - 1)
+    changed = states.copy()
+    for row in (HX, HY):
+        changed[late:, row] = states[:-late, row]
+        changed[:late, row] = 0.0
+    return changed
+
+
 EFFECT = Effect(
     name="alignment",
     says="Fish turn toward the direction in which their neighbours swim.",
@@ -144,4 +161,6 @@ EFFECT = Effect(
     lacks=needs_neighbour,
     fixed=("grading", "leaning", "turning"),
     needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
+    other_forms=("generic:heading:neighbour-heading",),
+    control=Control(name="neighbours' heading 12 s ago", states=_late),
 )

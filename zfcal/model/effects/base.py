@@ -31,9 +31,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 
 MAX_PARAMETERS = 8
@@ -85,6 +88,40 @@ class Company:
     follows_walls: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """A question whose answer is no in every tank: an effect, asked of states that tell it nothing.
+
+    Parameters
+    ----------
+    name
+        As findings tell of it.
+    states
+        From an agents' states, shape (sample, row, agent), the seconds between samples and
+        random numbers: the states that the effect is asked of instead.
+    """
+
+    name: str
+    states: Callable[[Floats, float, np.random.Generator], Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Likeness:
+    """Another effect that an effect looks like, whatever form that one has.
+
+    Parameters
+    ----------
+    name
+        Of the other one.
+    share
+        From positions where fish were, shape (step, xy) in metres, and the parameters: how
+        like the other one it is there, from 0 to 1.
+    """
+
+    name: str
+    share: Callable[[Floats, Mapping[str, float]], float]
+
+
 def _always(_company: Company) -> str | None:
     return None
 
@@ -131,12 +168,31 @@ class Effect:
         The sentence where the strength is negative; empty where it cannot be.
     identity_s
         Tracks need to be this long under one id for the effect to show.
-    stops
-        Whether its speed function stops agents by chance: what shows is how long they
-        stay.
-    individual
-        Whether it is a difference between individuals: what shows is how their scores
-        scatter.
+    rests
+        Name of a parameter in seconds, empty for most: the mean time for which its speed
+        function stops agents by chance. The strength is how often, per second, and what shows
+        is how long they stay.
+    by_trait
+        Whether individuals differ in it, by their trait in the state: what shows is how their
+        scores scatter.
+    by_place
+        Of an effect on speed: whether it goes by where in the tank a fish is. It is asked for over
+        the whole tank then; others are asked for within fields of the tank, each by itself.
+    per_hour
+        Whether the strength is a change with the hour: of that a recording twice as long tells
+        eight times as much.
+    shown_against
+        What pictures show its statistic against: the ``time``, the ``speed`` of the step before,
+        the distance to the ``wall`` or to the nearest ``neighbour``.
+    generic
+        Whether it is of the generic family, which names no mechanism.
+    other_forms
+        Names of effects of the generic family that say the same in another form: the same cue
+        and the same response.
+    looks_like
+        Another effect that fish with this one may seem to have.
+    control
+        A negative control that belongs to it.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     needs
@@ -162,8 +218,15 @@ class Effect:
     lacks: Callable[[Company], str | None] = _always
     opposite: str = ""
     identity_s: float = 0.0
-    stops: bool = False
-    individual: bool = False
+    rests: str = ""
+    by_trait: bool = False
+    by_place: bool = False
+    per_hour: bool = False
+    shown_against: Literal["time", "speed", "wall", "neighbour"] = "neighbour"
+    generic: bool = False
+    other_forms: tuple[str, ...] = ()
+    looks_like: Likeness | None = None
+    control: Control | None = None
     fixed: tuple[str, ...] = ()
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
@@ -176,6 +239,26 @@ class Effect:
     def on_speed(self) -> bool:
         """Whether it changes the speed; otherwise it changes the heading."""
         return self.speed is not None
+
+    @property
+    def multiplies(self) -> bool:
+        """Whether it multiplies drawn speeds, rather than to stop agents."""
+        return self.on_speed and not self.rests
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether its statistic is one of single steps; individuals have one each."""
+        return not self.by_trait
+
+    @property
+    def in_any_steps(self) -> bool:
+        """Whether any of the steps ask for it: rests last, and individuals show in all steps."""
+        return self.has_steps and not self.rests
+
+    @property
+    def may_be_placebo(self) -> bool:
+        """Whether it can be added to a model as any other one, though it is not there."""
+        return self.in_any_steps and self.lag is None
 
     def calls(self, kind: str, given: Mapping[str, float]) -> bool:
         """Return whether a function of a kind has anything to do at these parameters."""

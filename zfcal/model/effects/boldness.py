@@ -61,6 +61,6 @@ EFFECT = Effect(
     shapes=_shapes,
     lacks=_lacks,
     identity_s=300.0,
-    individual=True,
+    by_trait=True,
     fixed=("heading_share",),
 )

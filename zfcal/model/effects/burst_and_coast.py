@@ -40,4 +40,6 @@ EFFECT = Effect(
     probe=0.01,
     speed=speed,
     fixed=("usual_m_s",),
+    shown_against="speed",
+    other_forms=("generic:speed:own-speed",),
 )

@@ -53,4 +53,5 @@ EFFECT = Effect(
     factor=factor,
     harmonics=1,
     shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+    shown_against="wall",
 )

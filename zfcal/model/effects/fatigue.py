@@ -40,4 +40,6 @@ EFFECT = Effect(
     probe=0.02,
     speed=speed,
     fixed=("usual_at_s",),
+    per_hour=True,
+    shown_against="time",
 )

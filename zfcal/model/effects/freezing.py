@@ -47,5 +47,6 @@ EFFECT = Effect(
     speed=speed,
     shapes=lambda _arena: tuple({"duration_s": duration} for duration in (1.0, 2.0, 5.0)),
     identity_s=2.0,
-    stops=True,
+    rests="duration_s",
+    shown_against="speed",
 )

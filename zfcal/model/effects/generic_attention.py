@@ -38,6 +38,7 @@ def _effect(
             *parameters,
         ),
         sight=sight,
+        generic=True,
         lacks=needs_neighbour,
         shapes=(lambda _arena: tuple({"middle_m": m} for m in (0.06, 0.15)))
         if parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from zfcal.arena import Arena
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
@@ -216,6 +216,8 @@ def _effect(
         harmonics=_HARMONICS,
         shapes=shapes,
         lacks=lacks,
+        generic=True,
+        shown_against=_SHOWN.get(cue, "neighbour"),
         fixed=tuple(own.name for own in parameters if own.name in FIXED),
     )
 
@@ -232,6 +234,14 @@ _ASKED: dict[str, tuple[Callable[[Arena], Shapes], Callable[[Company], str | Non
     "time": (_times, _anywhere),
     "own-turn": (_each("carried", -1.0, 0.0, 1.0), _anywhere),
 }
+
+_SHOWN: dict[str, Literal["time", "speed", "wall"]] = {
+    "wall": "wall",
+    "wall-time": "wall",
+    "time": "time",
+    "own-speed": "speed",
+}
+"""What pictures show a cue against, where that is no neighbour."""
 
 EFFECTS = (
     _effect(

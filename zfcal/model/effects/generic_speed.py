@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from zfcal.arena import Arena
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
@@ -137,6 +137,9 @@ def _effect(
         speed=speed,
         shapes=shapes,
         lacks=needs_neighbour if cue.startswith("neighbour") else _anywhere,
+        generic=True,
+        by_place=cue in {"place", "wall"},
+        shown_against=_SHOWN.get(cue, "neighbour"),
         fixed=tuple(own.name for own in parameters if own.name in FIXED),
     )
 
@@ -147,6 +150,13 @@ _ASKED: dict[str, Callable[[Arena], Shapes]] = {
     "place": _places,
     "time": _times,
 }
+
+_SHOWN: dict[str, Literal["time", "speed", "wall"]] = {
+    "wall": "wall",
+    "time": "time",
+    "own-speed": "speed",
+}
+"""What pictures show a cue against, where that is no neighbour."""
 
 EFFECTS = (
     _effect(

@@ -46,4 +46,6 @@ EFFECT = Effect(
     sight=sight,
     lacks=needs_neighbour,
     fixed=("usual_at_s",),
+    per_hour=True,
+    shown_against="time",
 )

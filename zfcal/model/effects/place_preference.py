@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
-from zfcal.model.effects.base import Effect, EffectParameter
+import numpy as np
+
+from zfcal.arrays import Floats
+from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.forms import tilt
 from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
@@ -23,6 +27,19 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         return 1.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     return tilt(parameters[0], pull * (ux * dx + uy * dy) / away, pull)
+
+
+def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
+    """Return how much one way the place pulls where fish were, from 0 to 1.
+
+    The length of the mean of the unit vectors to the place, weighed by its pull (the mean
+    resultant length; Mardia and Jupp 2000, Directional Statistics, section 2.3).
+    """
+    dx, dy = values["x_m"] - xy_m[:, 0], values["y_m"] - xy_m[:, 1]
+    away = np.maximum(np.hypot(dx, dy), 1e-9)
+    pull = 1.0 / (1.0 + (away / values["reach_m"]) ** 4)
+    mean = np.average(np.column_stack([dx / away, dy / away]), axis=0, weights=pull)
+    return float(np.hypot(*mean))
 
 
 EFFECT = Effect(
@@ -56,4 +73,7 @@ EFFECT = Effect(
     factor=factor,
     harmonics=1,
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
+    other_forms=("generic:heading:place",),
+    # A place with a reach of its own bends to a drift of any form.
+    looks_like=Likeness(name="directional-drift", share=_one_sided),
 )

@@ -73,3 +73,8 @@ EFFECT = Effect(
     fixed=("flight",),
     needs={"factor": ("flight",)},
 )
+
+
+def less_attention(lost: float) -> dict[str, dict[str, float]]:
+    """Return the effect at parameters by which the robot is not fled from, but attended to less."""
+    return {EFFECT.name: {EFFECT.strength: lost, "flight": 0.0}}

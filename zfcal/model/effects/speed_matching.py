@@ -59,4 +59,5 @@ EFFECT = Effect(
     shapes=lambda _arena: ({"focus": 0.0}, {"focus": 4.0}),
     lacks=needs_neighbour,
     fixed=("focus", "usual_m_s"),
+    other_forms=("generic:speed:neighbour-speed",),
 )

@@ -47,4 +47,6 @@ EFFECT = Effect(
     factor=factor,
     harmonics=1,
     fixed=("usual_m_s",),
+    shown_against="speed",
+    other_forms=("generic:speed:own-turn",),
 )

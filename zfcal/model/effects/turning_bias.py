@@ -42,4 +42,5 @@ EFFECT = Effect(
     harmonics=2,
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
     fixed=("along_walls",),
+    shown_against="wall",
 )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from zfcal.model.effects.base import Effect, EffectParameter
+import numpy as np
+
+from zfcal.arrays import Floats
+from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -17,6 +20,16 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     # A fish that has turned back has no side to go on to.
     last = (px * hy - py * hx) * max(0.0, px * hx + py * hy) ** parameters[2]
     return tilt(parameters[0], last * leftward(state, n, i, ux, uy, parameters[1]), abs(last))
+
+
+def _shuffled(states: Floats, _dt_s: float, random: np.random.Generator) -> Floats:
+    """Return states in which the last turns are dealt anew among all agents and times."""
+    changed = states.copy()
+    now = np.arctan2(changed[:, HY], changed[:, HX])
+    turn = now - np.arctan2(changed[:, PAST_HY], changed[:, PAST_HX])
+    dealt = random.permutation(turn.ravel()).reshape(turn.shape)
+    changed[:, PAST_HX], changed[:, PAST_HY] = np.cos(now - dealt), np.sin(now - dealt)
+    return changed
 
 
 EFFECT = Effect(
@@ -57,4 +70,8 @@ EFFECT = Effect(
     ),
     fixed=("along_walls", "forgets_wide"),
     identity_s=0.8,
+    shown_against="wall",
+    # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep
+    # their heading, which is no memory of turns, and what real fish do most.
+    control=Control(name="a shuffled turn", states=_shuffled),
 )

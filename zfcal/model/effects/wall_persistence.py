@@ -44,4 +44,5 @@ EFFECT = Effect(
     probe=0.01,
     factor=factor,
     lacks=_lacks,
+    shown_against="wall",
 )

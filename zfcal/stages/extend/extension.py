@@ -252,7 +252,7 @@ class Extension:
     def _statistic(self, there: dict[str, Screen], name: str) -> Steps | None:
         """Return the first effect's own statistic in a model; None for what is none of steps."""
         first = next(iter(self.effects))
-        if name not in there or find_effect(first).individual:
+        if name not in there or not find_effect(first).has_steps:
             return None
         values = self.fits[WITH].fitted.parameters.effects[first]
         return effect_steps(there[name], self.fits[name], first, values)
