@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.effects import less_attention_to_robots
 from zfcal.model.fish_simulator import Shoal
 from zfcal.parameters import ALPHA_MAX, KAPPA_0_MAX, KAPPA_F_MAX, Parameters, ZoneParameters
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
-
-Floats = NDArray[np.float64]
 
 _SPECIES, _DRIFT, _MOVES, _NOISE = range(4)
 """Tell the random numbers of a tank from one another."""

@@ -10,15 +10,13 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.diagnose.pictured import Curve, Parts, Pictured
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls
 from zfcal.report.figures.panels import PANEL_IN, Entry, Panel, Picture
-
-Floats = NDArray[np.float64]
 
 _WIDTH_IN = 3.2
 _BAR_IN = 0.65

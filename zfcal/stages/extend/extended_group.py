@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.calibrate.group import check_genome_length
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
 from zfcal.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

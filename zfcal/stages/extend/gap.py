@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.scores import FeatureScores, Scores, population_scores
 from zfcal.behaviour.statistics import Statistics
@@ -22,8 +23,6 @@ from zfcal.diagnose.findings import Gap
 from zfcal.diagnose.heldout import Gains, Steps
 from zfcal.model.simulate import Counts
 from zfcal.stages.extend.halves import Halves
-
-Floats = NDArray[np.float64]
 
 N_DRAWS = 1000
 _SIDES = (2.5, 97.5)
