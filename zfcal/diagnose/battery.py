@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Bools, Floats
 from zfcal.diagnose.kernels import (
     BEARING,
     DISTANCE,
@@ -40,8 +40,6 @@ from zfcal.diagnose.surroundings import Surroundings, signed_angle
 from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene
 from zfcal.units import HEADING_MIN_STEP_M
-
-Rows = NDArray[np.bool_]
 
 UNITS = {
     "turning": "rad",
@@ -80,7 +78,7 @@ class Steps:
     """
 
     statistic: str
-    rows: Rows
+    rows: Bools
     observed: Floats
     expected: Floats
     variance: Floats
@@ -117,7 +115,7 @@ def _of_turns(quantities: Floats, about: Surroundings, speed_m_s: Floats) -> Ite
     last = signed_angle(about.heading, about.past)
     fast = speed_m_s > np.median(speed_m_s) if len(speed_m_s) else everywhere
 
-    def take(name: str, column: int, rows: Rows, sign: Floats | float = 1.0) -> Steps:
+    def take(name: str, column: int, rows: Bools, sign: Floats | float = 1.0) -> Steps:
         values = quantities[:, column]
         return Steps(
             statistic=name, rows=rows, observed=sign * values[:, 0],
@@ -135,7 +133,7 @@ def _of_turns(quantities: Floats, about: Surroundings, speed_m_s: Floats) -> Ite
     yield take("nearest neighbour's bearing", BEARING, with_one)
 
 
-def _along(name: str, axis: Floats, waves: Floats, taken: Floats, rows: Rows) -> Steps:
+def _along(name: str, axis: Floats, waves: Floats, taken: Floats, rows: Bools) -> Steps:
     """Return the cosine of the angle between the heading and a direction."""
     x, y = axis[:, 0], axis[:, 1]
     mean = waves[:, 0] * x + waves[:, 1] * y
@@ -233,7 +231,7 @@ def speed_statistics(standing: Standing) -> Iterator[Steps]:
         )  # fmt: skip
 
 
-def _quarters(scene: Scene, about: Surroundings) -> Iterator[tuple[str, Rows]]:
+def _quarters(scene: Scene, about: Surroundings) -> Iterator[tuple[str, Bools]]:
     x0, y0, x1, y1 = scene.arena.outline.bounds
     upper, right = about.y_m > (y0 + y1) / 2, about.x_m > (x0 + x1) / 2
     yield "upper left", upper & ~right

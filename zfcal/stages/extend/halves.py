@@ -8,8 +8,8 @@ from itertools import pairwise
 from operator import add
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zfcal.arrays import Bools, Ints
 from zfcal.behaviour.located import locate
 from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.diagnose.heldout import scene_of
@@ -19,9 +19,6 @@ from zfcal.stages.track_window import Stretch
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FISH
 from zfcal.units import SEGMENT_S
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _FEWEST = 2
 """Blocks that each half needs at least."""

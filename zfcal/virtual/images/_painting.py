@@ -11,11 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from zfcal.arrays import Floats, Ints
+from zfcal.arrays import Floats, Floats32, Grey, Ints
 from zfcal.cameras._kernels import kernel
 
-Floats32 = NDArray[np.float32]
-Grey = NDArray[np.uint8]
 Field = NDArray[np.int16]
 Points = NDArray[np.int32]
 

@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Floats, Floats32
 from zfcal.cameras.frames import Image
 from zfcal.virtual.images import _painting
-from zfcal.virtual.images._painting import Floats32
 
 FINE = 16
 """Fine pixels along the side of a pixel: an edge is right to a thirtieth of a pixel."""

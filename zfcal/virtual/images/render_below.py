@@ -12,10 +12,10 @@ from typing import final
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.arrays import Floats
+from zfcal.arrays import Floats, Floats32
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Image
-from zfcal.virtual.images._painting import Floats32, add_light
+from zfcal.virtual.images._painting import add_light
 from zfcal.virtual.images.look import Look
 from zfcal.virtual.images.painting import Fill, Noise, darken, patch_of
 from zfcal.virtual.images.swimming import Moment

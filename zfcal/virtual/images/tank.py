@@ -14,10 +14,10 @@ import shapely
 from numpy.typing import NDArray
 
 from zfcal.arena import Arena
+from zfcal.arrays import Floats32
 from zfcal.cameras.camera import Projection
 from zfcal.cameras.frames import Image
 from zfcal.cameras.rig import WALL_M
-from zfcal.virtual.images._painting import Floats32
 from zfcal.virtual.images.look import Look
 from zfcal.virtual.images.painting import smooth_field
 
