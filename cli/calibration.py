@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .durations import seconds
-from .options import Decorator, adds, population_option, seed_option, workers_option
+from .options import EXISTING, Decorator, adds, population_option, seed_option, workers_option
 
 if TYPE_CHECKING:
     from zfcal.stages.calibrate.searching import CalibrateOptions
@@ -58,11 +58,17 @@ def round_options(*, generations: str = "", budget: str = "") -> Decorator:
             help="Let the maximum-likelihood estimate join the first population.",
         ),
         click.option(
-            "--champion",
-            type=click.Choice(["score", "likely"]),
-            default="score",
-            show_default=True,
-            help="Who is handed on: the best by its score, or the estimate if its score allows.",
+            "--model", type=EXISTING, help="Another model to calibrate than the trial's first."
+        ),
+        click.option(
+            "--publish",
+            type=click.Choice(["forward", "score", "likelihood"]),
+            help="Which model is handed on: by the rule whose models have been better so far, the "
+            "best by its score, or the estimate if its score allows.  [default: forward; a trial "
+            "that has models keeps its way]",
+        ),
+        click.option(
+            "--champion", type=click.Choice(["score", "likely", "likelihood"]), hidden=True
         ),
         click.option(
             "--baselines", is_flag=True, help="Score random search and the last model too."
@@ -92,7 +98,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         runs=options["runs"],
         steps=options["steps"],
         optimiser=options["optimiser"],
-        champion=options["champion"],
+        champion=CHAMPIONS[_publish(options) or "score"],
         features=options.get("features", SCORED),
     )
     if options.get("cluster") is not None and further(settings.features):
@@ -104,6 +110,8 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         n_workers=options["workers"],
         baselines=options["baselines"],
         seed_likelihood=options["seed_likelihood"],
+        model=options["model"],
+        keeps_way=_publish(options) is None and options["window"] is None,
     )
 
     def task(ends_s: frozenset[int] | None) -> Task:
@@ -112,13 +120,32 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
     return chosen, task
 
 
+CHAMPIONS: dict[str, Any] = {
+    "forward": "forward",
+    "score": "score",
+    "likelihood": "likely",
+    "likely": "likely",
+}
+"""What `zfcal.calibrate.task.Settings` calls each way to publish."""
+
+
+def _publish(options: Mapping[str, Any]) -> str | None:
+    if options["publish"] and options["champion"]:
+        raise click.UsageError("--publish and --champion say the same: give one.")
+    found: str | None = options["publish"] or options["champion"]
+    return found
+
+
 def _check_together(options: Mapping[str, Any]) -> None:
     if options["generations"] is not None and options["budget_s"] is not None:
         raise click.UsageError("A round ends after --generations or with its --budget: give one.")
-    if options["champion"] == "likely" and not options["seed_likelihood"]:
+    publish = _publish(options)
+    if publish in {"likely", "likelihood"} and not options["seed_likelihood"]:
         raise click.UsageError(
-            "--champion likely is the estimate, which --no-seed-likelihood omits."
+            "--publish likelihood is the estimate, which --no-seed-likelihood omits."
         )
+    if publish == "forward" and options["window"] is not None:
+        raise click.UsageError("--publish forward judges round after round: --window has one.")
     if options["window"] is None:
         for name in ("held_out", "output"):
             if options[name] is not None:

@@ -7,16 +7,27 @@ from pathlib import Path
 import click
 
 from .durations import seconds
-from .options import PLACE, FiniteRange, speaks
+from .options import EXISTING, PLACE, FiniteRange, speaks
 from .output import Output
 
 _LETTERS = tuple("ABCDEFGHIJ")
-_DRIVING = {"port", "pattern", "free_running", "robot", "radius_mm", "clock", "events", "force"}
+_DRIVING = {
+    "port",
+    "model",
+    "pattern",
+    "free_running",
+    "robot",
+    "radius_mm",
+    "clock",
+    "events",
+    "force",
+}
 
 
 @click.command("drive")
 @click.argument("trial", type=PLACE, required=False)
 @click.option("--port", metavar="DEV|virtual", help="Serial port of the robot, or a virtual one.")
+@click.option("--model", type=EXISTING, help="This model drives, whatever others the trial gets.")
 @click.option(
     "--pattern",
     type=click.Choice(["fish", "pid"]),
@@ -80,6 +91,7 @@ def command(
     trial: Path | None,
     *,
     port: str | None,
+    model: Path | None,
     pattern: str,
     free_running: bool,
     robot: str,
@@ -104,6 +116,7 @@ def command(
     Example:
         zfcal drive trial --port /dev/rfcomm5
         zfcal drive trial --port virtual --pattern pid --duration 30min
+        zfcal drive trial --port virtual --model trial/models/extended.toml
         zfcal drive trial --port virtual --events
         zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
@@ -140,7 +153,12 @@ def command(
         pattern=pattern, free_running=free_running, letter=robot, radius_m=radius_mm / 1000
     )
     options = DriveOptions(
-        port=port, manner=manner, clock=clock, duration_s=duration_s, verbose=out.verbose > 0
+        port=port,
+        manner=manner,
+        clock=clock,
+        duration_s=duration_s,
+        verbose=out.verbose > 0,
+        model=model,
     )
 
     def work() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.calibrate.intervals import acceptance_threshold, parameter_intervals
-from zfcal.parameters import gene_names
+from zfcal.parameters import gene_names, natural
 
 NAMES = ("corridor", "walls", "centre")
 
@@ -15,6 +15,9 @@ def ceiling(mean, low):
     return Ceiling(
         zone_names=NAMES, mean=(mean,) * 14, low=(low,) * 14, high=(1.0,) * 14, n_windows=200
     )
+
+
+MODEL = natural((("corridor", True), ("walls", True), ("centre", False)), dt_s=0.2)
 
 
 @pytest.fixture
@@ -30,7 +33,7 @@ def intervals(champion, genes, scores, *, score=0.85):
         (np.asarray(genes), np.asarray(scores)),
         score=score,
         ceiling=ceiling(0.85, 0.75),
-        zone_names=NAMES,
+        template=MODEL,
     )
 
 

@@ -53,10 +53,10 @@ def test_the_likely_one_is_handed_on_where_its_score_allows(task, small, truth):
     likely = calibrate_window(guided, replace(small, champion="likely"))
     by_score = calibrate_window(guided, small)
     assert (likely.genes == truth).all()
-    assert likely.is_likely
+    assert likely.rule == "likelihood"
     assert likely.intervals.within_ceiling
     assert task.confirmation(small).scores(truth[None]).S[0] == likely.scores.S
-    assert not by_score.is_likely
+    assert by_score.rule == "score"
     assert by_score.scores.S >= likely.scores.S
 
 
@@ -65,7 +65,7 @@ def test_an_estimate_that_scores_less_than_its_own_windows_is_none(task, small, 
     guided = replace(task, guests=1.0 - truth[None])
     asked = calibrate_window(guided, replace(small, champion="likely"))
     by_score = calibrate_window(guided, small)
-    assert not asked.is_likely
+    assert asked.rule == "score"
     assert (asked.genes == by_score.genes).all()
     assert asked.ceiling == by_score.ceiling
 
@@ -74,7 +74,7 @@ def test_without_an_estimate_the_score_decides(task, small, result):
     """Where there are no tracks, say."""
     asked = calibrate_window(task, replace(small, champion="likely"))
     assert (asked.genes == result.genes).all()
-    assert not asked.is_likely
+    assert asked.rule == "score"
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from zfcal.errors import InputError
         ({"long_s": math.nan}, "long_s must be a positive time in seconds, got nan"),
         ({"window_s": 0.0}, "window_s must be a positive time in seconds, got 0.0"),
         ({"optimiser": "cma"}, "optimiser must be 'zfcal' or 'deap', got 'cma'"),
-        ({"champion": "best"}, "champion must be 'score' or 'likely', got 'best'"),
+        ({"champion": "best"}, "champion must be 'score', 'likely' or 'forward', got 'best'"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(change, message):

@@ -87,17 +87,18 @@ def test_analyse_makes_statistics_and_scores(zfcal, trial):
 
 
 def test_calibrate_makes_models(zfcal, trial):
-    """Three files a window; the result of each round is in the JSON document."""
+    """Four files a window; the result of each round is in the JSON document."""
     zfcal("analyse", "trial")
     document = json.loads(zfcal("calibrate", "trial", *ROUND, "--json").out)
-    assert [a["path"] for a in document["artifacts"]][:3] == [
+    assert [a["path"] for a in document["artifacts"]][:4] == [
         "trial/models/000120.parquet",
         "trial/scores/000120-model.parquet",
+        "trial/scores/000120-rules.parquet",
         "trial/models/000120.toml",
     ]
     assert [result["window_end_s"] for result in document["results"]] == [120, 180]
     assert all(0 <= result["S"] <= 1 and result["ceiling"] for result in document["results"])
-    assert "nothing to do, 6 up to date" in zfcal("calibrate", "trial", *ROUND).err
+    assert "nothing to do, 8 up to date" in zfcal("calibrate", "trial", *ROUND).err
 
 
 def test_calibrate_a_stretch_into_a_file_of_its_own(zfcal, trial):

@@ -28,7 +28,9 @@ _TYPES: dict[str, pa.DataType] = {
     "dictionary": pa.dictionary(pa.int8(), pa.string()),
     "list<float64>": pa.list_(pa.float64()),
 }
-TABLE_SCHEMAS = ("zfcal.tracks/1", "zfcal.stats/1", "zfcal.scores/1", "zfcal.population/1")
+TABLE_SCHEMAS = (
+    "zfcal.tracks/1", "zfcal.stats/1", "zfcal.scores/1", "zfcal.rules/1", "zfcal.population/1",
+)  # fmt: skip
 """Names of the schemas that tables can have."""
 
 

@@ -36,6 +36,7 @@ __all__ = [
 TRACKS = "zfcal.tracks/1"
 STATS = "zfcal.stats/1"
 SCORES = "zfcal.scores/1"
+RULES = "zfcal.rules/1"
 POPULATION = "zfcal.population/1"
 
 _EXTRA_KEY = b"zfcal.extra"

@@ -10,10 +10,10 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import overall_score
-from zfcal.calibrate.group import Purpose, check_genome_length
+from zfcal.calibrate.group import Purpose
 from zfcal.calibrate.task import Settings, Task
 from zfcal.errors import InputError
-from zfcal.parameters import n_genes
+from zfcal.model.effects.genome import check_genomes
 
 
 def random_search(task: Task, settings: Settings, *, n_evaluations: int) -> Confirmed:
@@ -29,7 +29,7 @@ def random_search(task: Task, settings: Settings, *, n_evaluations: int) -> Conf
     if n_evaluations < 1:
         raise InputError(f"Random search needs at least one evaluation, got {n_evaluations}.")
     rng = task.seeds.generator(Purpose.RANDOM_SEARCH)
-    genes = rng.random((n_evaluations, n_genes(len(task.group.template.zones))))
+    genes = rng.random((n_evaluations, task.n_genes))
     evaluate = task.evaluation(settings)
     # As many at a time as in a generation, which bounds the memory.
     parts = range(0, n_evaluations, settings.population)
@@ -48,5 +48,5 @@ def unchanged(task: Task, settings: Settings, *, genes: Floats) -> Confirmed:
     genes : ndarray, shape (gene,)
         The parameters that stay as they are; speeds are this window's.
     """
-    check_genome_length(genes, len(task.group.template.zones))
+    check_genomes(genes, task.group.template)
     return confirm(task.confirmation(settings), np.atleast_2d(genes))

@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 
 from zfcal.arrays import Floats, Seeds
-from zfcal.calibrate.group import Group, check_genome_length
+from zfcal.calibrate.group import Group
 from zfcal.calibrate.scheduler import Cluster
+from zfcal.model.effects.genome import check_genomes
 from zfcal.model.simulate import Counts, burn_in_steps
 from zfcal.parameters import Parameters
 
@@ -88,7 +89,7 @@ class ClusterGroup:
         ZfcalError
             The cluster has gone.
         """
-        check_genome_length(genes, len(self.template.zones))
+        check_genomes(genes, self.template)
         table = np.ascontiguousarray(genes, dtype=np.float64)
         words = np.ascontiguousarray(seeds, dtype=np.uint64)
         steps = self.n_agents * (n_steps + burn_in_steps(self.template.dt_s))

@@ -20,8 +20,9 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.recorded import Runs, count_recorded
 from zfcal.errors import InputError
 from zfcal.model.effects import find_effect
+from zfcal.model.effects.genome import check_genomes, from_genome
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
-from zfcal.parameters import Parameters, from_genes, n_genes
+from zfcal.parameters import Parameters, n_genes
 
 _MIN_SPEEDS = 10
 """A zone with fewer measured speeds borrows those of all zones."""
@@ -166,7 +167,7 @@ class Group:
         Counts
             With leading axes (genome, run).
         """
-        check_genome_length(genes, len(self.template.zones))
+        check_genomes(genes, self.template)
         return simulate_counts(
             pack_genes(genes, self.template, self.arena),
             self.arena,
@@ -195,7 +196,7 @@ class Group:
         -------
         dict of ndarray of int64, with leading axes (genome, run)
         """
-        check_genome_length(genes, len(self.template.zones))
+        check_genomes(genes, self.template)
         return count_recorded(
             [pack_genes(genome[None, :], self.template, self.arena) for genome in genes],
             self.arena,
@@ -211,23 +212,6 @@ class Group:
         )
 
 
-def check_genome_length(genes: ArrayLike, n_zones: int) -> None:
-    """Refuse genomes that are of another arena.
-
-    Raises
-    ------
-    InputError
-        The last axis is not the number of genes of so many zones.
-    """
-    shape = np.shape(genes)
-    if shape[-1:] != (n_genes(n_zones),):
-        raise InputError(
-            f"Genomes of {n_zones} zones need {n_genes(n_zones)} genes, got a table of shape "
-            f"{shape}.",
-            hint="A population from another arena cannot be taken over.",
-        )
-
-
 def scale_gamma(genes: ArrayLike, n_zones: int) -> Floats:
     """Return genes with each row of gamma scaled to a maximum of one, as models are reported.
 
@@ -237,7 +221,7 @@ def scale_gamma(genes: ArrayLike, n_zones: int) -> Floats:
     Parameters
     ----------
     genes : array_like, shape (..., gene)
-        In [0, 1], in the order of `zfcal.parameters.gene_names`.
+        In [0, 1], in the order of `zfcal.model.effects.genome.genome_names`.
     n_zones
         Zones of the arena.
 
@@ -245,18 +229,23 @@ def scale_gamma(genes: ArrayLike, n_zones: int) -> Floats:
     -------
     ndarray, shape (..., gene)
     """
-    check_genome_length(genes, n_zones)
     values = np.array(genes, dtype=np.float64)
-    rows = values[..., 3 * n_zones :].reshape(*values.shape[:-1], n_zones, n_zones)
+    if values.shape[-1:] < (n_genes(n_zones),):
+        raise InputError(
+            f"Genomes of {n_zones} zones need {n_genes(n_zones)} genes, got a table of shape "
+            f"{values.shape}."
+        )
+    rates = slice(3 * n_zones, n_genes(n_zones))
+    rows = values[..., rates].reshape(*values.shape[:-1], n_zones, n_zones)
     most = rows.max(axis=-1, keepdims=True)
     rows = np.where(most > 0, rows / np.where(most > 0, most, 1.0), 1.0)
-    values[..., 3 * n_zones :] = rows.reshape(*values.shape[:-1], n_zones**2)
+    values[..., rates] = rows.reshape(*values.shape[:-1], n_zones**2)
     return values
 
 
 def express(genes: ArrayLike, template: Parameters) -> Parameters:
     """Return the model that a genome stands for, its gamma rows scaled to a maximum of one."""
-    return from_genes(scale_gamma(genes, len(template.zones)), template)
+    return from_genome(scale_gamma(genes, len(template.zones)), template)
 
 
 def with_measured_speeds(template: Parameters, control: Statistics) -> Parameters:

@@ -13,7 +13,8 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.calibrate.group import scale_gamma
-from zfcal.parameters import gene_names, gene_scales
+from zfcal.model.effects.genome import genome_names, genome_ranges
+from zfcal.parameters import Parameters
 
 _QUANTILES = (0.025, 0.975)
 
@@ -54,7 +55,7 @@ class Intervals:
     Parameters
     ----------
     parameters
-        In the order of `zfcal.parameters.gene_names`; of the Z numbers of a gamma row
+        In the order of `zfcal.model.effects.genome.genome_names`; of the Z numbers of a gamma row
         Z - 1 are free, since each row is scaled to a maximum of one.
     threshold
         Genomes with at least this S are compatible.
@@ -102,7 +103,7 @@ def parameter_intervals(
     *,
     score: float,
     ceiling: Ceiling,
-    zone_names: tuple[str, ...],
+    template: Parameters,
 ) -> Intervals:
     """Return an interval per parameter: where the genomes lie that are compatible.
 
@@ -116,8 +117,8 @@ def parameter_intervals(
         The champion's S against the window.
     ceiling
         What its own windows score.
-    zone_names
-        In the arena's order.
+    template
+        The model that genomes complete.
 
     Notes
     -----
@@ -134,17 +135,17 @@ def parameter_intervals(
     * An evaluation shorter than the champion's long run scores a little lower for
       its own noise, which makes the region a little small.
     """
-    n_zones = len(zone_names)
     threshold, within_ceiling = acceptance_threshold(score, ceiling)
     genes, scores = evaluated
     compatible = genes[scores >= threshold]
-    scales = gene_scales(n_zones)
-    value = scale_gamma(champion, n_zones) * scales
-    values = np.vstack([value, scale_gamma(compatible, n_zones) * scales])
+    n_zones, n = len(template.zones), len(champion)
+    least, most = (ends[:n] for ends in genome_ranges(template))
+    value = least + scale_gamma(champion, n_zones) * (most - least)
+    values = np.vstack([value, least + scale_gamma(compatible, n_zones) * (most - least)])
     low, high = np.quantile(values, _QUANTILES, axis=0)
     low, high = np.minimum(low, value), np.maximum(high, value)
-    known = (high - low <= _COVERED_MAX * scales) & (len(compatible) >= _MIN_COMPATIBLE)
-    columns = zip(gene_names(zone_names), value, low, high, known, strict=True)
+    known = (high - low <= _COVERED_MAX * (most - least)) & (len(compatible) >= _MIN_COMPATIBLE)
+    columns = zip(genome_names(template)[:n], value, low, high, known, strict=True)
     return Intervals(
         parameters=tuple(
             Interval(name=name, value=float(v), low=float(a), high=float(b), identified=bool(k))

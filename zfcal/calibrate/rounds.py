@@ -7,7 +7,7 @@ of files. What leads to the champion is in ``search``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,12 +17,26 @@ from zfcal.behaviour.scores import Scores
 from zfcal.calibrate.ceiling import measure_ceiling, window_noise
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import State
-from zfcal.calibrate.group import Purpose, express
+from zfcal.calibrate.group import Purpose, express, scale_gamma
 from zfcal.calibrate.history import Generation
 from zfcal.calibrate.intervals import Intervals, parameter_intervals
 from zfcal.calibrate.pace import Deadline
+from zfcal.calibrate.rules import (
+    COMPROMISE,
+    KEEP,
+    LIKELIHOOD,
+    MADE,
+    MEMORY,
+    NEAREST,
+    SCORE,
+    Candidate,
+    Choice,
+    Record,
+    half_way,
+)
 from zfcal.calibrate.search import Progress, Watch, search
 from zfcal.calibrate.task import Previous, Settings, Task
+from zfcal.model.effects.genome import to_genome
 from zfcal.parameters import Parameters
 
 
@@ -36,8 +50,10 @@ class RoundResult:
         The model that is handed on, its gamma rows scaled to a maximum of one.
     genes : ndarray, shape (gene,)
         The same as a genome, gamma as it was bred.
-    is_likely
-        Whether it is the maximum-likelihood estimate, and not the best of the search.
+    rule
+        By which of `zfcal.calibrate.rules.RULES` it was chosen.
+    handed
+        Why, and the record of all rules; None where one rule was asked for.
     scores
         Its similarities with the window, by long simulations with new seeds.
     optimiser_score
@@ -58,7 +74,8 @@ class RoundResult:
 
     champion: Parameters
     genes: Floats
-    is_likely: bool
+    rule: str
+    handed: HandedOn | None
     scores: Scores
     optimiser_score: float
     ceiling: Ceiling
@@ -140,20 +157,26 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
     Where the likely one is asked for, the estimate is the champion if the window scores
     against it as its own windows do, less one standard deviation of them: the best of many
     scores fits what happened by chance. Of windows of the true model one in six scores less.
+    Where rules are judged, it is the model of the rule that has been better so far.
     """
     likely = _likely(task, settings)
     confirmed, ceiling = likely or _best(task, settings, progress)
+    handed = None
+    if settings.champion == "forward":
+        handed = hand_on(task, settings, confirmed, window_noise(ceiling))
+        confirmed, ceiling = handed.confirmed or confirmed, handed.ceiling or ceiling
     intervals = parameter_intervals(
         confirmed.genes,
         (progress.genes, progress.scores),
         score=confirmed.scores.overall,
         ceiling=ceiling,
-        zone_names=task.control.zone_names,
+        template=task.group.template,
     )
     return RoundResult(
         champion=express(confirmed.genes, task.simulator.template),
         genes=confirmed.genes,
-        is_likely=likely is not None,
+        rule=LIKELIHOOD if likely is not None else SCORE if handed is None else handed.choice.rule,
+        handed=handed,
         scores=confirmed.scores,
         optimiser_score=float(np.nan_to_num(progress.scores, nan=0.0).max()),
         ceiling=ceiling,
@@ -179,6 +202,87 @@ def _likely(task: Task, settings: Settings) -> tuple[Confirmed, Ceiling] | None:
     mean, _, _ = ceiling.overall
     falls_short = mean - confirmed.scores.overall
     return (confirmed, ceiling) if falls_short <= window_noise(ceiling) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HandedOn:
+    """The model that a round hands on, by the rule that has been better.
+
+    Parameters
+    ----------
+    choice
+        The rule, and why.
+    record
+        Of all rules, with the models of this round.
+    confirmed, ceiling
+        What the model scores on the window, and at best; None where it is the window's best.
+    """
+
+    choice: Choice
+    record: Record
+    confirmed: Confirmed | None
+    ceiling: Ceiling | None
+
+
+def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> HandedOn:
+    """Judge all rules' earlier models on a window, and hand on by the one that has been better.
+
+    Parameters
+    ----------
+    task, settings
+        Of the round.
+    best
+        The window's best by its score.
+    noise
+        Standard deviation of S between windows of one model.
+    """
+    end_s, record = task.seeds.window_end_s, task.record
+    record = record.judged(task.control, end_s, noise)
+    made = _made(task, settings, best)
+    record = record.with_models([made[rule] for rule in MADE if rule in made])
+    nearest = record.nearest(task.control)
+    if nearest is not None:
+        made[NEAREST] = replace(nearest, rule=NEAREST, made_at_s=end_s)
+    made[KEEP] = replace(made[KEEP], rule=KEEP, made_at_s=end_s)
+    choice = record.choose(set(made) - {KEEP}, noise)
+    chosen = made[choice.rule]
+    record = replace(
+        record.with_models([made[rule] for rule in (NEAREST, KEEP) if rule in made]),
+        n_rounds=record.n_rounds + 1,
+        in_use=chosen,
+    )
+    if choice.rule == SCORE:
+        return HandedOn(choice=choice, record=record, confirmed=None, ceiling=None)
+    confirmed, ceiling = judge(task, settings, chosen.genes[None, :])
+    return HandedOn(choice=choice, record=record, confirmed=confirmed, ceiling=ceiling)
+
+
+def _made(task: Task, settings: Settings, best: Confirmed) -> dict[str, Candidate]:
+    """Return the model of each rule that makes one, and the one in use, all simulated alike."""
+    n_zones, end_s = len(task.group.template.zones), task.seeds.window_end_s
+    genes = {SCORE: scale_gamma(best.genes, n_zones)}
+    if task.guests is not None:
+        genes[LIKELIHOOD] = scale_gamma(np.atleast_2d(task.guests)[0], n_zones)
+        genes[COMPROMISE] = half_way(genes[SCORE], genes[LIKELIHOOD])
+    if task.memory is not None:
+        genes[MEMORY] = scale_gamma(task.memory, n_zones)
+    in_use = task.record.in_use
+    if in_use is None:
+        genes[KEEP] = to_genome(task.group.template)[: task.n_genes]
+    others = [rule for rule in genes if rule != SCORE]
+    runs = {SCORE: best.long_run}
+    if others:
+        objective = task.confirmation(settings)
+        found = objective.simulate(np.stack([genes[rule] for rule in others]))
+        names = task.control.zone_names
+        runs |= {rule: found.as_statistics(k, names) for k, rule in enumerate(others)}
+    made = {
+        rule: Candidate(
+            rule=rule, made_at_s=end_s, of_s=end_s, genes=genes[rule], long_run=runs[rule]
+        )
+        for rule in genes
+    }
+    return made if in_use is None else made | {KEEP: in_use}
 
 
 def judge(task: Task, settings: Settings, genes: Floats) -> tuple[Confirmed, Ceiling]:

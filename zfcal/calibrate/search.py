@@ -149,7 +149,7 @@ def _take_pace(pace: Pace, task: Task, settings: Settings, evaluate: Evaluate) -
     """Time a genome per worker, since a resumed search has timed no population."""
     n = max(task.group.n_workers, 1)
     pace.start()
-    evaluate(np.full((n, n_genes(len(task.group.template.zones))), 0.5))
+    evaluate(np.full((n, task.n_genes), 0.5))
     pace.finish(task.work(n_genomes=n, n_runs=settings.runs, n_steps=settings.steps))
 
 
@@ -226,8 +226,8 @@ def first_population(task: Task, settings: Settings) -> Floats:
     -------
     ndarray, shape (population, gene)
     """
-    n, n_zones = settings.population, len(task.group.template.zones)
-    fresh = task.seeds.generator(Purpose.FIRST_POPULATION).random((n, n_genes(n_zones)))
+    n = settings.population
+    fresh = task.seeds.generator(Purpose.FIRST_POPULATION).random((n, task.n_genes))
     guests = fresh[:0] if task.guests is None else np.atleast_2d(task.guests)
     if len(guests) > n:
         raise InputError(f"A population of {n} has no room for {len(guests)} guests.")

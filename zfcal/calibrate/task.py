@@ -17,14 +17,18 @@ from zfcal.calibrate.group import (
     Purpose,
     SeedSource,
     Simulator,
-    check_genome_length,
     with_measured_speeds,
 )
 from zfcal.calibrate.objective import Objective
+from zfcal.calibrate.rules import Record
 from zfcal.errors import InputError
+from zfcal.model.effects.genome import check_genomes, genome_length
+from zfcal.parameters import n_genes
 from zfcal.units import BURN_IN_S, WINDOW_S
 
 DEFAULT_GENERATIONS = 15
+_RULES_SIMULATED = 5
+"""Models that a round simulates for the rules: four made, and the one that is handed on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +47,8 @@ class Settings:
         ``zfcal``, or ``deap`` for DEAP's own operators.
     champion
         ``score``: the best of those that are simulated anew. ``likely``: the first guest, the
-        maximum-likelihood estimate, unless its score says that it misses something.
+        maximum-likelihood estimate, unless its score says that it misses something. ``forward``:
+        by the rule that has been better so far, see `zfcal.calibrate.rules`.
     n_confirmed
         So many of the best are simulated anew, and the best of these is champion.
     long_runs, long_s
@@ -61,7 +66,7 @@ class Settings:
     runs: int = 1
     steps: int = 3000
     optimiser: Literal["zfcal", "deap"] = "zfcal"
-    champion: Literal["score", "likely"] = "score"
+    champion: Literal["score", "likely", "forward"] = "score"
     n_confirmed: int = 10
     long_runs: int = 10
     long_s: float = 1800.0
@@ -90,8 +95,10 @@ class Settings:
         object.__setattr__(self, "features", ordered(self.features))
         if self.optimiser not in {"zfcal", "deap"}:
             raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
-        if self.champion not in {"score", "likely"}:
-            raise InputError(f"champion must be 'score' or 'likely', got {self.champion!r}.")
+        if self.champion not in {"score", "likely", "forward"}:
+            raise InputError(
+                f"champion must be 'score', 'likely' or 'forward', got {self.champion!r}."
+            )
 
     @property
     def _is_scored(self) -> bool:
@@ -157,6 +164,12 @@ class Task:
         What the last round left; None in the first one.
     guests : ndarray, shape (genome, gene)
         Genomes that join the initial population, such as a maximum-likelihood estimate.
+    memory : ndarray, shape (gene,)
+        The estimate over all minutes so far.
+    record
+        What each rule's earlier models have scored.
+    moves_effects
+        Whether the strengths of the model's effects are genes, or stay as they are.
     """
 
     group: Simulator
@@ -164,14 +177,26 @@ class Task:
     seeds: SeedSource
     previous: Previous | None = None
     guests: Floats | None = field(default=None)
+    memory: Floats | None = None
+    record: Record = field(default_factory=Record)
+    moves_effects: bool = True
 
     def __post_init__(self) -> None:
-        n_zones = len(self.group.template.zones)
+        told = [self.guests] if self.guests is not None else []
         if self.previous is not None:
-            check_genome_length(self.previous.genes, n_zones)
-            check_genome_length(self.previous.champion, n_zones)
-        if self.guests is not None:
-            check_genome_length(self.guests, n_zones)
+            told += [self.previous.genes, self.previous.champion]
+        for genes in told:
+            check_genomes(genes, self.group.template)
+            if genes.shape[-1] != self.n_genes:
+                raise InputError(
+                    f"The search has {self.n_genes} genes, got a table of shape {genes.shape}."
+                )
+
+    @property
+    def n_genes(self) -> int:
+        """Genes of a genome: with those of the effects, if these are calibrated as well."""
+        template = self.group.template
+        return genome_length(template) if self.moves_effects else n_genes(len(template.zones))
 
     @property
     def simulator(self) -> Simulator:
@@ -214,5 +239,6 @@ class Task:
             confirmed = self.work(n_genomes=n_genomes, n_runs=settings.long_runs, n_steps=long)
             return confirmed + self.work(n_genomes=1, n_runs=settings.n_windows, n_steps=short)
 
-        likely = settings.champion == "likely" and self.guests is not None
-        return of(settings.n_confirmed) + (of(1) if likely else 0.0)
+        more = {"likely": 0 if self.guests is None else 1, "forward": _RULES_SIMULATED}
+        extra = more.get(settings.champion, 0)
+        return of(settings.n_confirmed) + (of(extra) if extra else 0.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from zfcal.artifacts.drive_files import DRIVE, drive_files
-from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_files import PoseFollower
 from zfcal.drive.clock import DriveClock, PoseClock, WallClock
@@ -72,6 +72,8 @@ class DriveOptions:
         Seconds of the trial after which to end; None for no end.
     verbose
         Whether to say what only bears on how quick it is.
+    model
+        The model file that drives throughout; None for the newest numbered one.
     """
 
     port: str
@@ -79,6 +81,7 @@ class DriveOptions:
     clock: str = "wall"
     duration_s: float | None = None
     verbose: bool = False
+    model: Path | None = None
 
 
 def drive(root: Path, options: DriveOptions, tell: DriveTell, *, task: Task | None = None) -> str:
@@ -132,6 +135,8 @@ def _open(root: Path, options: DriveOptions) -> tuple[OpenTrial, Lineage]:
 def lineage_of(opened: OpenTrial, options: DriveOptions) -> Lineage:
     """Return where the log of a drive comes from; which models drove, it says itself."""
     manner = dataclasses.asdict(options.manner)
+    if options.model is not None:
+        manner["model"] = relative_to(opened.trial.root, options.model)
     return Lineage(
         schema=DRIVE,
         command="drive",
@@ -171,7 +176,7 @@ def _drive(
     crew = Crew(
         robot=robot,
         clock=clock,
-        models=DriveModels(opened),
+        models=DriveModels(opened, only=options.model),
         log=log,
         tell=tell,
         watchdog=watchdog,

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import final
 
+from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of, one_content, read_bytes
 from zfcal.drive.pilot import InForce
@@ -24,6 +25,8 @@ class DriveModels:
     ----------
     opened
         The trial.
+    only
+        The one file that drives, read again when it has changed; None for the newest numbered one.
     after_s
         A model that is there sooner drives only so many seconds after its window has ended;
         the starting model at once.
@@ -34,8 +37,10 @@ class DriveModels:
         What is wrong with the files that were passed over at the last look; empty for nothing.
     """
 
-    def __init__(self, opened: OpenTrial, *, after_s: float = -math.inf) -> None:
-        self._opened, self._after_s = opened, after_s
+    def __init__(
+        self, opened: OpenTrial, *, only: Path | None = None, after_s: float = -math.inf
+    ) -> None:
+        self._opened, self._only, self._after_s = opened, only, after_s
         self._folder = opened.trial.root / "models"
         self._force: InForce | None = None
         self._known: tuple[int, Looks] | None = None
@@ -53,6 +58,11 @@ class DriveModels:
         found = self.look() or self._force
         if found is not None:
             return found
+        if self._only is not None:
+            raise InputError(
+                self.problem or f"{self._only}: cannot be read.",
+                hint="Name a model file of this trial's arena and step.",
+            )
         raise InputError(
             self.problem or f"{self._folder}: holds no numbered model.",
             hint=f"Make one with: zfcal calibrate {self._opened.trial.root}",
@@ -89,7 +99,9 @@ class DriveModels:
         return None
 
     def _files(self) -> list[tuple[int, Path]]:
-        """Return the numbered models, the newest first."""
+        """Return the numbered models, the newest first, or the one that is named."""
+        if self._only is not None:
+            return [(0, self._only)]
         try:
             found = numbered_of(self._folder, ".toml")
         except InputError as error:
@@ -111,7 +123,7 @@ class DriveModels:
             self._note(error)
             return None
         return InForce(
-            name=path.relative_to(opened.trial.root).as_posix(),
+            name=relative_to(opened.trial.root, path),
             sha256=hashlib.sha256(data).hexdigest(),
             text=data.decode(errors="replace"),
             parameters=model,

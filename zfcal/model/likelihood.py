@@ -1,12 +1,13 @@
 """The estimate of a model's parameters from measured steps, and how well it is known.
 
 The law is that of `zfcal.model.fitted`, the climb that of `zfcal.model.extended`, here within what
-a genome can hold. Intervals are by the observed information.
+a genome can hold. The strengths of effects on headings are fitted along; all else of an effect
+stays as the model has it. Intervals are by the observed information.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import math
 import os
 from dataclasses import dataclass
 
@@ -14,7 +15,9 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
-from zfcal.model.extended import GENES, maximise, without_effects
+from zfcal.model.effects import find_effect
+from zfcal.model.effects.genome import spelt_out, strengths_of
+from zfcal.model.extended import GENES, bounds_of, maximise
 from zfcal.model.fitted import MIN_STEPS, SCALES, ZoneTurns, zone_scores, zone_turns
 from zfcal.model.packing import check_model
 from zfcal.model.scene import Scene
@@ -24,6 +27,9 @@ from zfcal.parameters import Parameters
 _NO_INFORMATION = 1e-9
 _DIFFERENCE = 1e-4
 _QUANTILE = 1.959964
+
+IDENTIFIED = 0.7
+"""Of a parameter's range: an interval that is no shorter says nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,9 +41,9 @@ class Fit:
     parameters
         The most likely ones; a zone with fewer than 30 steps keeps the template's.
     interval : dict
-        For each parameter (``walls.kappa_0``, ``walls.gamma.centre``) its 95 %
-        interval from the observed information; the whole range where the
-        recording says nothing.
+        For each parameter (``walls.kappa_0``, ``walls.gamma.centre``,
+        ``alignment.strength``) its 95 % interval from the observed information; the whole range
+        where the recording says nothing.
     identified : dict
         Whether the interval is shorter than 70 % of the range. The largest
         gamma of a row fixes the scale and has no interval of its own; a zone
@@ -59,7 +65,7 @@ class Fit:
 
 
 def fit(scene: Scene, template: Parameters) -> Fit:
-    """Return the most likely parameters of the base model.
+    """Return the most likely parameters of a model, and strengths of its effects on headings.
 
     Parameters
     ----------
@@ -80,7 +86,11 @@ def fit(scene: Scene, template: Parameters) -> Fit:
             f"No zone has {MIN_STEPS} steps with a heading; {len(scene.turns)} steps in all.",
             hint="A likelihood needs agents that move and keep their track for three samples.",
         )
-    found = maximise(scene, without_effects(template), bounds=GENES, n_workers=os.cpu_count() or 1)
+    free = tuple(
+        (name, key) for name, key in strengths_of(template) if find_effect(name).on_headings
+    )
+    model, n_workers = spelt_out(template), os.cpu_count() or 1
+    found = maximise(scene, model, free=free, bounds=GENES, n_workers=n_workers)
     interval: dict[str, tuple[float, float]] = {}
     lapse: dict[str, float] = {}
     names = scene.arena.zone_names
@@ -90,11 +100,18 @@ def fit(scene: Scene, template: Parameters) -> Fit:
             continue
         interval |= _intervals(x, _information(x, turns, found.view), zone, names)
         lapse[zone] = float(x[-1])
+    spans = {name: _span(name) for name in interval}
+    for (name, key), variance in zip(free, np.diag(found.covariance), strict=True):
+        low, high = bounds_of(name, key)
+        half = _QUANTILE * math.sqrt(variance) if variance > 0 else math.inf
+        value = found.parameters.effects[name][key]
+        spans[f"{name}.{key}"] = high - low
+        interval[f"{name}.{key}"] = (max(low, value - half), min(high, value + half))
     n_steps = int(found.used.sum())
     return Fit(
-        parameters=dataclasses.replace(template, zones=found.parameters.zones),
+        parameters=found.parameters,
         interval=interval,
-        identified={n: high - low < 0.7 * _span(n) for n, (low, high) in interval.items()},
+        identified={n: high - low < IDENTIFIED * spans[n] for n, (low, high) in interval.items()},
         lapse=lapse,
         nats_per_step=found.nats / n_steps,
         n_steps=n_steps,

@@ -13,6 +13,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
+from zfcal.model.effects.genome import genome_length, with_strengths
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
 from zfcal.model.kernels.state import (
     KAPPA_BASE,
@@ -74,7 +75,8 @@ def pack_genes(genes: ArrayLike, template: Parameters, arena: Arena) -> Packed:
     Parameters
     ----------
     genes : array_like, shape (model, gene)
-        In [0, 1], in the order of `zfcal.parameters.gene_names`.
+        In [0, 1], in the order of `zfcal.model.effects.genome.genome_names`; those of the base
+        alone leave the strengths of effects as the template has them.
     template
         Gives all that is not calibrated.
 
@@ -86,17 +88,21 @@ def pack_genes(genes: ArrayLike, template: Parameters, arena: Arena) -> Packed:
     """
     check_model(template, arena)
     n_zones = len(template.zones)
-    table = np.asarray(genes, dtype=np.float64)
-    if table.shape[1:] != (n_genes(n_zones),) or not ((table >= 0) & (table <= 1)).all():
+    table, base = np.asarray(genes, dtype=np.float64), n_genes(n_zones)
+    known = table.shape[1:] in {(base,), (genome_length(template),)}
+    if not known or not ((table >= 0) & (table <= 1)).all():
+        effects = f" and {len(template.effects)} of effects" if template.effects else ""
         raise InputError(
-            f"Genomes of {n_zones} zones need {n_genes(n_zones)} genes in [0, 1], got an array "
+            f"Genomes of {n_zones} zones need {base} genes{effects} in [0, 1], got an array "
             f"of shape {table.shape} from {np.min(table, initial=1):g} to "
             f"{np.max(table, initial=0):g}."
         )
-    values = table * gene_scales(n_zones)
+    values = table[:, :base] * gene_scales(n_zones)
     own = values[:, : 3 * n_zones].reshape(-1, n_zones, 3)
     gamma = values[:, 3 * n_zones :].reshape(-1, n_zones, n_zones)
-    return _packed(own, gamma, [template], arena)
+    moved = table.shape[1] > base
+    models = [with_strengths(template, row[base:]) for row in table] if moved else [template]
+    return _packed(own, gamma, models, arena)
 
 
 def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Arena) -> Packed:

@@ -374,9 +374,13 @@ def test_a_budget_and_generations_contradict(quick):
 def test_places_by_hand(tmp_path):
     """The files of the round of the window to 120 s."""
     places = RoundPlaces(root=tmp_path, end_s=120)
-    assert [path.relative_to(tmp_path).as_posix() for path, _ in places.artifacts] == [
+    made = [path.relative_to(tmp_path).as_posix() for path, _ in places.artifacts("score")]
+    assert made == ["models/000120.parquet", "scores/000120-model.parquet", "models/000120.toml"]
+    made = [path.relative_to(tmp_path).as_posix() for path, _ in places.artifacts("forward")]
+    assert made == [
         "models/000120.parquet",
         "scores/000120-model.parquet",
+        "scores/000120-rules.parquet",
         "models/000120.toml",
     ]
     assert places.checkpoint.name == ".000120.checkpoint"

@@ -241,6 +241,11 @@ class Effect:
         return self.speed is not None
 
     @property
+    def on_headings(self) -> bool:
+        """Whether single headings show how strong it is."""
+        return not self.on_speed and self.has_steps
+
+    @property
     def multiplies(self) -> bool:
         """Whether it multiplies drawn speeds, rather than to stop agents."""
         return self.on_speed and not self.rests

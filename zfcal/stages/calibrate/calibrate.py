@@ -7,10 +7,10 @@ run over all windows and the online run on the newest one are the same code.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import final
+from typing import Any, NamedTuple, final
 
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
@@ -18,13 +18,18 @@ from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.places import is_regular
+from zfcal.artifacts.tables import read_extra
 from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.group import Group, SeedSource, Simulator
+from zfcal.calibrate.rules import Record
+from zfcal.calibrate.task import Previous
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.stages.calibrate.likelihood import estimate
+from zfcal.model.effects.genome import genome_names
+from zfcal.stages.calibrate.likelihood import estimate, memory_span, remembered
+from zfcal.stages.calibrate.record import read_record
 from zfcal.stages.calibrate.rounds import (
     MODEL,
     Found,
@@ -58,10 +63,18 @@ class _Window:
     @property
     def previous(self) -> Path | None:
         """The population from which its round starts: the last one that is there."""
+        return self._last(lambda places: places.population)
+
+    @property
+    def rules(self) -> Path | None:
+        """The record of the rules that it carries on."""
+        return self._last(lambda places: places.rules)
+
+    def _last(self, file: Callable[[RoundPlaces], Path]) -> Path | None:
         window = self.before
-        while window is not None and not is_regular(window.places.population):
+        while window is not None and not is_regular(file(window.places)):
             window = window.before
-        return None if window is None else window.places.population
+        return None if window is None else file(window.places)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,9 +157,9 @@ class Calibrate(Stage[_Shared, _Window]):
 
     def open(self, run: Run) -> _Shared:
         """Read the trial and its starting model."""
-        opened = open_trial(run.root)
-        group = make_group(opened, self.options)
-        return _Shared(run=run, opened=opened, options=self.options, group=group)
+        opened, options = open_trial(run.root), _as_before(run.root, self.options)
+        group = make_group(opened, options)
+        return _Shared(run=run, opened=opened, options=options, group=group)
 
     def items(self, shared: _Shared) -> list[_Window]:
         """Return the windows up to the last one that is asked for."""
@@ -170,10 +183,28 @@ class Calibrate(Stage[_Shared, _Window]):
         return None if control is None else _round(shared, key, control)
 
 
+def _as_before(root: Path, options: CalibrateOptions) -> CalibrateOptions:
+    """Return options that publish as the rounds that a trial has, if that is wanted."""
+    if not options.keeps_way:
+        return options
+    champion: Any = "forward"
+    for end, path in sorted(numbered_of(root / "models", ".toml").items()):
+        if end == 0 or not is_regular(path):
+            continue
+        try:
+            lineage = read_lineage(path)
+        except (InputError, DamagedError):
+            continue
+        if lineage.command == "calibrate":
+            champion = lineage.options.get("champion", "score")
+            break
+    return replace(options, settings=replace(options.settings, champion=champion))
+
+
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
-    """Return the trial's agents, driven by its starting model, where they are to be simulated."""
+    """Return the trial's agents, driven by the model to calibrate, where they are simulated."""
     trial = opened.trial
-    template = read_model_for(trial.root / trial.model, opened.arena, dt_s=trial.dt_s)
+    template = read_model_for(options.model_of(trial), opened.arena, dt_s=trial.dt_s)
     group = Group(
         arena=opened.arena,
         template=template,
@@ -205,8 +236,11 @@ def _ends(run: Run) -> list[int]:
 
 def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
     """Return a round: population, scores and champion; the model is last."""
-    places, previous = window.places, window.previous
-    lineage = _lineage(shared, places, previous)
+    places, before = window.places, _Before(window.previous, None)
+    champion = shared.options.settings.champion
+    if champion == "forward":
+        before = before._replace(rules=window.rules)
+    lineage = _lineage(shared, places, before)
     # A dry run that makes the round before makes this one too, whatever the hashes say now.
     otherwise = "the round before it is made again" if shared.run.planned else None
     outputs = [
@@ -216,11 +250,11 @@ def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
             ignore=shared.options.not_asked,
             otherwise=otherwise,
         )
-        for path, schema in places.artifacts
+        for path, schema in places.artifacts(champion)
     ]
 
     def compute() -> Iterator[Draft]:
-        found = _search(shared, places, control, previous, key=checkpoint_key(lineage))
+        found = _search(shared, places, control, before, key=checkpoint_key(lineage))
         # First, so that no window is ever both passed over and calibrated.
         discard(skipped_path(shared.root, places.end_s))
         for output, write in zip(outputs, found.writers(places, shared.seed), strict=True):
@@ -232,14 +266,24 @@ def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
     return Item(outputs=outputs, compute=compute)
 
 
-def _lineage(shared: _Shared, places: RoundPlaces, previous: Path | None) -> Lineage:
+class _Before(NamedTuple):
+    """What a round carries on: a population, and the record of the rules."""
+
+    population: Path | None
+    rules: Path | None
+
+
+def _lineage(shared: _Shared, places: RoundPlaces, before: _Before) -> Lineage:
     opened, options = shared.opened, shared.options
-    files = [places.stats, shared.root / opened.trial.model, *opened.arena_files]
-    files += [previous] if previous is not None else []
+    files = [places.stats, options.model_of(opened.trial), *opened.arena_files]
+    files += [path for path in before if path is not None]
     said = calibrate_options(opened, options, generations=options.generations_asked)
     if options.seed_likelihood:
         # One that is no file is no input: it is told where the estimate is made.
-        tracks = readable(segment_files(shared.root, _window_span(places.end_s)), say_nothing)
+        span_s = _window_span(places.end_s)
+        if options.settings.champion == "forward":
+            span_s = memory_span(places.end_s)
+        tracks = readable(segment_files(shared.root, span_s), say_nothing)
         said |= guess_options(tracks)
         files += tracks
     return shared.run.lineage(MODEL, files, options=said, seed=shared.seed)
@@ -249,23 +293,28 @@ def _search(
     shared: _Shared,
     places: RoundPlaces,
     control: Statistics,
-    previous: Path | None,
+    before: _Before,
     *,
     key: str,
 ) -> Found:
     """Search for the model of a window, and go on from a checkpoint where there is one."""
     options, tell = shared.options, shared.run.tell
     began_s = time.monotonic()
-    estimated = None
+    template, zone_names = shared.group.template, shared.opened.arena.zone_names
+    estimated = memory = None
     if options.seed_likelihood:
-        template = shared.group.template
         estimated = estimate(shared.opened, template, _window_span(places.end_s), tell)
+    record = Record() if before.rules is None else read_record(before.rules, zone_names)
+    if options.seed_likelihood and options.settings.champion == "forward":
+        memory = remembered(shared.opened, template, places.end_s, memory_span(places.end_s))
     round_task = RoundTask(
         group=shared.group,
         control=control,
         guests=None if estimated is None else estimated.genes,
         seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
-        previous=None if previous is None else read_previous(previous, options.settings.features),
+        previous=_previous(shared, before.population),
+        memory=memory,
+        record=record,
     )
     if options.budget_s is not None:
         # The estimate is a part of the round.
@@ -277,6 +326,14 @@ def _search(
         baselines=baseline_scores(round_task, options, result),
         likelihood=None if estimated is None else estimated.table,
     )
+
+
+def _previous(shared: _Shared, path: Path | None) -> Previous | None:
+    """Return the last population; None where there is none, or its models have other effects."""
+    names = genome_names(shared.group.template)
+    if path is None or read_extra(path).get("gene_names", list(names)) != list(names):
+        return None
+    return read_previous(path, shared.options.settings.features)
 
 
 def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:

@@ -5,7 +5,7 @@ For recordings whose behaviour is to be learnt from one half and judged on the o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats, Seeds
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.lineage import JSON, Lineage
-from zfcal.artifacts.models import read_model_for, write_model
+from zfcal.artifacts.models import write_model
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import further as further_of
@@ -252,7 +252,8 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         checkpoint = output.path.with_name(f".{output.path.name}.checkpoint")
         key = checkpoint_key(output.lineage)
         result = run_search(round_task, asked, checkpoint, run.tell, key=key)
-        judged = _judge(opened, span, result.champion, seed, segments)
+        models = {"before": group.template, "after": result.champion}
+        judged = _judge(opened, span, models, seed, segments)
         found = Found(
             result=result,
             baselines=baseline_scores(round_task, options, result),
@@ -276,7 +277,7 @@ def _lineage(
     files = [segment_path(trial.root, start) for start in starts]
     said = calibrate_options(opened, options, generations=options.generations_asked)
     said |= guess_options(files) if options.seed_likelihood else {}
-    files += [trial.root / trial.model, *opened.arena_files]
+    files += [options.model_of(trial), *opened.arena_files]
     stretches: dict[str, JSON] = {
         "fps": trial.fps,
         "window": _text(span.train_s),
@@ -287,16 +288,16 @@ def _lineage(
 
 
 def _judge(
-    opened: OpenTrial, span: Span, champion: Parameters, seed: int, segments: Segments
+    opened: OpenTrial, span: Span, models: Mapping[str, Parameters], seed: int, segments: Segments
 ) -> dict[str, JSON]:
-    """Score the starting model and the champion on what was held out."""
+    """Score models on what was held out."""
     if span.held_out_s is None:
         return {}
-    trial = opened.trial
-    start = read_model_for(trial.root / trial.model, opened.arena, dt_s=trial.dt_s)
     scored: dict[str, JSON] = {"window": _text(span.held_out_s)}
-    for name, model in (("before", start), ("after", champion)):
-        found = evaluate_model(trial.root, model, span.held_out_s, seed=seed, segments=segments)
+    for name, model in models.items():
+        found = evaluate_model(
+            opened.trial.root, model, span.held_out_s, seed=seed, segments=segments
+        )
         scored[name] = score_table(found.scores, found.ceiling)
     return {"held_out": scored}
 

@@ -5,16 +5,28 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from zfcal.arrays import Floats
 from zfcal.artifacts.lineage import JSON
+from zfcal.calibrate.rules import HALF_LIFE_S
+from zfcal.diagnose.candidates import candidate_of
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.speeds import fit_speed
 from zfcal.errors import InputError
-from zfcal.model.likelihood import Fit, fit
-from zfcal.model.scene import make_scene
-from zfcal.parameters import Parameters, to_genes
-from zfcal.stages.events import Event, LeftOut, Note, Tell
+from zfcal.model.effects import find_effect
+from zfcal.model.effects.genome import genome_names, genome_ranges, strengths_of, to_genome
+from zfcal.model.extended import bounds_of, maximise, with_effect
+from zfcal.model.likelihood import IDENTIFIED, Fit, fit
+from zfcal.model.scene import Scene, make_scene, thin
+from zfcal.parameters import Parameters
+from zfcal.stages.events import Event, LeftOut, Note, Tell, say_nothing
 from zfcal.stages.segments import segment_files
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import OpenTrial
+from zfcal.stages.windows import LENGTH_S
+
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +44,7 @@ class Estimate:
     @property
     def genes(self) -> Floats:
         """The estimate as a population of one, shape (1, gene)."""
-        return to_genes(self.found.parameters)[None, :]
+        return to_genome(self.found.parameters)[None, :]
 
     @property
     def table(self) -> dict[str, JSON]:
@@ -55,13 +67,9 @@ class Estimate:
 
 
 def _values(parameters: Parameters) -> dict[str, float]:
-    values: dict[str, float] = {}
-    for zone in parameters.zones:
-        values |= {
-            f"{zone.name}.{key}": getattr(zone, key) for key in ("kappa_0", "kappa_f", "alpha")
-        }
-        values |= {f"{zone.name}.gamma.{to}": value for to, value in zone.gamma.items()}
-    return values
+    low, high = genome_ranges(parameters)
+    values = low + to_genome(parameters) * (high - low)
+    return dict(zip(genome_names(parameters), values.tolist(), strict=True))
 
 
 def estimate(
@@ -83,14 +91,9 @@ def estimate(
     Returns
     -------
     Estimate or None
-        None where the tracks are missing or damaged, the fish hardly move, or the
-        model has effects, which the base model's likelihood does not know.
+        None where the tracks are missing or damaged, or the fish hardly move.
     """
     trial = opened.trial
-    if template.effects:
-        names = ", ".join(template.effects)
-        tell(Note(text=f"{trial.root}: no likelihood estimate for a model with {names}."))
-        return None
     where = f"{trial.root}, {span_s[0]} s to {span_s[1]} s"
     without = f"{where}: no likelihood estimate joins the search"
     if not segment_files(trial.root, span_s):
@@ -106,8 +109,78 @@ def estimate(
         stretch = read_stretch(opened, span_s, say)
         if stretch.n_left_out:
             return None
-        found = fit(make_scene(stretch.samples, opened.arena), template)
+        scene = make_scene(stretch.samples, opened.arena)
+        found = _with_speeds(scene, fit(scene, template))
     except InputError as error:
         tell(Note(text=f"{without}: {error}"))
         return None
     return Estimate(found=found) if math.isfinite(found.nats_per_step) else None
+
+
+def remembered(
+    opened: OpenTrial, template: Parameters, end_s: int, span_s: tuple[int, int]
+) -> Floats | None:
+    """Return the estimate over all minutes so far, older ones counting less, as a genome.
+
+    Parameters
+    ----------
+    opened
+        The trial.
+    template
+        Gives the step, the field of view and the speeds.
+    end_s
+        End of the window, all of which counts.
+    span_s
+        What is looked at, see `memory_span`.
+
+    Returns
+    -------
+    ndarray, shape (gene,), or None
+        None where the tracks do not suffice; whose are damaged are left out.
+    """
+    try:
+        scene = make_scene(read_stretch(opened, span_s, say_nothing).samples, opened.arena)
+        found = fit(_faded(scene, end_s - LENGTH_S), template)
+    except InputError:
+        return None
+    return to_genome(found.parameters) if math.isfinite(found.nats_per_step) else None
+
+
+def memory_span(end_s: int) -> tuple[int, int]:
+    """Return what the estimate over all minutes so far looks at: beyond, a step counts 1/8."""
+    return max(0, end_s - LENGTH_S - round(3 * HALF_LIFE_S)), end_s
+
+
+def _faded(scene: Scene, until_s: float) -> Scene:
+    """Return a scene with the fewer steps the older they are, half as many per half-life.
+
+    Which are left out is spread evenly, by multiples of the golden ratio.
+    """
+    age_s = np.maximum(until_s - scene.time_s(scene.turns), 0.0)
+    spread = np.modf(np.arange(len(age_s)) * _GOLDEN)[0]
+    return thin(
+        scene,
+        spread < np.exp2(-age_s / HALF_LIFE_S),
+        np.ones(len(scene.moves), dtype=bool),
+    )
+
+
+def _with_speeds(scene: Scene, found: Fit) -> Fit:
+    """Return a fit whose effects on speed have their most likely strengths, one after the other."""
+    for name, key in strengths_of(found.parameters):
+        if not find_effect(name).on_speed:
+            continue
+        model, values = found.parameters, found.parameters.effects[name]
+        others = {other: given for other, given in model.effects.items() if other != name}
+        without = maximise(scene, replace(model, effects=others), rounds=0)
+        candidate = candidate_of(name, values)
+        speed = fit_speed(Screen(scene=scene, fitted=without), candidate, values[key])
+        low, high = bounds_of(name, key)
+        pair, (least, most) = f"{name}.{key}", speed.interval
+        found = replace(
+            found,
+            parameters=with_effect(model, name, {key: speed.values[key]}),
+            interval=found.interval | {pair: speed.interval},
+            identified=found.identified | {pair: most - least < IDENTIFIED * (high - low)},
+        )
+    return found

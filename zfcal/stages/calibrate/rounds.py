@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,23 +12,31 @@ import numpy as np
 from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import write_model
-from zfcal.artifacts.tables import make_table, read_extra, read_table, write_table
+from zfcal.artifacts.tables import (
+    POPULATION,
+    RULES,
+    SCORES,
+    STATS,
+    make_table,
+    read_extra,
+    read_table,
+    write_table,
+)
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
 from zfcal.behaviour.scores import NamedScore, Scores
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.rounds import RoundResult
+from zfcal.calibrate.rules import LIKELIHOOD, SAYS, Record
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
-from zfcal.parameters import gene_names
+from zfcal.model.effects.genome import genome_names
+from zfcal.stages.calibrate.record import write_record
 from zfcal.stages.events import Event, Result
 from zfcal.stages.stage import Write
 
 MODEL = "zfcal.model/1"
-POPULATION = "zfcal.population/1"
-SCORES = "zfcal.scores/1"
-STATS = "zfcal.stats/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +70,11 @@ class RoundPlaces:
         return self._at("scores", "-model.parquet")
 
     @property
+    def rules(self) -> Path:
+        """What the publishing rules have scored so far, and their models."""
+        return self._at("scores", "-rules.parquet")
+
+    @property
     def model(self) -> Path:
         """The champion."""
         return self._at("models", ".toml")
@@ -70,13 +84,13 @@ class RoundPlaces:
         """Where a killed round was; a dot-file, which nobody mirrors or reads."""
         return self.root / "models" / f".{self.end_s:06d}.checkpoint"
 
-    @property
-    def artifacts(self) -> tuple[tuple[Path, str], ...]:
-        """The files and their schemas, in the order in which they are written.
+    def artifacts(self, champion: str) -> tuple[tuple[Path, str], ...]:
+        """Return the files and their schemas, in the order in which they are written.
 
         The model is last: whoever finds it finds the others too.
         """
-        return (self.population, POPULATION), (self.scores, SCORES), (self.model, MODEL)
+        rules = ((self.rules, RULES),) if champion == "forward" else ()
+        return (self.population, POPULATION), (self.scores, SCORES), *rules, (self.model, MODEL)
 
     def _at(self, folder: str, ending: str) -> Path:
         return self.root / folder / f"{self.end_s:06d}{ending}"
@@ -166,8 +180,8 @@ class Found:
             "baselines": self.baselines,
         }
 
-    def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, Write, Write]:
-        """Return what writes each of the files, in the order of ``places.artifacts``."""
+    def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, ...]:
+        """Return what writes each of the files, in the order of `RoundPlaces.artifacts`."""
         result = self.result
 
         def population(path: Path, lineage: Lineage) -> None:
@@ -187,7 +201,14 @@ class Found:
             value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
             return [Result(value={**value, **self.summary})]
 
-        return population, scores, model
+        handed = result.handed
+        if handed is None:
+            return population, scores, model
+        return population, scores, functools.partial(_write_rules, handed.record), model
+
+
+def _write_rules(record: Record, path: Path, lineage: Lineage) -> None:
+    write_record(path, record, lineage)
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
@@ -207,7 +228,7 @@ def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None
         "genes": state.genes.tolist(),
     }
     extra: dict[str, JSON] = {
-        "gene_names": list(gene_names(result.champion.zone_names)),
+        "gene_names": list(genome_names(result.champion)[: len(result.genes)]),
         "champion": result.genes.tolist(),
         "noise": _number(result.as_previous.noise),
         "generations": result.generations,
@@ -250,7 +271,8 @@ def result_table(
         "generations": result.generations,
         "evaluations": result.evaluations,
         **score_table(result.scores, result.ceiling),
-        "champion": "likely" if result.is_likely else "score",
+        "champion": "likely" if result.rule == LIKELIHOOD else result.rule,
+        **_published(result),
         f"optimiser_{score}": _number(result.optimiser_score),
         "hypervolume": [_number(line.hypervolume) for line in result.history],
         f"best_{score}_in_population": _number(last.best_score),
@@ -269,6 +291,26 @@ def result_table(
             },
         },
     }  # fmt: skip
+
+
+def _published(result: RoundResult) -> dict[str, JSON]:
+    """Return why a model was published, where rules are judged."""
+    if result.handed is None:
+        return {}
+    choice, record = result.handed.choice, result.handed.record
+    lead = choice.lead
+    return {
+        "published": {
+            "rule": choice.rule,
+            "says": SAYS[choice.rule],
+            "because": choice.because,
+            "of_window_end_s": record.in_use.of_s if record.in_use else None,
+            "lead": None if lead is None else _number(lead.mean),
+            "lead_error": None if lead is None else _number(lead.error),
+            "lead_windows": None if lead is None else lead.n,
+            "forward": dict[str, JSON](record.means()) or None,
+        }
+    }
 
 
 def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:

@@ -51,6 +51,12 @@ class CalibrateOptions:
     cluster
         Who simulates instead of this machine's threads. The numbers do not depend
         on it.
+    model
+        The model whose parameters, and strengths of effects, are calibrated; None for the
+        trial's own starting model.
+    keeps_way
+        Whether rounds publish as those that the trial has already, and by the rule that has been
+        better where it has none, whatever the settings say.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -60,6 +66,8 @@ class CalibrateOptions:
     baselines: bool = False
     seed_likelihood: bool = True
     cluster: Cluster | None = None
+    model: Path | None = None
+    keeps_way: bool = False
 
     def __post_init__(self) -> None:
         if self.budget_s is not None and not self.budget_s > 0:
@@ -89,6 +97,10 @@ class CalibrateOptions:
     def workers(self) -> int:
         """Threads to use."""
         return self.n_workers or len(os.sched_getaffinity(0))
+
+    def model_of(self, trial: Trial) -> Path:
+        """Return the file of the model that is calibrated in a trial."""
+        return trial.root / trial.model if self.model is None else self.model
 
     def deadline(self) -> Deadline | None:
         """Return when a round that starts now has to be over."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.calibrate.group import check_genome_length
+from zfcal.model.effects.genome import check_genomes
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
 from zfcal.parameters import Parameters
 
@@ -49,7 +49,7 @@ class SpanGroup:
         self, genes: Floats, *, n_counted: int, n_steps: int, seeds: NDArray[np.uint64]
     ) -> Counts:
         """Return counts with leading axes (genome, run); the burn-in comes on top."""
-        check_genome_length(genes, len(self.template.zones))
+        check_genomes(genes, self.template)
         start_s, end_s = self.span_s
         pace = (end_s - start_s) / (n_steps * self.template.dt_s)
         packed = pack_genes(genes, self.template, self.arena)

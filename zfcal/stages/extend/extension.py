@@ -167,6 +167,7 @@ class Extension:
             ),
             control=control,
             guests=to_genes(screen.fitted.parameters)[None, :],
+            moves_effects=False,
             seeds=SeedSource(trial_seed=self.seed, window_end_s=int(self._span_s[1])),
         )
         settings = replace(self.calibration.settings, window_s=halves.seconds(halves.learnt))

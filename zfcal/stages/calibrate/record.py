@@ -1,0 +1,88 @@
+"""The record of the publishing rules: ``scores/E-rules.parquet``, and the models that it judges."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.tables import RULES, make_table, read_extra, read_table, write_table
+from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
+from zfcal.calibrate.rules import Candidate, Forward, Record
+from zfcal.errors import DamagedError
+
+
+def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
+    """Return what rules had scored by a round, and their models.
+
+    Raises
+    ------
+    DamagedError
+        The file is damaged, or its extra metadata is not what `write_record` writes.
+    """
+    table, extra = read_table(path, RULES).to_pydict(), read_extra(path)
+    rows = (dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True))
+    try:
+        models: Any = extra["models"]
+        in_use: Any = extra["in_use"]
+        return Record(
+            rows=tuple(Forward(**{**row, **_numbers(row)}) for row in rows),
+            models=tuple(_candidate(entry, zone_names) for entry in models),
+            n_rounds=int(extra["n_rounds"]),  # type: ignore[arg-type]
+            in_use=None if in_use is None else _candidate(in_use, zone_names),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise DamagedError(
+            f"{path}: does not say which models the rules made ({error!r}).",
+            hint="Make it again: zfcal calibrate TRIAL --force",
+        ) from error
+
+
+def _numbers(row: dict[str, Any]) -> dict[str, float]:
+    return {key: math.nan if row[key] is None else row[key] for key in ("S", "low", "high")}
+
+
+def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...]) -> Candidate:
+    counts = {
+        attribute: np.array(entry["counts"][name], dtype=np.int64)
+        for name, attribute in ATTRIBUTES.items()
+    }
+    return Candidate(
+        rule=entry["rule"],
+        made_at_s=int(entry["made_at_s"]),
+        of_s=int(entry["of_s"]),
+        genes=np.array(entry["genes"], dtype=np.float64),
+        long_run=Statistics(zone_names=zone_names, **counts),  # type: ignore[arg-type]
+    )
+
+
+def write_record(path: Path, record: Record, lineage: Lineage) -> None:
+    """Write the forward scores of all rules so far, and the models that wait to be judged."""
+    columns: dict[str, Any] = {
+        key: [getattr(row, key) for row in record.rows]
+        for key in ("window_end_s", "rule", "made_at_s", "S", "low", "high", "n")
+    }
+    for key in ("S", "low", "high"):
+        columns[key] = [None if math.isnan(value) else value for value in columns[key]]
+    extra: dict[str, JSON] = {
+        "models": [_entry(model) for model in record.models],
+        "in_use": None if record.in_use is None else _entry(record.in_use),
+        "n_rounds": record.n_rounds,
+    }
+    write_table(path, make_table(RULES, columns), lineage, extra=extra)
+
+
+def _entry(model: Candidate) -> dict[str, JSON]:
+    counts = {
+        name: getattr(model.long_run, attribute).tolist() for name, attribute in ATTRIBUTES.items()
+    }
+    return {
+        "rule": model.rule,
+        "made_at_s": model.made_at_s,
+        "of_s": model.of_s,
+        "genes": model.genes.tolist(),
+        "counts": counts,
+    }
