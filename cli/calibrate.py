@@ -45,9 +45,10 @@ if TYPE_CHECKING:
 def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
     r"""Find the model that comes nearest to each window of a trial.
 
-    Writes models/E.toml, models/E.parquet and scores/E-model.parquet for each
-    window that `zfcal analyse` has measured. Each round starts from the last
-    population of the one before. A killed run goes on where it was.
+    Writes models/E.toml, models/E.parquet, scores/E-model.parquet and
+    scores/E-rules.parquet for each window that `zfcal analyse` has measured.
+    Each round starts from the last population of the one before, and says which
+    model it publishes, and why. A killed run goes on where it was.
 
     \b
     Example:

@@ -18,7 +18,8 @@ def describe(status: Status) -> str:
     parts = [_stage(name, stage) for name, stage in status.stages.items()]
     if status.score is not None:
         ceiling = "" if status.ceiling is None else f" of {status.ceiling:.3f}"
-        parts.append(f"S {status.score:.3f}{ceiling}")
+        rule = f" by {status.rule}" if status.rule else ""
+        parts.append(f"S {status.score:.3f}{ceiling}{rule}")
     if status.lag_s is not None:
         parts.append(f"lag {status.lag_s:.0f} s")
     if status.n_skipped:

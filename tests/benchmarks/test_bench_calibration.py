@@ -1,5 +1,7 @@
 """The benchmarks of calibration, each run small; who wins, what is fresh, what is committed."""
 
+import json
+
 import pytest
 
 
@@ -118,3 +120,13 @@ def test_committed_rounds_are_measured_in_full(script, words, n):
     seeds = rounds.effort_of(options_of.parse_args(words)).seeds
     assert len(seeds) == n
     assert set(seeds) <= set(rounds.FULL.seeds)
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_publishing_runs(command):
+    """The parts of the rules are among the whole round."""
+    done = command("calibration/bench_publishing.py", "--minutes", "4", "--budget", "3")
+    found = json.loads(done.stdout)
+    seconds = found["seconds"]
+    assert 0 < seconds["simulations of the models"] < seconds["all of judging and handing on"]
+    assert 0 < found["share_of_the_rules"] < 1

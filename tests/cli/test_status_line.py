@@ -4,6 +4,7 @@ import io
 import os
 import pty
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -28,6 +29,12 @@ def test_it_says_what_each_stage_is_at():
         "analyse: done to 300 s · calibrate: to 300 s 34/50 · S 0.846 of 0.912 · lag 51 s · "
         "skipped 1"
     )
+
+
+def test_it_says_by_which_rule_the_last_model_was_published():
+    """In two words, beside its score."""
+    said = describe(replace(AT_WORK, rule="likelihood"))
+    assert "S 0.846 of 0.912 by likelihood · lag 51 s" in said
 
 
 def test_it_says_what_is_amiss():

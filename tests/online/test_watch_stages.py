@@ -8,7 +8,13 @@ import pytest
 from zfcal.artifacts.models import read_result
 from zfcal.artifacts.validation import check
 from zfcal.online.watch_events import Happened, Skipped, Takes, told_by
-from zfcal.online.watch_stages import AnalyseStage, CalibrateStage, Turn, has_ended
+from zfcal.online.watch_stages import (
+    AnalyseStage,
+    CalibrateStage,
+    Turn,
+    has_ended,
+    is_of_a_round,
+)
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.events import LeftOut, Made, Note, say_nothing
@@ -193,3 +199,16 @@ def test_an_order_without_windows_makes_the_stage_ready(trial, quick, heard):
     assert stage(trial, quick)(Turn(seen_s={}), heard.append).end_s is None
     assert sorted(trial.rglob("*")) == before
     assert heard == []
+
+
+@pytest.mark.parametrize(("name", "is_theirs"), [
+    ("models/000120.toml", True),
+    ("scores/000120-model.parquet", True),
+    ("scores/000120-rules.parquet", True),
+    ("scores/000120.parquet", False),
+    ("stats/000120.parquet", False),
+    ("tracks/000060.parquet", False),
+])  # fmt: skip
+def test_what_rounds_make_gives_analysis_nothing_to_do(name, is_theirs):
+    """A round does not wake it."""
+    assert is_of_a_round(name) is is_theirs

@@ -99,7 +99,7 @@ class Forward:
     S
         The score; NaN where no feature can be counted.
     low, high
-        95 % of what windows of one model differ by.
+        95 % of what windows of one model differ by; NaN where S or that is unknown.
     n
         Positions of fish in the window.
     """
@@ -252,13 +252,15 @@ class Record:
             Standard deviation of S between windows of one model.
         """
         first = LIKELIHOOD if LIKELIHOOD in made else SCORE
-        means = {rule: mean for rule, mean in self.means().items() if rule in made or rule == KEEP}
-        if self.n_rounds < FIRST_ROUNDS or not set(means) - {KEEP}:
+        # Rules may lack a model in some minutes: each is held against `KEEP` on the minutes it has.
+        found = {rule: self.lead(rule, KEEP, noise) for rule in RULES if rule in made}
+        leads = {rule: lead for rule, lead in found.items() if lead.n}
+        if self.n_rounds < FIRST_ROUNDS or not leads:
             return Choice(rule=first, because="no window has followed a model yet")
-        leader = max(means, key=lambda rule: means[rule])
-        if leader == KEEP:
-            return Choice(rule=KEEP, because="no rule has done better than to keep it")
-        lead = self.lead(leader, KEEP, noise)
+        leader = max(leads, key=lambda rule: leads[rule].mean)
+        lead = leads[leader]
+        if not lead.mean > 0:
+            return Choice(rule=KEEP, because="no rule has done better than to keep it", lead=lead)
         if not lead.is_sure:
             return Choice(rule=KEEP, because=f"the lead of {leader} may be chance", lead=lead)
         return Choice(rule=leader, because="its models have been the better ones", lead=lead)
@@ -272,8 +274,8 @@ def _row(model: Candidate, control: Statistics, end_s: int, noise: float) -> For
         rule=model.rule,
         made_at_s=model.made_at_s,
         S=score,
-        low=max(0.0, score - half),
-        high=min(1.0, score + half),
+        low=float(np.maximum(0.0, score - half)),
+        high=float(np.minimum(1.0, score + half)),
         n=int(control.occupation.sum()),
     )
 

@@ -39,6 +39,7 @@ from zfcal.online.watch_stages import (
     WatchOptions,
     begin,
     has_ended,
+    is_of_a_round,
 )
 from zfcal.online.worker import Done, Failure, Worker
 from zfcal.stages import events as of
@@ -267,11 +268,7 @@ class _Watch:
             return frozenset()
         if name == CALIBRATE:
             return self._seen
-        return frozenset(
-            each
-            for each in self._seen
-            if not each[0].startswith("models/") and not each[0].endswith("-model.parquet")
-        )
+        return frozenset(each for each in self._seen if not is_of_a_round(each[0]))
 
     def _take(self, stage: Running, told: of.Event | Done | Failure) -> None:
         """Take what a stage tells."""
@@ -311,7 +308,9 @@ class _Watch:
                 stage.status = dataclasses.replace(stage.status, last_s=int(told.path.stem))
             case of.Result() if stage.name == CALIBRATE:
                 score, ceiling = told.value.get("S"), told.value.get("ceiling")
-                self._status = dataclasses.replace(self._status, score=score, ceiling=ceiling)
+                self._status = dataclasses.replace(
+                    self._status, score=score, ceiling=ceiling, rule=told.value.get("rule", "")
+                )
             case Skipped():
                 n_skipped = self._status.n_skipped + 1
                 self._status = dataclasses.replace(self._status, n_skipped=n_skipped)

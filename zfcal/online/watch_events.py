@@ -79,6 +79,8 @@ class Status:
         By their names.
     score, ceiling
         S of the last model, and what a perfect one would reach.
+    rule
+        By which it was published.
     lag_s
         From the end of the last window's tracks to its model.
     n_skipped
@@ -90,6 +92,7 @@ class Status:
     stages: Mapping[str, StageStatus]
     score: float | None = None
     ceiling: float | None = None
+    rule: str = ""
     lag_s: float | None = None
     n_skipped: int = 0
     is_gone: bool = False

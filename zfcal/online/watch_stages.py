@@ -288,6 +288,11 @@ def begin(name: str, job: Job) -> Running:
     return Running(name=name, job=job, worker=Worker(name, job, niceness=NICENESS[name]))
 
 
+def is_of_a_round(name: str) -> bool:
+    """Return whether rounds make the file with a name in a trial: it is nothing to analyse."""
+    return name.startswith("models/") or name.endswith(("-model.parquet", "-rules.parquet"))
+
+
 def has_ended(root: Path, whole: Mapping[int, float]) -> bool:
     """Return whether a recording is there to its end.
 

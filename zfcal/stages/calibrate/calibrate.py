@@ -50,8 +50,6 @@ from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.stages.windows import LENGTH_S
 
-_INSTANT_S = 0.001
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Window:
@@ -300,11 +298,10 @@ def _search(
     """Search for the model of a window, and go on from a checkpoint where there is one."""
     options, tell = shared.options, shared.run.tell
     began_s = time.monotonic()
-    template, zone_names = shared.group.template, shared.opened.arena.zone_names
+    template = shared.group.template
     estimated = memory = None
     if options.seed_likelihood:
         estimated = estimate(shared.opened, template, _window_span(places.end_s), tell)
-    record = Record() if before.rules is None else read_record(before.rules, zone_names)
     if options.seed_likelihood and options.settings.champion == "forward":
         memory = remembered(shared.opened, template, places.end_s, memory_span(places.end_s))
     round_task = RoundTask(
@@ -314,12 +311,9 @@ def _search(
         seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
         previous=_previous(shared, before.population),
         memory=memory,
-        record=record,
+        record=_record(shared, before.rules),
     )
-    if options.budget_s is not None:
-        # The estimate is a part of the round.
-        left_s = options.budget_s - (time.monotonic() - began_s)
-        options = replace(options, budget_s=max(left_s, _INSTANT_S))
+    options = options.left_since(began_s)
     result = run_search(round_task, options, places.checkpoint, tell, key=key)
     return Found(
         result=result,
@@ -330,10 +324,21 @@ def _search(
 
 def _previous(shared: _Shared, path: Path | None) -> Previous | None:
     """Return the last population; None where there is none, or its models have other effects."""
-    names = genome_names(shared.group.template)
-    if path is None or read_extra(path).get("gene_names", list(names)) != list(names):
+    if path is None or not _has_same_genes(shared, path):
         return None
     return read_previous(path, shared.options.settings.features)
+
+
+def _record(shared: _Shared, path: Path | None) -> Record:
+    """Return the record of the rules; a new one where its models have other effects."""
+    if path is None or not _has_same_genes(shared, path):
+        return Record()
+    return read_record(path, shared.opened.arena.zone_names)
+
+
+def _has_same_genes(shared: _Shared, path: Path) -> bool:
+    names = list(genome_names(shared.group.template))
+    return bool(read_extra(path).get("gene_names", names) == names)
 
 
 def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:

@@ -5,6 +5,7 @@ For recordings whose behaviour is to be learnt from one half and judged on the o
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -236,6 +237,7 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
     seed = options.seed_of(opened.trial)
 
     def compute() -> Iterator[Draft]:
+        began_s = time.monotonic()
         group = make_group(opened, options)
         estimated = None
         if options.seed_likelihood:
@@ -248,7 +250,7 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         )
         window_s = float(span.train_s[1] - span.train_s[0])
         settings = replace(options.settings, window_s=window_s)
-        asked = replace(options, settings=settings)
+        asked = replace(options, settings=settings).left_since(began_s)
         checkpoint = output.path.with_name(f".{output.path.name}.checkpoint")
         key = checkpoint_key(output.lineage)
         result = run_search(round_task, asked, checkpoint, run.tell, key=key)

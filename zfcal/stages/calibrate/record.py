@@ -11,8 +11,9 @@ import numpy as np
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.tables import RULES, make_table, read_extra, read_table, write_table
 from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
+from zfcal.calibrate.rules import RULES as RULE_NAMES
 from zfcal.calibrate.rules import Candidate, Forward, Record
-from zfcal.errors import DamagedError
+from zfcal.errors import DamagedError, InputError
 
 
 def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
@@ -28,13 +29,14 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
     try:
         models: Any = extra["models"]
         in_use: Any = extra["in_use"]
+        n_genes = len(extra["gene_names"])  # type: ignore[arg-type]
         return Record(
             rows=tuple(Forward(**{**row, **_numbers(row)}) for row in rows),
-            models=tuple(_candidate(entry, zone_names) for entry in models),
+            models=tuple(_candidate(entry, zone_names, n_genes) for entry in models),
             n_rounds=int(extra["n_rounds"]),  # type: ignore[arg-type]
-            in_use=None if in_use is None else _candidate(in_use, zone_names),
+            in_use=None if in_use is None else _candidate(in_use, zone_names, n_genes),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, InputError) as error:
         raise DamagedError(
             f"{path}: does not say which models the rules made ({error!r}).",
             hint="Make it again: zfcal calibrate TRIAL --force",
@@ -45,7 +47,10 @@ def _numbers(row: dict[str, Any]) -> dict[str, float]:
     return {key: math.nan if row[key] is None else row[key] for key in ("S", "low", "high")}
 
 
-def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...]) -> Candidate:
+def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...], n_genes: int) -> Candidate:
+    genes = np.array(entry["genes"], dtype=np.float64)
+    if entry["rule"] not in RULE_NAMES or genes.shape != (n_genes,) or not np.isfinite(genes).all():
+        raise ValueError(f"a model of rule {entry['rule']!r} with genes of shape {genes.shape}")
     counts = {
         attribute: np.array(entry["counts"][name], dtype=np.int64)
         for name, attribute in ATTRIBUTES.items()
@@ -54,13 +59,18 @@ def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...]) -> Candidate:
         rule=entry["rule"],
         made_at_s=int(entry["made_at_s"]),
         of_s=int(entry["of_s"]),
-        genes=np.array(entry["genes"], dtype=np.float64),
+        genes=genes,
         long_run=Statistics(zone_names=zone_names, **counts),  # type: ignore[arg-type]
     )
 
 
-def write_record(path: Path, record: Record, lineage: Lineage) -> None:
-    """Write the forward scores of all rules so far, and the models that wait to be judged."""
+def write_record(
+    path: Path, record: Record, lineage: Lineage, *, gene_names: tuple[str, ...]
+) -> None:
+    """Write the forward scores of all rules so far, and the models that wait to be judged.
+
+    The genes have names, since models of other effects can be neither scored nor handed on.
+    """
     columns: dict[str, Any] = {
         key: [getattr(row, key) for row in record.rows]
         for key in ("window_end_s", "rule", "made_at_s", "S", "low", "high", "n")
@@ -68,6 +78,7 @@ def write_record(path: Path, record: Record, lineage: Lineage) -> None:
     for key in ("S", "low", "high"):
         columns[key] = [None if math.isnan(value) else value for value in columns[key]]
     extra: dict[str, JSON] = {
+        "gene_names": list(gene_names),
         "models": [_entry(model) for model in record.models],
         "in_use": None if record.in_use is None else _entry(record.in_use),
         "n_rounds": record.n_rounds,

@@ -33,6 +33,7 @@ from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.model.effects.genome import genome_names
 from zfcal.stages.calibrate.record import write_record
+from zfcal.stages.calibrate.telling import published_fields, published_note
 from zfcal.stages.events import Event, Result
 from zfcal.stages.stage import Write
 
@@ -178,6 +179,8 @@ class Found:
             "generations": result.generations,
             **score_table(result.scores, result.ceiling),
             "baselines": self.baselines,
+            **published_fields(result),
+            **_published(result),
         }
 
     def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, ...]:
@@ -199,16 +202,21 @@ class Found:
         def model(path: Path, lineage: Lineage) -> list[Event]:
             write_model(path, result.champion, lineage, self.table, parents=False)
             value = {"path": str(path), "window_end_s": places.end_s, "seed": seed}
-            return [Result(value={**value, **self.summary})]
+            note = published_note(result, places.end_s)
+            return [note, Result(value={**value, **self.summary})]
 
         handed = result.handed
         if handed is None:
             return population, scores, model
-        return population, scores, functools.partial(_write_rules, handed.record), model
+        return population, scores, functools.partial(_write_rules, result, handed.record), model
 
 
-def _write_rules(record: Record, path: Path, lineage: Lineage) -> None:
-    write_record(path, record, lineage)
+def _write_rules(result: RoundResult, record: Record, path: Path, lineage: Lineage) -> None:
+    write_record(path, record, lineage, gene_names=_gene_names(result))
+
+
+def _gene_names(result: RoundResult) -> tuple[str, ...]:
+    return genome_names(result.champion)[: len(result.genes)]
 
 
 def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None:
@@ -228,7 +236,7 @@ def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None
         "genes": state.genes.tolist(),
     }
     extra: dict[str, JSON] = {
-        "gene_names": list(genome_names(result.champion)[: len(result.genes)]),
+        "gene_names": list(_gene_names(result)),
         "champion": result.genes.tolist(),
         "noise": _number(result.as_previous.noise),
         "generations": result.generations,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from zfcal.artifacts.atomic import append_bytes, check_free, write_bytes_whole
@@ -26,6 +26,8 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import Progress, Tell
 from zfcal.stages.taken import unless_taken
 from zfcal.trial import Trial
+
+_INSTANT_S = 0.001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +103,19 @@ class CalibrateOptions:
     def model_of(self, trial: Trial) -> Path:
         """Return the file of the model that is calibrated in a trial."""
         return trial.root / trial.model if self.model is None else self.model
+
+    def left_since(self, began_s: float) -> CalibrateOptions:
+        """Return the options with what is left of the budget of a round that began then.
+
+        Parameters
+        ----------
+        began_s
+            By the monotonic clock. What came before the search is a part of the round.
+        """
+        if self.budget_s is None:
+            return self
+        left_s = self.budget_s - (time.monotonic() - began_s)
+        return replace(self, budget_s=max(left_s, _INSTANT_S))
 
     def deadline(self) -> Deadline | None:
         """Return when a round that starts now has to be over."""

@@ -1,0 +1,306 @@
+"""Which model is handed on: what rules have scored, and when a lead is more than chance."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from zfcal.behaviour.scores import compare
+from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.rules import (
+    COMPROMISE,
+    KEEP,
+    LIKELIHOOD,
+    MADE,
+    MEMORY,
+    NEAREST,
+    RULES,
+    SAYS,
+    SCORE,
+    Candidate,
+    Forward,
+    Lead,
+    Record,
+    half_way,
+)
+
+NOISE = 0.05
+
+
+def statistics(n_first=50, *, n=100):
+    """Return counts of one zone of two, of which the first gets so many of n in each statistic."""
+    two = np.array([n_first, n - n_first], dtype=np.int64)
+    bins = np.zeros((2, 10), dtype=np.int64)
+    bins[:, 0] = bins[:, 1] = two
+    return Statistics(
+        zone_names=("one", "other"),
+        distance=bins,
+        wall=bins,
+        occupation=two,
+        transition=np.outer(two, two),
+        speed=bins,
+    )
+
+
+NOTHING = statistics(n=0, n_first=0)
+
+
+def model(rule, made_at_s, *, n_first=50, gene=0.5, of_s=None):
+    """Return a model of a rule."""
+    return Candidate(
+        rule=rule,
+        made_at_s=made_at_s,
+        of_s=made_at_s if of_s is None else of_s,
+        genes=np.full(3, gene),
+        long_run=statistics(n_first),
+    )
+
+
+def row(rule, end_s, score):
+    """Return a forward score of a window."""
+    return Forward(
+        window_end_s=end_s, rule=rule, made_at_s=end_s - 120, S=score, low=0.0, high=1.0, n=9
+    )
+
+
+def record_of(scores, *, n_rounds=5):
+    """Return a record of rules, each with a score per minute."""
+    rows = [
+        row(rule, 240 + 60 * k, score)
+        for rule, values in scores.items()
+        for k, score in enumerate(values)
+        if score is not None
+    ]
+    return Record(rows=tuple(rows), n_rounds=n_rounds)
+
+
+def test_a_model_is_judged_on_the_first_window_that_begins_after_it_was_made():
+    """One made at 120 s is judged at 240 s and not at 180 s, whose first minute it has seen."""
+    record = Record(models=(model(SCORE, 120), model(SCORE, 180)))
+    assert record.judged(statistics(), 180, NOISE).rows == ()
+    assert record.judged(statistics(), 239, NOISE).rows == ()
+    (found,) = record.judged(statistics(), 240, NOISE).rows
+    assert (found.window_end_s, found.made_at_s, found.rule) == (240, 120, SCORE)
+
+
+def test_a_row_says_what_the_model_scores_and_how_far_windows_differ():
+    """S by the definition, 1.96 standard deviations to each side and no farther than 0 and 1."""
+    control = statistics(40)
+    record = Record(models=(model(SCORE, 120, n_first=60), model(KEEP, 120, n_first=40)))
+    first, second = record.judged(control, 240, NOISE).rows
+    wanted = compare(statistics(60), control).S
+    assert 0.5 < wanted < 1.0
+    assert wanted == first.S
+    assert first.low == pytest.approx(wanted - 0.098)
+    assert first.high == pytest.approx(min(1.0, wanted + 0.098))
+    assert (second.S, second.high) == (pytest.approx(1.0), 1.0)
+    assert {first.n, second.n} == {100}
+
+
+def test_every_model_of_a_round_is_judged_once():
+    """A window that is seen again, or one that comes where nothing new is due, adds no row."""
+    record = Record(models=tuple(model(rule, 120) for rule in RULES))
+    once = record.judged(statistics(), 240, NOISE)
+    assert [found.rule for found in once.rows] == list(RULES)
+    assert once.judged(statistics(), 240, NOISE).rows == once.rows
+    assert once.judged(statistics(), 300, NOISE).rows == once.rows
+
+
+def test_after_windows_that_were_passed_over_the_newest_models_are_judged_alone():
+    """Made at 120, 180 and 240 s, nothing until 600 s: those of 240 s; the others never are."""
+    record = Record(models=tuple(model(SCORE, end) for end in (120, 180, 240)))
+    later = record.judged(statistics(), 600, NOISE)
+    assert [found.made_at_s for found in later.rows] == [240]
+    assert later.judged(statistics(), 660, NOISE).rows == later.rows
+
+
+def test_a_window_that_holds_nothing_gives_no_number():
+    """S and its interval are NaN, and so is an interval whose noise is unknown."""
+    still = replace(model(SCORE, 120), long_run=NOTHING)
+    (found,) = Record(models=(still,)).judged(NOTHING, 240, NOISE).rows
+    assert all(map(math.isnan, (found.S, found.low, found.high)))
+    assert found.n == 0
+    record = Record(models=(model(SCORE, 120),))
+    (found,) = record.judged(statistics(), 240, math.nan).rows
+    assert pytest.approx(1.0) == found.S
+    assert math.isnan(found.low)
+    assert math.isnan(found.high)
+
+
+def test_models_wait_until_they_have_been_judged():
+    """Those of the last two windows wait; older ones of rules that make none are dropped."""
+    record = Record()
+    for end in (120, 180, 240, 300, 360):
+        record = record.with_models([model(NEAREST, end), model(KEEP, end)])
+    assert {found.made_at_s for found in record.models} == {180, 240, 300, 360}
+
+
+def test_no_model_is_dropped_before_its_window_comes():
+    """Round after round, a minute apart or more: each newest set that is due is there."""
+    for apart in (60, 120, 180, 240, 600):
+        record = Record()
+        for end in range(120, 4000, apart):
+            record = record.judged(statistics(), end, NOISE)
+            record = record.with_models([model(rule, end) for rule in RULES])
+        judged = {(found.rule, found.made_at_s) for found in record.rows}
+        ends = [end for end in range(120, 4000, apart) if end <= max(m for _, m in judged)]
+        assert judged == {(rule, end) for rule in RULES for end in ends}
+
+
+def test_the_sixty_newest_models_that_rules_made_are_kept():
+    """For the rule that takes the nearest of them, however old."""
+    record = Record()
+    for k in range(100):
+        record = record.with_models([model(SCORE, 120 + 60 * k), model(KEEP, 120 + 60 * k)])
+    made = [found.made_at_s for found in record.models if found.rule in MADE]
+    assert made == [120 + 60 * k for k in range(40, 100)]
+
+
+def test_the_nearest_is_the_model_that_scores_best_on_the_window():
+    """Of those that rules made, not of the one in use; without any there is none."""
+    record = Record(
+        models=(
+            model(SCORE, 120, n_first=10),
+            model(MEMORY, 180, n_first=42),
+            model(LIKELIHOOD, 240, n_first=70),
+            model(KEEP, 240, n_first=40),
+        )
+    )
+    found = record.nearest(statistics(40))
+    assert (found.rule, found.made_at_s) == (MEMORY, 180)
+    assert Record(models=(model(KEEP, 120),)).nearest(statistics()) is None
+    assert record.nearest(NOTHING).rule == SCORE
+
+
+def test_means_leave_out_what_has_no_number():
+    """NaN is no score; a rule that has none at all has no mean."""
+    record = record_of({SCORE: [0.8, math.nan, 0.6], KEEP: [math.nan], MEMORY: [0.5]})
+    assert record.means() == {SCORE: pytest.approx(0.7), MEMORY: 0.5}
+    assert Record().means() == {}
+
+
+def test_a_lead_by_hand():
+    """Differences 0.1 and 0.2, noise 0.05: mean 0.15, error sqrt((0.005 + 0.0025) / 4)."""
+    record = record_of({SCORE: [0.8, 0.9], KEEP: [0.7, 0.7]})
+    lead = record.lead(SCORE, KEEP, NOISE)
+    assert (lead.mean, lead.n) == (pytest.approx(0.15), 2)
+    assert lead.error == pytest.approx(0.0433013, abs=1e-7)
+    assert record.lead(KEEP, SCORE, NOISE).mean == pytest.approx(-0.15)
+
+
+def test_a_lead_counts_windows_that_both_were_judged_on():
+    """The second minute lacks one of them, the third has no number."""
+    record = record_of({SCORE: [0.8, 0.9, math.nan, 0.7], KEEP: [0.7, None, 0.1, 0.7]})
+    lead = record.lead(SCORE, KEEP, NOISE)
+    assert (lead.mean, lead.n) == (pytest.approx(0.05), 2)
+
+
+def test_no_window_in_common_is_no_lead():
+    """And surely none that is sure."""
+    lead = record_of({SCORE: [0.8], KEEP: [None, 0.7]}).lead(SCORE, KEEP, NOISE)
+    assert (lead.n, lead.is_sure) == (0, False)
+    assert math.isnan(lead.mean)
+
+
+@pytest.mark.parametrize(("mean", "n", "sure"), [
+    (1.377, 1, True), (1.376, 1, False), (1.061, 2, True), (1.060, 2, False),
+    (0.920, 5, True), (0.919, 5, False), (-9.0, 5, False), (0.0, 5, False),
+])  # fmt: skip
+def test_a_lead_is_sure_beyond_the_quantile_of_student(mean, n, sure):
+    """One-sided at 0.8: 1.3764, 1.0607 and 0.9195 errors for 1, 2 and 5 windows, from a table."""
+    assert Lead(mean=mean, error=1.0, n=n).is_sure is sure
+
+
+def test_a_lead_of_unknown_error_is_not_sure():
+    """NaN fails."""
+    assert not Lead(mean=0.9, error=math.nan, n=9).is_sure
+    record = record_of({SCORE: [0.9, 0.9], KEEP: [0.1, 0.1]})
+    assert record.choose({SCORE}, math.nan).rule == KEEP
+
+
+@pytest.mark.parametrize("n_rounds", [0, 1])
+def test_the_first_two_rounds_publish_the_estimate(n_rounds):
+    """Whatever the record says; without an estimate the best by its score."""
+    record = record_of({SCORE: [0.9] * 9, KEEP: [0.1] * 9}, n_rounds=n_rounds)
+    assert record.choose({SCORE, LIKELIHOOD}, NOISE).rule == LIKELIHOOD
+    assert record.choose({SCORE}, NOISE).rule == SCORE
+
+
+def test_without_any_score_the_estimate_is_published():
+    """Nothing was judged yet, or on windows without a number."""
+    assert Record(n_rounds=7).choose({SCORE, LIKELIHOOD}, NOISE).rule == LIKELIHOOD
+    blind = record_of({SCORE: [math.nan], KEEP: [math.nan]})
+    assert blind.choose({SCORE}, NOISE).rule == SCORE
+
+
+def test_the_rule_that_leads_publishes():
+    """By more than chance over the model in use, and by most of all."""
+    record = record_of({SCORE: [0.8] * 3, MEMORY: [0.9] * 3, KEEP: [0.5] * 3})
+    choice = record.choose({SCORE, MEMORY}, NOISE)
+    assert (choice.rule, choice.because) == (MEMORY, "its models have been the better ones")
+    assert (choice.lead.mean, choice.lead.n) == (pytest.approx(0.4), 3)
+
+
+def test_a_rule_without_a_model_publishes_nothing():
+    """The one that leads has no estimate in this minute."""
+    record = record_of({SCORE: [0.8] * 3, MEMORY: [0.9] * 3, KEEP: [0.5] * 3})
+    assert record.choose({SCORE}, NOISE).rule == SCORE
+
+
+def test_nothing_better_keeps_the_model_in_use():
+    """The best of the others is as good or worse."""
+    record = record_of({SCORE: [0.5] * 3, LIKELIHOOD: [0.6] * 3, KEEP: [0.6] * 3})
+    choice = record.choose({SCORE, LIKELIHOOD}, NOISE)
+    assert (choice.rule, choice.because) == (KEEP, "no rule has done better than to keep it")
+
+
+def test_a_lead_that_may_be_chance_changes_nothing():
+    """It says whose lead, and how large."""
+    record = record_of({COMPROMISE: [0.62], KEEP: [0.6]})
+    choice = record.choose({COMPROMISE}, NOISE)
+    assert (choice.rule, choice.because) == (KEEP, "the lead of compromise may be chance")
+    assert choice.lead.mean == pytest.approx(0.02)
+
+
+def test_a_rule_that_missed_hard_minutes_does_not_lead_by_that():
+    """The estimate has 0.9 in the easy minute alone, where all have: score leads, by 0.2."""
+    record = record_of(
+        {SCORE: [0.9, 0.5, 0.5], LIKELIHOOD: [0.9, None, None], KEEP: [0.9, 0.2, 0.2]}
+    )
+    assert max(record.means(), key=record.means().get) == LIKELIHOOD
+    choice = record.choose({SCORE, LIKELIHOOD}, NOISE)
+    assert choice.rule == SCORE
+    assert choice.lead.mean == pytest.approx(0.2)
+
+
+def test_chance_alone_seldom_changes_the_model():
+    """One rule as good as the model in use leads surely in one of five records, within 5 errors.
+
+    Over 2000 records of five windows; the noise that is taken for one more window makes it less.
+    """
+    rng = np.random.default_rng(3)
+    changed = 0
+    for apart in rng.normal(0, NOISE * math.sqrt(2), size=(2000, 5)):
+        record = record_of({SCORE: list(0.5 + apart), KEEP: [0.5] * 5})
+        changed += record.choose({SCORE}, NOISE).rule == SCORE
+    assert 0.10 < changed / 2000 < 0.2 + 5 * math.sqrt(0.16 / 2000)
+
+
+def test_half_way_is_the_middle():
+    """Gene by gene."""
+    assert half_way(np.array([0.0, 1.0]), np.array([0.5, 0.0])).tolist() == [0.25, 0.5]
+
+
+def test_every_rule_says_what_it_is():
+    """For the model's file, and for those who look on."""
+    assert set(SAYS) == set(RULES)
+    assert {*MADE, NEAREST, KEEP} == set(RULES)
+
+
+def test_judging_leaves_the_record_as_it_was():
+    """Rounds that are killed are done again from it."""
+    record = Record(models=(model(SCORE, 120),))
+    record.judged(statistics(), 240, NOISE)
+    replace(record).with_models([model(SCORE, 300)])
+    assert (record.rows, len(record.models)) == ((), 1)

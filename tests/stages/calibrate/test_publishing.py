@@ -1,0 +1,305 @@
+"""Rounds that judge publishing rules: their files, what depends on what, and what is told."""
+
+import dataclasses
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+from zfcal.artifacts.checking import check_trial
+from zfcal.artifacts.inspecting import describe
+from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.models import read_result
+from zfcal.artifacts.tables import RULES, read_extra, read_table, write_table
+from zfcal.calibrate.rules import MADE
+from zfcal.errors import DamagedError
+from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
+from zfcal.stages.calibrate import calibrate as calibrate_module
+from zfcal.stages.calibrate import holdout
+from zfcal.stages.calibrate.calibrate import calibrate
+from zfcal.stages.calibrate.holdout import Span, calibrate_span
+from zfcal.stages.events import LeftOut, Made, Note, Progress, Result, UpToDate, say_nothing
+from zfcal.stages.trial_context import Task
+
+ENDS = (120, 180, 240, 300)
+
+
+class Killed(BaseException):
+    """What a test throws into a round, as a power cut would."""
+
+
+@pytest.fixture(scope="module")
+def analysed(made_once, tmp_path_factory):
+    """Return a trial of 5 minutes with its statistics, which nobody changes."""
+    root = tmp_path_factory.mktemp("analysed") / "trial"
+    shutil.copytree(made_once(300, 3, 0, 1), root)
+    analyse(root, AnalyseOptions(), say_nothing)
+    return root
+
+
+@pytest.fixture
+def trial(analysed, tmp_path):
+    """Return a copy of that trial."""
+    return shutil.copytree(analysed, tmp_path / "trial")
+
+
+@pytest.fixture
+def forward(in_full):
+    """Return options of a quick round that judges rules."""
+    settings = dataclasses.replace(in_full.settings, champion="forward")
+    return dataclasses.replace(in_full, settings=settings)
+
+
+@pytest.fixture(scope="module")
+def published(analysed, tmp_path_factory):
+    """Return a trial with its four rounds."""
+    return shutil.copytree(analysed, tmp_path_factory.mktemp("published") / "trial")
+
+
+@pytest.fixture
+def done(published, forward, tmp_path):
+    """Return a copy of a trial with its four rounds, which are made once."""
+    calibrate(published, forward, say_nothing)
+    return shutil.copytree(published, tmp_path / "done")
+
+
+def rules_of(root, end):
+    """Return the path of a round's record."""
+    return root / "scores" / f"{end:06d}-rules.parquet"
+
+
+def made_of(events):
+    """Return why files were made, by name."""
+    return {event.path.name: event.reason for event in events if isinstance(event, Made)}
+
+
+def test_each_round_leaves_the_record_of_all_windows_so_far(done):
+    """Models of 120 s are judged at 240 s, those of 180 s at 300 s."""
+    n_rows = [len(read_table(rules_of(done, end), RULES)) for end in ENDS]
+    assert n_rows == [0, 0, 6, 12]
+    last = read_table(rules_of(done, 300), RULES).to_pydict()
+    assert list(zip(last["made_at_s"], last["window_end_s"], strict=True)) == (
+        [(120, 240)] * 6 + [(180, 300)] * 6
+    )
+    assert set(MADE) < set(last["rule"])
+    assert last["n"] == [1800] * 12
+
+
+def test_a_model_file_says_what_was_published_and_why(done):
+    """The first two are estimates; mean forward scores stand with the later ones."""
+    found = [read_result(done / "models" / f"{end:06d}.toml") for end in ENDS]
+    published = [each["published"] for each in found]
+    assert [each["rule"] for each in published[:2]] == ["likelihood", "likelihood"]
+    assert [each["champion"] for each in found[:2]] == ["likely", "likely"]
+    assert published[0]["because"] == "no window has followed a model yet"
+    assert "forward" not in published[0]
+    table = read_table(rules_of(done, 300), RULES).to_pydict()
+    mean = np.mean([s for s, rule in zip(table["S"], table["rule"], strict=True) if rule == "keep"])
+    assert published[3]["forward"]["keep"] == pytest.approx(mean)
+
+
+def test_the_lineage_names_the_record_that_a_round_carries_on(done):
+    """And none in the first round; tracks are those that the estimate over all minutes reads."""
+    first, last = (read_lineage(done / "models" / f"{end:06d}.toml") for end in (120, 300))
+    assert not any("rules" in name for name in first.inputs)
+    assert "scores/000240-rules.parquet" in last.inputs
+    assert {f"tracks/{start:06d}.parquet" for start in range(0, 300, 60)} <= set(last.inputs)
+    assert last.options["champion"] == "forward"
+    assert read_lineage(rules_of(done, 300)).schema == RULES
+
+
+def test_the_second_run_does_nothing(done, forward, heard, read_all):
+    """Four files a window are up to date."""
+    before = read_all(done)
+    calibrate(done, forward, heard.append)
+    assert made_of(heard) == {}
+    assert sum(isinstance(event, UpToDate) for event in heard) == 16
+    assert read_all(done) == before
+
+
+def test_a_record_that_has_changed_makes_later_rounds_stale(done, forward, heard):
+    """Of another content, but whole: its own round stays, the next ones do not."""
+    path = rules_of(done, 180)
+    extra = read_extra(path)
+    extra["n_rounds"] = 9
+    write_table(path, read_table(path, RULES), read_lineage(path), extra=extra)
+    calibrate(done, forward, heard.append)
+    reasons = made_of(heard)
+    assert reasons["000240.toml"] == "input scores/000180-rules.parquet changed"
+    assert "000300.toml" in reasons
+    assert "000120.toml" not in reasons
+
+
+def test_a_record_that_was_removed_is_made_again(done, published, forward, heard, read_all):
+    """With its round; all ends in the same bytes."""
+    rules_of(done, 180).unlink()
+    calibrate(done, forward, heard.append)
+    assert "000180-rules.parquet" in made_of(heard)
+    assert read_all(done) == read_all(published)
+
+
+def test_one_window_at_a_time_ends_in_the_same_bytes(trial, published, done, forward, read_all):
+    """As a watch does it."""
+    for end in ENDS:
+        calibrate(trial, forward, say_nothing, task=Task(ends_s=frozenset({end})))
+    assert read_all(trial) == read_all(done) == read_all(published)
+
+
+def test_a_killed_round_ends_in_the_same_bytes(trial, done, forward, read_all):
+    """Killed in the last round, after its second generation."""
+
+    def kill(event):
+        is_last = isinstance(event, Progress) and event.stage == "window to 300 s"
+        if is_last and event.done == 2:
+            raise Killed
+
+    with pytest.raises(Killed):
+        calibrate(trial, forward, kill)
+    assert not rules_of(trial, 300).exists()
+    calibrate(trial, forward, say_nothing)
+    assert read_all(trial) == read_all(done)
+
+
+def test_without_the_estimate_other_rules_are_judged(trial, quick, forward):
+    """No tracks are read; score, the nearest and the model in use remain."""
+    calibrate(trial, dataclasses.replace(forward, seed_likelihood=False), say_nothing)
+    table = read_table(rules_of(trial, 300), RULES).to_pydict()
+    assert set(table["rule"]) == {"score", "nearest", "keep"}
+    inputs = read_lineage(trial / "models" / "000300.toml").inputs
+    assert not any("tracks" in name for name in inputs)
+    assert read_result(trial / "models" / "000120.toml")["published"]["rule"] == "score"
+
+
+def test_a_damaged_minute_costs_the_estimates_that_need_it(trial, forward, heard):
+    """Its windows have none; the estimate over all minutes takes the others."""
+    path = trial / "tracks" / "000060.parquet"
+    path.write_bytes(path.read_bytes()[:1000])
+    calibrate(trial, forward, heard.append)
+    left_out = [event.problem for event in heard if isinstance(event, LeftOut)]
+    assert any("000060.parquet" in text and "no likelihood estimate" in text for text in left_out)
+    names = {model["rule"] for model in read_extra(rules_of(trial, 120))["models"]}
+    assert "likelihood" not in names
+    assert "likelihood" in {m["rule"] for m in read_extra(rules_of(trial, 300))["models"]}
+
+
+def test_one_fish_is_enough(make_trial, forward):
+    """No pair has a distance, and all is judged by the others."""
+    root = make_trial("alone", seconds=240, n_fish=1)
+    analyse(root, AnalyseOptions(), say_nothing)
+    calibrate(root, forward, say_nothing)
+    table = read_table(rules_of(root, 240), RULES).to_pydict()
+    assert len(table["S"]) >= 3
+    assert all(0 <= score <= 1 for score in table["S"] if score is not None)
+
+
+def test_a_damaged_record_ends_the_rounds(done, forward):
+    """It is named, with what to do; what stands before it stays."""
+    path = rules_of(done, 180)
+    table, lineage = read_table(path, RULES), read_lineage(path)
+    write_table(path, table, lineage, extra={"n_rounds": 2})
+    with pytest.raises(DamagedError, match="000180-rules") as caught:
+        calibrate(done, forward, say_nothing)
+    assert caught.value.hint == "Make it again: zfcal calibrate TRIAL --force"
+    assert (done / "models" / "000180.toml").exists()
+    calibrate(done, forward, say_nothing, task=Task(force=True))
+    assert read_extra(path)["n_rounds"] == 2
+
+
+def test_a_record_of_other_genes_begins_anew(done, forward):
+    """Such as of a model that had other effects: its models can be neither scored nor used."""
+    path = rules_of(done, 240)
+    extra = read_extra(path)
+    extra["gene_names"] = [*extra["gene_names"], "alignment.strength"]
+    write_table(path, read_table(path, RULES), read_lineage(path), extra=extra)
+    calibrate(done, forward, say_nothing, task=Task(ends_s=frozenset({300})))
+    assert read_extra(rules_of(done, 300))["n_rounds"] == 1
+    assert read_result(done / "models" / "000300.toml")["published"]["rule"] == "likelihood"
+
+
+def test_check_and_inspect_know_the_record(done):
+    """A whole one has no finding, a damaged one does; its rows and its lineage are shown."""
+    path = rules_of(done, 300)
+    assert not [each for each in check_trial(done) if "rules" in str(each)]
+    shown = describe(path)
+    assert "zfcal.rules/1" in str(shown)
+    path.write_bytes(path.read_bytes()[:-20])
+    assert [each for each in check_trial(done) if "000300-rules.parquet" in str(each)]
+
+
+@pytest.mark.parametrize("champion", ["score", "likely"])
+def test_a_trial_that_was_made_before_keeps_its_way(trial, forward, heard, champion):
+    """It has nothing to do, and no record of rules comes."""
+    settings = dataclasses.replace(forward.settings, champion=champion)
+    calibrate(trial, dataclasses.replace(forward, settings=settings), say_nothing)
+    calibrate(trial, dataclasses.replace(forward, keeps_way=True), heard.append)
+    assert made_of(heard) == {}
+    assert sum(isinstance(event, UpToDate) for event in heard) == 12
+    assert not list((trial / "scores").glob("*-rules.parquet"))
+
+
+def test_a_fresh_trial_publishes_by_the_rule_that_leads(trial, done, forward, read_all):
+    """Where nothing says otherwise."""
+    settings = dataclasses.replace(forward.settings, champion="score")
+    unasked = dataclasses.replace(forward, settings=settings, keeps_way=True)
+    for end in ENDS:
+        calibrate(trial, unasked, say_nothing, task=Task(ends_s=frozenset({end})))
+    assert read_all(trial) == read_all(done)
+
+
+def test_each_round_says_one_line(trial, forward, heard):
+    """What was published, by which rule, what it is worth, and the rules so far, best first."""
+    calibrate(trial, forward, heard.append)
+    texts = [event.text for event in heard if isinstance(event, Note)]
+    lines = [text for text in texts if "publishes" in text]
+    assert len(lines) == 4
+    assert lines[0].startswith(
+        "Window to 120 s: publishes the window's likelihood estimate (rule likelihood: no window "
+        "has followed a model yet). S 0."
+    )
+    assert "Forward S" not in lines[1]
+    results = [event.value for event in heard if isinstance(event, Result)]
+    listed = lines[3].split("Forward S so far: ")[1].rstrip(".").split(", ")
+    wanted = [f"{rule} {mean:.3f}" for rule, mean in results[3]["forward"].items()]
+    assert listed == wanted
+    assert sorted(results[3]["forward"].values(), reverse=True) == list(
+        results[3]["forward"].values()
+    )
+    assert results[3]["rule"] == results[3]["published"]["rule"]
+    assert results[0]["forward"] is None
+    for value, line in zip(results, lines, strict=True):
+        assert value["above_ceiling"] is (value["S"] > value["ceiling_high"])
+        assert ("it fits chance" in line) is value["above_ceiling"]
+
+
+def test_a_round_that_judges_none_says_its_line_too(trial, quick, heard):
+    """By its score, with the ceiling; there is no rule to list."""
+    calibrate(trial, quick, heard.append, task=Task(ends_s=frozenset({120})))
+    (line,) = [event.text for event in heard if isinstance(event, Note)]
+    assert line.startswith("Window to 120 s: publishes the window's best by its score. S ")
+    (value,) = [event.value for event in heard if isinstance(event, Result)]
+    assert (value["rule"], value["forward"], "published" in value) == ("score", None, False)
+
+
+@pytest.mark.parametrize("kind", ["rounds", "window"])
+def test_the_estimate_is_a_part_of_the_budget(trial, forward, tmp_path, monkeypatch, kind):
+    """The search gets what is left of it, in a round and in one pooled window."""
+    settings = dataclasses.replace(forward.settings, generations=None, champion="score")
+    options = dataclasses.replace(forward, settings=settings, budget_s=30.0)
+    span = Span(train_s=(0, 120), output=tmp_path / "one.toml")
+    module, work = {
+        "rounds": (calibrate_module, calibrate),
+        "window": (holdout, lambda root, *given: calibrate_span(root, span, *given)),
+    }[kind]
+
+    def slow(*_):
+        time.sleep(0.3)
+
+    def search(_task, given, *_, **__):
+        raise Killed(given.budget_s)
+
+    monkeypatch.setattr(module, "estimate", slow)
+    monkeypatch.setattr(module, "run_search", search)
+    with pytest.raises(Killed) as caught:
+        work(trial, options, say_nothing)
+    assert 20.0 < caught.value.args[0] <= 29.7

@@ -1,0 +1,72 @@
+"""What a round tells those who look on: what was published, by which rule, and what it is worth."""
+
+from __future__ import annotations
+
+import math
+
+from zfcal.artifacts.lineage import JSON
+from zfcal.calibrate.rounds import RoundResult
+from zfcal.calibrate.rules import SAYS
+from zfcal.stages.events import Note
+
+
+def fits_chance(result: RoundResult) -> bool:
+    """Return whether a model scores more than windows of its own do: then it fits chance too."""
+    _, _, high = result.ceiling.overall
+    return bool(result.scores.overall > high)
+
+
+def standing(result: RoundResult) -> dict[str, float]:
+    """Return the mean forward S of each rule so far, best first; empty where none are judged."""
+    means = {} if result.handed is None else result.handed.record.means()
+    return dict(sorted(means.items(), key=lambda pair: -pair[1]))
+
+
+def published_fields(result: RoundResult) -> dict[str, JSON]:
+    """Return what the results of a round say of the model that it publishes."""
+    return {
+        "rule": result.rule,
+        "above_ceiling": fits_chance(result),
+        "forward": dict[str, JSON](standing(result)) or None,
+    }
+
+
+def published_note(result: RoundResult, end_s: int) -> Note:
+    """Return one line for those who look on.
+
+    Parameters
+    ----------
+    result
+        Of the round.
+    end_s
+        End of its window.
+    """
+    parts = [f"Window to {end_s} s: publishes {_what(result, end_s)}.", _worth(result)]
+    if means := standing(result):
+        listed = ", ".join(f"{rule} {mean:.3f}" for rule, mean in means.items())
+        parts.append(f"Forward S so far: {listed}.")
+    return Note(text=" ".join(parts))
+
+
+def _what(result: RoundResult, end_s: int) -> str:
+    what = SAYS[result.rule]
+    if result.handed is None:
+        return what
+    in_use = result.handed.record.in_use
+    if in_use is not None and in_use.of_s != end_s:
+        what = f"{what}, of the window to {in_use.of_s} s"
+    return f"{what} (rule {result.rule}: {result.handed.choice.because})"
+
+
+def _worth(result: RoundResult) -> str:
+    mean, low, high = result.ceiling.overall
+    name = "S" if result.scores.named is None else "The score"
+    score = f"{name} {_three(result.scores.overall)}"
+    band = f"{_three(low)} to {_three(high)}"
+    if fits_chance(result):
+        return f"{score} is above the band of its ceiling, {_three(mean)} ({band}): it fits chance."
+    return f"{score}, ceiling {_three(mean)} ({band})."
+
+
+def _three(value: float) -> str:
+    return "unknown" if math.isnan(value) else f"{value:.3f}"
