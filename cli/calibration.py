@@ -98,7 +98,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         runs=options["runs"],
         steps=options["steps"],
         optimiser=options["optimiser"],
-        champion=CHAMPIONS[_publish(options) or "score"],
+        champion=CHAMPIONS[published_by(options) or "score"],
         features=options.get("features", SCORED),
     )
     if options.get("cluster") is not None and further(settings.features):
@@ -111,7 +111,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         baselines=options["baselines"],
         seed_likelihood=options["seed_likelihood"],
         model=options["model"],
-        keeps_way=_publish(options) is None and options["window"] is None,
+        keeps_way=published_by(options) is None and options["window"] is None,
     )
 
     def task(ends_s: frozenset[int] | None) -> Task:
@@ -129,7 +129,8 @@ CHAMPIONS: dict[str, Any] = {
 """What `zfcal.calibrate.task.Settings` calls each way to publish."""
 
 
-def _publish(options: Mapping[str, Any]) -> str | None:
+def published_by(options: Mapping[str, Any]) -> str | None:
+    """Return who hands models on, by the option's name or its older one; None where unsaid."""
     if options["publish"] and options["champion"]:
         raise click.UsageError("--publish and --champion say the same: give one.")
     found: str | None = options["publish"] or options["champion"]
@@ -139,7 +140,7 @@ def _publish(options: Mapping[str, Any]) -> str | None:
 def _check_together(options: Mapping[str, Any]) -> None:
     if options["generations"] is not None and options["budget_s"] is not None:
         raise click.UsageError("A round ends after --generations or with its --budget: give one.")
-    publish = _publish(options)
+    publish = published_by(options)
     if publish in {"likely", "likelihood"} and not options["seed_likelihood"]:
         raise click.UsageError(
             "--publish likelihood is the estimate, which --no-seed-likelihood omits."

@@ -11,8 +11,8 @@ from .durations import seconds
 from .options import POSITIVE, Command, FiniteRange, adds
 
 _PRESENT = (
-    "real_time", "no_video", "duration_s", "generations", "champion", "budget_s", "robot", "seed",
-    "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
+    "real_time", "no_video", "duration_s", "generations", "publish", "champion", "budget_s",
+    "robot", "seed", "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
 )  # fmt: skip
 
 _FLAGS = {name: f"--{name.replace('_', '-')}" for name in _PRESENT} | {
@@ -42,9 +42,15 @@ _OPTIONS = adds(
     ),
     click.option("--generations", type=click.IntRange(min=0), help="Of a round.  [default: 30]"),
     click.option(
+        "--publish",
+        type=click.Choice(["forward", "score", "likelihood"]),
+        help="Which model of a round drives the robot.  [default: likelihood]",
+    ),
+    click.option(
         "--champion",
-        type=click.Choice(["score", "likely"]),
-        help="Which model of a round drives the robot.  [default: likely]",
+        type=click.Choice(["score", "likely", "likelihood"]),
+        hidden=True,
+        help="The older name of --publish.",
     ),
     click.option(
         "--swims",

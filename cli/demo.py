@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .calibration import CHAMPIONS, published_by
 from .closed_loop_options import closed_loop_options
 from .options import PLACE, speaks
 from .output import Output
@@ -74,13 +75,15 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
     loop: dict[str, Any] = {
         name: given[name] for name in ("duration_s", "robot", "seed") if name in given
     }
+    published = published_by(asked)
     options = LoopOptions(
         **loop,
         video=not asked["no_video"],
         fish=FishOptions(**fish),
         settings=dataclasses.replace(
             LOOP_SETTINGS,
-            **{name: given[name] for name in ("generations", "champion") if name in given},
+            **{name: given[name] for name in ("generations",) if name in given},
+            **({} if published is None else {"champion": CHAMPIONS[published]}),
         ),
     )
     if asked["real_time"]:

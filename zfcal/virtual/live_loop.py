@@ -98,6 +98,9 @@ def live_loop(
     return root
 
 
+_PUBLISH = {"forward": "forward", "score": "score", "likely": "likelihood"}
+
+
 def _watch_words(experiment: Experiment, budget_s: float, stage: _Tank) -> list[str]:
     options = experiment.options
     words = ["watch", str(experiment.root), "-q"]
@@ -106,7 +109,7 @@ def _watch_words(experiment: Experiment, budget_s: float, stage: _Tank) -> list[
     stages += ["calibrate"] if options.robot == "calibrated" else []
     words += ["--stages", ",".join(stages), "--until-idle", f"{2 * _END_S / 3:g}s"]
     if options.robot == "calibrated":
-        words += ["--budget", f"{budget_s:g}s", "--champion", options.settings.champion]
+        words += ["--budget", f"{budget_s:g}s", "--publish", _PUBLISH[options.settings.champion]]
     if stage.cameras:
         above, under = (camera.url for camera in stage.cameras)
         words += ["--overhead", above, "--below", under]
