@@ -301,11 +301,10 @@ def _search(
     """Search for the model of a window, and go on from a checkpoint where there is one."""
     options, tell = shared.options, shared.run.tell
     began_s = time.monotonic()
-    template, zone_names = shared.group.template, shared.opened.arena.zone_names
+    template = shared.group.template
     estimated = memory = None
     if options.seed_likelihood:
         estimated = estimate(shared.opened, template, _window_span(places.end_s), tell)
-    record = Record() if before.rules is None else read_record(before.rules, zone_names)
     if options.seed_likelihood and options.settings.champion == "forward":
         memory = remembered(shared.opened, template, places.end_s, memory_span(places.end_s))
     round_task = RoundTask(
@@ -315,7 +314,7 @@ def _search(
         seeds=SeedSource(trial_seed=shared.seed, window_end_s=places.end_s),
         previous=_previous(shared, before.population),
         memory=memory,
-        record=record,
+        record=_record(shared, before.rules),
     )
     if options.budget_s is not None:
         # The estimate is a part of the round.
@@ -331,10 +330,24 @@ def _search(
 
 def _previous(shared: _Shared, path: Path | None) -> Previous | None:
     """Return the last population; None where there is none, or its models have other effects."""
-    names = genome_names(shared.group.template)
-    if path is None or read_extra(path).get("gene_names", list(names)) != list(names):
+    if path is None or not _has_these_genes(shared, path):
         return None
     return read_previous(path, shared.options.settings.features)
+
+
+def _record(shared: _Shared, path: Path | None) -> Record:
+    """Return the record of the rules; a new one where its models have other effects."""
+    if path is None:
+        return Record()
+    made = RoundPlaces(root=shared.root, end_s=int(path.name.partition("-")[0]))
+    if is_regular(made.population) and not _has_these_genes(shared, made.population):
+        return Record()
+    return read_record(path, shared.opened.arena.zone_names)
+
+
+def _has_these_genes(shared: _Shared, population: Path) -> bool:
+    names = list(genome_names(shared.group.template))
+    return read_extra(population).get("gene_names", names) == names
 
 
 def _control_or_tell(shared: _Shared, places: RoundPlaces) -> Statistics | None:
