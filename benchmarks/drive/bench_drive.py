@@ -11,12 +11,14 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import statistics
 import subprocess
 import sys
 import tempfile
 import textwrap
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +26,20 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from benchmarks.shared.measuring import load, machine, table
 from benchmarks.shared.regressions import Ratio, conclude, parser
+from zfcal.arrays import Floats
 from zfcal.artifacts.lineage import Lineage
-from zfcal.artifacts.models import read_model
+from zfcal.artifacts.models import read_model, write_model
 from zfcal.artifacts.pose_files import PoseWriter
 from zfcal.artifacts.pose_messages import POSES
+from zfcal.drive.models import DriveModels
+from zfcal.drive.pilot import Manner, Pilot
 from zfcal.model.simulate import simulate_tracks
+from zfcal.robot.fishbot import FishBot
 from zfcal.stages.trial_context import open_trial
 from zfcal.tracks import FISH, ROBOT, AgentPose, FramePoses
 
 TARGET_S = 0.020
+MODEL = "zfcal.model/1"
 FPS = 15
 ZFCAL = (sys.executable, "-m", "zfcal_cli.main")
 CALIBRATE = """
@@ -117,12 +124,73 @@ def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
     }
 
 
+class NoLine:
+    """A line on which nothing is said."""
+
+    is_open, is_guarded, n_opened = False, False, 0
+
+    def write(self, data: bytes) -> bool:  # noqa: ARG002 - a line's signature
+        """Send nothing."""
+        return False
+
+    def read(self) -> bytes:
+        """Hear nothing."""
+        return b""
+
+    def beat(self, until_s: float) -> None:
+        """Tell nobody."""
+
+    def close(self) -> None:
+        """Leave nothing."""
+
+
+EFFECTS: dict[str, dict[str, dict[str, float]]] = {
+    "none": {},
+    "a component (alignment)": {"alignment": {}},
+    "a tilt (turning-bias)": {"turning-bias": {}},
+    "one on speed (crowding)": {"crowding": {}},
+}
+
+
+def cost_of_effects(rounds: int) -> dict[str, float]:
+    """Return the median time of a step of the driver in microseconds, by effect and by turns."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder) / "trial"
+        zfcal("init", root, "--arena", "two-rooms", "--fish", 4, "--robot", "--fps", FPS)
+        opened, own = open_trial(root), read_model(root / "models" / "000000.toml")
+        pilot = Pilot(opened, Manner(), FishBot("F", NoLine()))
+        models = {}
+        for name, effects in EFFECTS.items():
+            path = root / "models" / "extended.toml"
+            write_model(
+                path, replace(own, effects=effects), Lineage(schema=MODEL, command="extend")
+            )
+            models[name] = DriveModels(opened, only=path).first()
+            pilot.warm_up(models[name])
+        xy, heading = simulate_tracks(own, opened.arena, n_agents=5, n_steps=rounds, seed=1)
+    taken: dict[str, list[float]] = {name: [] for name in models}
+    number = 0
+    for at, towards in zip(xy[:rounds], heading[:rounds], strict=True):
+        for name, model in models.items():
+            poses = frame_of(number, at, towards)
+            began_s = time.perf_counter()
+            pilot.see(poses, model)
+            taken[name].append(1e6 * (time.perf_counter() - began_s))
+            number += round(opened.trial.dt_s * FPS)
+    return {name: statistics.median(values) for name, values in taken.items()}
+
+
 def main() -> None:
     """Measure, write, compare."""
     made = parser(__doc__)
     made.add_argument("--seconds", type=int, default=60, help="How long to drive.")
     made.add_argument("--busy", type=int, default=2, help="Workers of the calibration beside it.")
+    made.add_argument("--effects", action="store_true", help="What effects cost, and no more.")
     options = made.parse_args()
+    if options.effects:
+        cost = cost_of_effects(200 if options.tiny else 5000)
+        print(table(("effect", "a step (us)"), [[name, taken] for name, taken in cost.items()]))
+        return
     seconds = 5 if options.tiny else options.seconds
     found = {
         "machine": machine(),
@@ -132,6 +200,22 @@ def main() -> None:
         "latency": measure(seconds, options.busy),
     }
     conclude("drive", found, markdown(found), ratios=ratios, options=options)
+
+
+def frame_of(number: int, xy_m: Floats, heading_rad: Floats) -> FramePoses:
+    """Return a frame of four fish and a robot."""
+    agents = tuple(
+        AgentPose(
+            agent=i,
+            kind=ROBOT if i == 4 else FISH,
+            x_m=float(xy_m[i, 0]),
+            y_m=float(xy_m[i, 1]),
+            heading_rad=math.remainder(float(heading_rad[i]), 2 * math.pi),
+            confidence=1.0,
+        )
+        for i in range(5)
+    )
+    return FramePoses(time_s=number / FPS, frame=number, agents=agents)
 
 
 def write_poses(root: Path, driver: subprocess.Popen[str]) -> None:
@@ -145,23 +229,12 @@ def write_poses(root: Path, driver: subprocess.Popen[str]) -> None:
     while driver.poll() is None:
         k, share = divmod(number, stride)
         at = xy[k] + (xy[k + 1] - xy[k]) * share / stride
-        agents = tuple(
-            AgentPose(
-                agent=i,
-                kind=ROBOT if i == 4 else FISH,
-                x_m=float(at[i, 0]),
-                y_m=float(at[i, 1]),
-                heading_rad=math.remainder(float(heading[k, i]), 2 * math.pi),
-                confidence=1.0,
-            )
-            for i in range(5)
-        )
         if number // (60 * FPS) != minute:
             minute = number // (60 * FPS)
             if writer is not None:
                 writer.close()
             writer = PoseWriter(root / "poses" / f"{60 * minute:06d}.mcap", origin)
-        writer.add(FramePoses(time_s=number / FPS, frame=number, agents=agents))
+        writer.add(frame_of(number, at, heading[k]))
         number += 1
         time.sleep(max(0.0, began_s + number / FPS - time.monotonic()))
 

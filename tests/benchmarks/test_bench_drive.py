@@ -1,5 +1,8 @@
 """The benchmarks of the driver and of the closed loop, each run small."""
 
+import subprocess
+import sys
+
 import pytest
 
 
@@ -9,6 +12,16 @@ def test_the_benchmark_of_the_driver_runs(tiny):
     found, text = tiny("drive/bench_drive.py")
     assert set(found["latency"]) >= {"pose_to_state_s", "tick_to_byte_s"}
     assert "| pose written to state | " in text
+
+
+def test_the_cost_of_effects_is_measured(repository):
+    """A step without any, and with each of three kinds."""
+    script = repository / "benchmarks" / "drive" / "bench_drive.py"
+    done = subprocess.run(
+        [sys.executable, script, "--effects", "--tiny"], capture_output=True, text=True, check=True
+    )
+    for name in ("none", "alignment", "turning-bias", "crowding"):
+        assert name in done.stdout
 
 
 @pytest.mark.slow

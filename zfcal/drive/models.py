@@ -13,6 +13,7 @@ from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of, one_content, read_bytes
 from zfcal.drive.pilot import InForce
 from zfcal.errors import InputError, ZfcalError
+from zfcal.model.effects.genome import check_effects
 from zfcal.model.packing import pack
 from zfcal.stages.trial_context import OpenTrial
 
@@ -45,7 +46,7 @@ class DriveModels:
         self._force: InForce | None = None
         self._known: tuple[int, Looks] | None = None
         self._bad: dict[Path, Looks | None] = {}
-        self.problem = ""
+        self.problem = self._hint = ""
 
     def first(self) -> InForce:
         """Return the model to begin with.
@@ -61,7 +62,7 @@ class DriveModels:
         if self._only is not None:
             raise InputError(
                 self.problem or f"{self._only}: cannot be read.",
-                hint="Name a model file of this trial's arena and step.",
+                hint=self._hint or "Name a model file of this trial's arena and step.",
             )
         raise InputError(
             self.problem or f"{self._folder}: holds no numbered model.",
@@ -118,6 +119,7 @@ class DriveModels:
             with one_content():
                 data = read_bytes(path)
                 model = read_model_for(path, opened.arena, dt_s=opened.trial.dt_s)
+            check_effects(model, of=path)
             packed = pack([model], opened.arena)
         except ZfcalError as error:
             self._note(error)
@@ -132,6 +134,7 @@ class DriveModels:
 
     def _note(self, error: ZfcalError) -> None:
         self.problem = f"{self.problem} {error}".lstrip()
+        self._hint = error.hint
 
 
 def _looks_of(path: Path) -> Looks | None:

@@ -101,7 +101,9 @@ def fit(scene: Scene, template: Parameters) -> Fit:
         interval |= _intervals(x, _information(x, turns, found.view), zone, names)
         lapse[zone] = float(x[-1])
     spans = {name: _span(name) for name in interval}
-    for (name, key), variance in zip(free, np.diag(found.covariance), strict=True):
+    told = (found.effect_scores**2).sum(axis=0) > _NO_INFORMATION
+    variances = np.where(told, np.diag(found.covariance), math.inf)
+    for (name, key), variance in zip(free, variances, strict=True):
         low, high = bounds_of(name, key)
         half = _QUANTILE * math.sqrt(variance) if variance > 0 else math.inf
         value = found.parameters.effects[name][key]

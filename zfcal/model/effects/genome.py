@@ -40,6 +40,27 @@ def spelt_out(template: Parameters) -> Parameters:
     )
 
 
+def check_effects(parameters: Parameters, *, of: object) -> None:
+    """Refuse a model that has an effect which there is not, or a parameter out of its bounds.
+
+    Parameters
+    ----------
+    parameters
+        The model.
+    of
+        Where it stands, for the message.
+
+    Raises
+    ------
+    InputError
+        What is wrong, and where.
+    """
+    try:
+        spelt_out(parameters)
+    except InputError as error:
+        raise InputError(f"{of}: {error}", hint=error.hint) from error
+
+
 def genome_length(template: Parameters) -> int:
     """Return the number of genes of a model with its effects."""
     return n_genes(len(template.zones)) + len(template.effects)
@@ -117,7 +138,9 @@ def with_strengths(template: Parameters, genes: Floats) -> Parameters:
     effects = dict(template.effects)
     for gene, (name, key) in zip(genes, strengths_of(template) if len(genes) else (), strict=True):
         low, high = _range(name, key)
-        effects[name] = {**effects[name], key: float(low + gene * (high - low))}
+        # Rounding can push the end of a range just past the bound.
+        value = min(max(float(low + gene * (high - low)), low), high)
+        effects[name] = {**effects[name], key: value}
     return dataclasses.replace(template, effects=effects)
 
 

@@ -27,7 +27,7 @@ from zfcal.calibrate.rules import Record
 from zfcal.calibrate.task import Previous
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
-from zfcal.model.effects.genome import genome_names
+from zfcal.model.effects.genome import check_effects, genome_names
 from zfcal.stages.calibrate.likelihood import estimate, memory_span, remembered
 from zfcal.stages.calibrate.record import read_record
 from zfcal.stages.calibrate.rounds import (
@@ -201,8 +201,9 @@ def _as_before(root: Path, options: CalibrateOptions) -> CalibrateOptions:
 
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
     """Return the trial's agents, driven by the model to calibrate, where they are simulated."""
-    trial = opened.trial
-    template = read_model_for(options.model_of(trial), opened.arena, dt_s=trial.dt_s)
+    trial, path = opened.trial, options.model_of(opened.trial)
+    template = read_model_for(path, opened.arena, dt_s=trial.dt_s)
+    check_effects(template, of=path)
     group = Group(
         arena=opened.arena,
         template=template,

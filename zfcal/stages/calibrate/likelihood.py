@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.artifacts.lineage import JSON
@@ -18,7 +19,7 @@ from zfcal.model.effects import find_effect
 from zfcal.model.effects.genome import genome_names, genome_ranges, strengths_of, to_genome
 from zfcal.model.extended import bounds_of, maximise, with_effect
 from zfcal.model.likelihood import IDENTIFIED, Fit, fit
-from zfcal.model.scene import Scene, make_scene, thin
+from zfcal.model.scene import Moves, Scene, make_scene, thin
 from zfcal.parameters import Parameters
 from zfcal.stages.events import Event, LeftOut, Note, Tell, say_nothing
 from zfcal.stages.segments import segment_files
@@ -140,7 +141,8 @@ def remembered(
     """
     try:
         scene = make_scene(read_stretch(opened, span_s, say_nothing).samples, opened.arena)
-        found = fit(_faded(scene, end_s - LENGTH_S), template)
+        faded = _faded(scene, end_s - LENGTH_S)
+        found = _with_speeds(faded, fit(faded, template))
     except InputError:
         return None
     return to_genome(found.parameters) if math.isfinite(found.nats_per_step) else None
@@ -156,13 +158,13 @@ def _faded(scene: Scene, until_s: float) -> Scene:
 
     Which are left out is spread evenly, by multiples of the golden ratio.
     """
-    age_s = np.maximum(until_s - scene.time_s(scene.turns), 0.0)
-    spread = np.modf(np.arange(len(age_s)) * _GOLDEN)[0]
-    return thin(
-        scene,
-        spread < np.exp2(-age_s / HALF_LIFE_S),
-        np.ones(len(scene.moves), dtype=bool),
-    )
+
+    def kept(steps: Moves) -> NDArray[np.bool_]:
+        age_s = np.maximum(until_s - scene.time_s(steps), 0.0)
+        spread = np.modf(np.arange(len(age_s)) * _GOLDEN)[0]
+        return np.asarray(spread < np.exp2(-age_s / HALF_LIFE_S))
+
+    return thin(scene, kept(scene.turns), kept(scene.moves))
 
 
 def _with_speeds(scene: Scene, found: Fit) -> Fit:
