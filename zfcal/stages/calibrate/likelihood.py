@@ -140,7 +140,7 @@ def remembered(
     """
     try:
         scene = make_scene(read_stretch(opened, span_s, say_nothing).samples, opened.arena)
-        found = fit(_faded(scene, end_s - LENGTH_S), template)
+        found = fit(_faded(scene, end_s - LENGTH_S), template, level=None)
     except InputError:
         return None
     return to_genome(found.parameters) if math.isfinite(found.nats_per_step) else None
