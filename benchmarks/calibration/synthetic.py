@@ -95,7 +95,7 @@ def make_window(name: str, seed: int, *, n_workers: int) -> Window:
     truth = truth_of(name, template)
     xy_m, _ = simulate_tracks(truth, arena, n_agents=N_FISH + 1, n_steps=n_steps, seed=seed)
     cuts = [xy_m[:WINDOW_STEPS], xy_m[WINDOW_STEPS : 2 * WINDOW_STEPS], xy_m[2 * WINDOW_STEPS :]]
-    before, now, after = (_samples(part) for part in cuts)
+    before, now, after = (samples_of(part) for part in cuts)
     group = Group(arena=arena, template=template, n_fish=N_FISH, n_robots=1, n_workers=n_workers)
 
     def task(samples: Samples, end_s: int) -> Task:
@@ -116,7 +116,8 @@ def make_window(name: str, seed: int, *, n_workers: int) -> Window:
     )
 
 
-def _samples(xy_m: np.ndarray) -> Samples:
+def samples_of(xy_m: np.ndarray) -> Samples:
+    """Return positions of four fish, and of robots after them, as samples."""
     n, agents = xy_m.shape[:2]
     return Samples(
         dt_s=DT_S,

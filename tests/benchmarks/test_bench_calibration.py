@@ -2,7 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
+
+from zfcal.parameters import to_genes
 
 
 @pytest.mark.slow
@@ -20,6 +23,45 @@ def test_the_benchmark_of_a_cluster_runs(tiny):
     found, text = tiny("calibration/bench_cluster.py")
     assert {"cluster, 1 worker", "cluster, 2 workers"} <= set(found["places"])
     assert "All places counted the same, bit for bit." in text
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_coverage_runs(tiny):
+    """Two kinds of intervals of each kind of parameter, and of gammas once more."""
+    found, text = tiny("calibration/bench_coverage.py")
+    assert set(found["kinds"]) == {"kappa_0", "kappa_f", "alpha", "gamma"}
+    assert text.count("| by profile |") == text.count("| symmetric |") == 4 + 1
+    for one in found["kinds"].values():
+        held = one["profile"]["held"]
+        assert sorted(held) == held
+        assert held[-1] <= one["n"]
+
+
+def test_a_share_has_its_binomial_interval(script):
+    """None of ten: up to 1 - 0.025 ** 0.1."""
+    share_and_ends = script("calibration.bench_coverage").share_and_ends
+    assert share_and_ends(0, 10) == pytest.approx((0.0, 0.0, 1 - 0.025**0.1))
+    assert share_and_ends(10, 10) == pytest.approx((1.0, 0.025**0.1, 1.0))
+
+
+def test_committed_intervals_hold_the_truth_as_often_as_they_say(script, repository):
+    """At 95 %, of each kind of parameter, over two hundred trials or more."""
+    path = repository / "benchmarks" / "results" / "coverage.json"
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert found["trials"] >= 200
+    for one in (*found["kinds"].values(), found["gamma_below_the_largest"]):
+        _, low, high = one["profile"]["shares"][-1]
+        assert high >= 0.95
+        assert low <= 0.98
+
+
+def test_truths_of_coverage_lie_within_what_a_genome_can_hold(script):
+    """And are spread by 0.3 in their logs, where the bound does not cut them off."""
+    coverage = script("calibration.bench_coverage")
+    _, template = script("calibration.synthetic").two_rooms()
+    genes = [to_genes(coverage.truth_of(seed, template)) for seed in range(400)]
+    assert max(map(max, genes)) <= 1.0
+    assert np.log([each[0] for each in genes]).std() == pytest.approx(0.3, rel=0.2)
 
 
 @pytest.mark.slow

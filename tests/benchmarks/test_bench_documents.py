@@ -8,6 +8,7 @@ import pytest
 COMMITTED = {
     "calibration.bench_calibration": "calibration.bench_calibration",
     "calibration.bench_cluster": "calibration.bench_cluster",
+    "calibration.bench_coverage": "calibration.bench_coverage",
     "calibration.bench_main_job": "calibration.bench_main_job",
     "calibration.bench_optimisers": "calibration.optimisers_document",
     "calibration.bench_rounds": "calibration.rounds_document",

@@ -1,8 +1,11 @@
 """The tables of the page."""
 
+from dataclasses import replace
+
 from zfcal.artifacts.lineage import Lineage
+from zfcal.report.figures.rules import rules_picture
 from zfcal.report.numbers import lineage_table, tables, trials_table
-from zfcal.report.views import MODEL, Integration, Source
+from zfcal.report.views import MODEL, Integration, Mark, Published, RuleScore, Source
 
 
 def table_of(view, name):
@@ -78,3 +81,20 @@ def test_a_trial_without_anything_has_a_row_of_dashes(make_view):
     empty = make_view(courses={}, integration=Integration(start_s=0, end_s=0), seen=None)
 
     assert trials_table([empty]).rows[0] == ["trial", "0.0", "0", *"–" * 6]
+
+
+def test_rules_have_their_mean_forward_score_and_how_often_they_published(make_view):
+    """0.7 and 0.8 are 0.75 on the average; a trial without rules has neither table."""
+    view = make_view()
+    scores = [
+        RuleScore(rule="score", end_s=end, made_at_s=end - 120, score=Mark(value=value))
+        for end, value in ((240, 0.7), (300, 0.8))
+    ]
+    last = replace(view.rounds[-1], published=Published(rule="score", because="so", of_s=240))
+    judged = replace(view, rule_scores=scores, rounds=[*view.rounds[:-1], last])
+
+    assert table_of(judged, "rules-by-score").rows == [["score", "2", "0.750", "0.071", "1"]]
+    assert table_of(judged, "published").rows == [[str(last.second), "score", "240", "so"]]
+    assert {"rules-by-score", "published"}.isdisjoint(table.name for table in tables(view))
+    assert rules_picture(judged.rule_scores).panels[0].alt.endswith("score 0.75.")
+    assert rules_picture(view.rule_scores) is None

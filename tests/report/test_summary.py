@@ -254,3 +254,25 @@ def test_trials_that_are_too_short_have_no_common_score(make_view):
     views = [make_view(name, n_windows=2) for name in "ab"]
 
     assert [s.question for s in statements_of_trials(views)] == ["Do the robots move like fish?"]
+
+
+def test_more_than_a_perfect_model_is_overfitting(make_view, course):
+    """Three windows of 0.97 where the ceiling's range ends at 0.9; none of them is praised."""
+    courses = {(MODEL, "S", None): course([0.97] * 3, ceiling=0.8)}
+    said = answer_to(make_view(courses=courses), "Does the model")
+
+    assert "In 3 of 3 windows S lies above it" in said.answer
+    assert "overfitting" in said.answer
+    assert "In 0 of 3 windows S lies where" in said.answer
+    assert said.figure == ("121 %", "of what a perfect model would score: overfitting")
+
+
+def test_a_published_value_outside_the_interval_of_the_likelihood_is_named(make_view):
+    """All intervals are moved below zero but one."""
+    last = make_view().rounds[-1]
+    moved = dict.fromkeys(last.intervals, (-2.0, -1.0)) | {"walls.kappa_0": (0.0, 30.0)}
+    by_likelihood = replace(last, intervals=moved, intervals_by="likelihood")
+    said = answer_to(replace(make_view(), rounds=[by_likelihood]), "Which parameters").answer
+
+    assert "by its likelihood" in said
+    assert "The published values of 17 lie outside their intervals." in said

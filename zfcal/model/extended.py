@@ -58,7 +58,7 @@ WIDE = Bounds(high=(4.0, 4.0, 10.0))
 reads as an effect: the scores of suspects have what the base could explain projected off, and that
 holds at a maximum alone."""
 
-_LOG_GAMMA_SPAN = 7.0
+LOG_GAMMA_SPAN = 7.0
 """An attraction below e^-7 of the largest one is not told from zero."""
 
 _LAPSE = (1e-6, 0.2)
@@ -80,7 +80,7 @@ def start_of(parameters: Parameters, bounds: Bounds = WIDE) -> tuple[Floats, ...
         own = np.array([base, zone.kappa_f, zone.alpha]) / SCALES
         own = np.clip(own, bounds.low, bounds.high)
         gamma = np.array([zone.gamma[name] for name in parameters.zone_names])
-        log_gamma = np.log(np.maximum(gamma / gamma.max(), math.exp(-_LOG_GAMMA_SPAN)))
+        log_gamma = np.log(np.maximum(gamma / gamma.max(), math.exp(-LOG_GAMMA_SPAN)))
         made.append(
             np.concatenate([np.maximum(own, [0.02, 0.02, 0.02]), log_gamma, [_FIRST_LAPSE]])
         )
@@ -317,8 +317,9 @@ def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, f
     return max(found.low, ends[0]), min(found.high, ends[1])
 
 
-def _limits(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floats]:
-    least = np.where(turns.reachable, -_LOG_GAMMA_SPAN, 0.0)
+def limits_of(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floats]:
+    """Return within which a zone's parameters are looked for; a gamma that is told has no top."""
+    least = np.where(turns.reachable, -LOG_GAMMA_SPAN, 0.0)
     low = np.concatenate([bounds.low, least, [_LAPSE[0]]])
     high = np.concatenate([bounds.high, np.full(x.size - 4, np.inf), [_LAPSE[1]]])
     high[3:-1][~turns.reachable] = 0.0
@@ -330,7 +331,7 @@ def _shifted(x: Floats, by: Floats, turns: ZoneTurns, bounds: Bounds) -> Floats:
     moved = x + by
     # A common factor of all gammas is no matter: it goes before the limits, not after.
     moved[3:-1] -= moved[3:-1][turns.reachable].max()
-    return np.clip(moved, *_limits(x, turns, bounds))
+    return np.clip(moved, *limits_of(x, turns, bounds))
 
 
 def _is_better(there: Fitted, here: Fitted) -> bool:
@@ -365,7 +366,7 @@ def _directions(
     open_ = np.diag(information) > 1e-12
     at = 0
     for x, turns in zip(here.x, here.turns, strict=True):
-        low, high = _limits(x, turns, bounds)
+        low, high = limits_of(x, turns, bounds)
         pushed = ((x <= low) & (slope[at : at + x.size] < 0)) | (
             (x >= high) & (slope[at : at + x.size] > 0)
         )

@@ -20,7 +20,7 @@ from zfcal.artifacts.models import read_model_for, read_result
 from zfcal.artifacts.reading.contents import numbered_of, open_regular
 from zfcal.artifacts.segments import read_segment, segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import SCORES, STATS, read_extra, read_table
+from zfcal.artifacts.tables import RULES, SCORES, STATS, read_extra, read_table
 from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
@@ -28,7 +28,16 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
-from zfcal.report.views import Course, CourseKey, Mark, Round, Source, TrialView
+from zfcal.report.views import (
+    Course,
+    CourseKey,
+    Mark,
+    Published,
+    Round,
+    RuleScore,
+    Source,
+    TrialView,
+)
 from zfcal.trial import Trial
 
 Damage = Callable[[DamagedError], None]
@@ -43,6 +52,7 @@ _ENDINGS = (
     ("stats", ".parquet"),
     ("scores", ".parquet"),
     ("scores", "-model.parquet"),
+    ("scores", "-rules.parquet"),
     ("models", ".toml"),
 )
 
@@ -145,6 +155,7 @@ def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
             courses, seen, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
         ),
         sources=list(_sources(reader)),
+        rule_scores=_rule_scores(reader),
         left_out=list(reader.damaged.values()),
         scoring=str(scored.get("scoring", "paper")),
         has_control_trials="control" in scored,
@@ -225,8 +236,43 @@ def _round(reader: _Reader, second: int, path: Path) -> Round | None:
         parameters=model,
         intervals={name: (float(row["low"]), float(row["high"])) for name, row in known.items()},
         unidentified=frozenset(name for name, row in known.items() if not row["identified"]),
+        intervals_by=str(result.get("intervals", {}).get("by", "score")),
+        published=_published(result.get("published")),
         score=score,
         score_of=names,
+    )
+
+
+def _published(said: Any) -> Published | None:
+    """Return why a model was published; None where its file does not say."""
+    if not isinstance(said, dict) or "rule" not in said:
+        return None
+    of_s = said.get("of_window_end_s")
+    return Published(
+        rule=str(said["rule"]),
+        because=str(said.get("because", "")),
+        of_s=of_s if isinstance(of_s, int) else None,
+    )
+
+
+def _rule_scores(reader: _Reader) -> tuple[RuleScore, ...]:
+    """Return the forward scores of all rules: the newest record that can be read has them all."""
+    for _, path in reversed(reader.files("scores", "-rules.parquet")):
+        table = reader.attempt(path, lambda p: read_table(p, RULES))
+        if table is not None:
+            return tuple(map(_rule_score, table.to_pylist()))
+    return ()
+
+
+def _rule_score(row: Mapping[str, Any]) -> RuleScore:
+    value, low, high = (
+        float("nan") if row[key] is None else float(row[key]) for key in ("S", "low", "high")
+    )
+    return RuleScore(
+        rule=row["rule"],
+        end_s=row["window_end_s"],
+        made_at_s=row["made_at_s"],
+        score=Mark(value=value, low=low, high=high),
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.artifacts.lineage import to_json
-from zfcal.report.figures.parameters import values_of
+from zfcal.report.figures.parameters import outside_of, values_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _COMPARED = {
@@ -62,6 +62,8 @@ def tables(view: TrialView) -> list[Table]:
         _scores(view),
         _scores_by_zone(view),
         _windows(view),
+        _published(view),
+        _rules(view),
         _parameters(view),
         lineage_table([view]),
     )
@@ -195,21 +197,75 @@ def _windows(view: TrialView) -> Table:
 def _parameters(view: TrialView) -> Table:
     last = view.calibrated
     rows = []
+    by_likelihood = last is not None and last.intervals_by == "likelihood"
     if last is not None:
+        outside = outside_of(last)
         for name, value in values_of(last).items():
             low, high = last.intervals.get(name, (math.nan, math.nan))
             interval = NONE if math.isnan(low) else f"{low:.3g} to {high:.3g}"
+            interval += " (value outside)" if name in outside else ""
             known = "no" if name in last.unidentified else "yes" if last.intervals else NONE
             rows.append([name, f"{value:.3g}", interval, known])
     return Table(
         name="parameter-values",
         title="Parameters of the last round",
-        heads=("parameter", "value", "values that fit as well", "identified"),
+        heads=(
+            "parameter",
+            "value",
+            "95 % interval" if by_likelihood else "values that fit as well",
+            "identified",
+        ),
         rows=rows,
         numbers=(1,),
         folded=f"{len(rows)} parameters",
-        note="The interval spans 95 % of the genomes of the round that agree with the window as "
+        note="The interval is that of the window's likelihood, whichever model was published; the "
+        "value is the published one. A parameter is identified where the interval is short."
+        if by_likelihood
+        else "The interval spans 95 % of the genomes of the round that agree with the window as "
         "well as the champion does.",
+    )
+
+
+def _published(view: TrialView) -> Table:
+    """Return a row per round whose file says by which rule its model was published."""
+    rows = [
+        [
+            str(each.second),
+            each.published.rule,
+            NONE if each.published.of_s is None else str(each.published.of_s),
+            each.published.because,
+        ]
+        for each in view.rounds
+        if each.published is not None
+    ]
+    return Table(
+        name="published",
+        title="Published models",
+        heads=("end (s)", "rule", "made of the window to (s)", "because"),
+        rows=rows,
+        numbers=(0, 2),
+        wide=(3,),
+        folded="1 model" if len(rows) == 1 else f"{len(rows)} models",
+        note="Which model the robot was given at the end of each window, and by which rule.",
+    )
+
+
+def _rules(view: TrialView) -> Table:
+    rules = dict.fromkeys(each.rule for each in view.rule_scores)
+    rows = []
+    for rule in rules:
+        scores = [each.score.value for each in view.rule_scores if each.rule == rule]
+        mean, sd = mean_and_sd(scores)
+        n = sum(not math.isnan(score) for score in scores)
+        uses = sum(r.published is not None and r.published.rule == rule for r in view.rounds)
+        rows.append([rule, str(n), number(mean), number(sd), str(uses)])
+    return Table(
+        name="rules-by-score",
+        title="Forward score of each rule",
+        heads=("rule", "windows", "mean S", "standard deviation", "has published"),
+        rows=rows,
+        numbers=(1, 2, 3, 4),
+        note="S of the models that the rule made, or would have made, on the first window after.",
     )
 
 

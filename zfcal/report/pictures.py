@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from zfcal.report.figures.arena import arena_picture
 from zfcal.report.figures.panels import Picture
 from zfcal.report.figures.parameters import parameters_picture
+from zfcal.report.figures.rules import rules_picture
 from zfcal.report.figures.scores import scores_picture
 from zfcal.report.figures.statistics import statistics_picture
 from zfcal.report.figures.tracks import tracks_picture
@@ -20,6 +21,7 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
     """Return the pictures that a trial has the artifacts for; the arena always."""
     made = (
         *_scores([view]),
+        rules_picture(view.rule_scores),
         _statistics(view),
         parameters_picture(view.rounds),
         None if view.seen is None else tracks_picture(view.seen),

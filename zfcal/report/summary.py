@@ -15,9 +15,10 @@ from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.contents import Statement
+from zfcal.report.figures.parameters import outside_of
 from zfcal.report.figures.statistics import histogram_mean
 from zfcal.report.integration import NOT_COMPARED
-from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Mark, TrialView
+from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _NEAR = 0.97
 """Nearer to the ceiling than this, a part of the robot's score is not named."""
@@ -30,6 +31,11 @@ _NOTHING = 0.005
 """A score that is printed as 0.00 or below it."""
 
 _FEW = 4
+
+_OF_PERFECT = "of what a perfect model would score"
+_TOO_MUCH = ": overfitting"
+OVERFITTING = "the model fits what happened there by chance as well (overfitting)"
+"""What it means to score more than a perfect model does."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,15 +118,20 @@ def _model(view: TrialView) -> Statement | None:
         return None
     known = ~np.isnan(course.value)
     mean, last, n = course.mean(), course.mark(course.last), int(known.sum())
-    within = int((course.value[known] >= course.low[known]).sum())
+    above, within = _against_band(course)
+    reaches = (
+        f"It reaches {_percent(mean)} of its ceiling."
+        if not _is_above(mean)
+        else f"That is {_percent(mean)} of its ceiling, and above the range of a perfect model."
+    )
     parts = [
         f"Over {_windows(n)} the calibrated model scores S = {mean.value:.2f}; a perfect model "
         f"would score {mean.ceiling:.2f}, since windows of two minutes are too short for two of "
-        f"them to be alike. It reaches {_percent(mean)} of its ceiling."
+        f"them to be alike. {reaches}"
         if n > 1
         else f"In the only window the calibrated model scores S = {mean.value:.2f}; a perfect "
         f"model would score {mean.ceiling:.2f} (95 % of its windows between {mean.low:.2f} and "
-        f"{mean.high:.2f}). It reaches {_percent(mean)} of its ceiling."
+        f"{mean.high:.2f}). {reaches}"
     ]
     if n > 1:
         parts.append(
@@ -129,17 +140,32 @@ def _model(view: TrialView) -> Statement | None:
         )
     if n > 1 and not np.isnan(course.low[known]).all():
         parts.append(
-            f"In {within} of {_windows(n)} S is no lower than where 95 % of a perfect model's own "
-            "windows lie: there the score alone gives no reason to doubt the model."
+            f"In {within} of {_windows(n)} S lies where 95 % of a perfect model's own windows "
+            "lie: there the score alone gives no reason to doubt the model."
         )
     elif within:
         parts.append("The score alone gives no reason to doubt the model.")
+    if above:
+        parts.append(f"In {above} of {_windows(n)} S lies above it: {OVERFITTING}.")
     parts.extend(_hidden(view))
     return Statement(
         question="Does the model behave like these fish?",
         answer=" ".join(parts),
-        figure=(_percent(mean), "of what a perfect model would score"),
+        figure=(_percent(mean), _OF_PERFECT + (_TOO_MUCH if _is_above(mean) else "")),
     )
+
+
+def _against_band(course: Course) -> tuple[int, int]:
+    """Return in how many windows a score is above the ceiling's range, and in how many within."""
+    known = ~(np.isnan(course.value) | np.isnan(course.low))
+    value, low, high = course.value[known], course.low[known], course.high[known]
+    above = value > np.where(np.isnan(high), np.inf, high)
+    return int(above.sum()), int((~above & (value >= low)).sum())
+
+
+def _is_above(mark: Mark) -> bool:
+    """Return whether a score is higher than what chance gives a perfect model."""
+    return mark.value > mark.high
 
 
 def _named(view: TrialView) -> Statement | None:
@@ -152,9 +178,10 @@ def _named(view: TrialView) -> Statement | None:
         question="What was the model calibrated on?",
         answer=f"On the score of {', '.join(last.score_of)}, which is not S and not to be "
         f"compared with it. In the last window it is {mark.value:.2f}; a perfect model would score "
-        f"{mark.ceiling:.2f} (95 % of its windows between {mark.low:.2f} and {mark.high:.2f}). S "
-        "above is of D, W, O and T alone, and was not optimised.",
-        figure=(_percent(mark), "of what a perfect model would score"),
+        f"{mark.ceiling:.2f} (95 % of its windows between {mark.low:.2f} and {mark.high:.2f}). "
+        + (f"It lies above these: {OVERFITTING}. " if _is_above(mark) else "")
+        + "S above is of D, W, O and T alone, and was not optimised.",
+        figure=(_percent(mark), _OF_PERFECT + (_TOO_MUCH if _is_above(mark) else "")),
     )
 
 
@@ -327,11 +354,13 @@ def _parameters(view: TrialView) -> Statement | None:
         answer += f" ({', '.join(few)})"
     elif unknown and len(unknown) <= _FEW:
         answer += f" (not {', '.join(unknown)})"
-    answer += (
-        ". Of the others many values fit as well: do not read a meaning into them."
-        if unknown
-        else "."
-    )
+    answer += ", by its likelihood." if last.intervals_by == "likelihood" else "."
+    if unknown:
+        answer += " Of the others many values fit as well: do not read a meaning into them."
+    outside = sorted(outside_of(last))
+    if outside:
+        named_ = f" ({', '.join(outside)})" if len(outside) <= _FEW else ""
+        answer += f" The published values of {len(outside)}{named_} lie outside their intervals."
     return Statement(
         question="Which parameters do the data pin down?",
         answer=answer,

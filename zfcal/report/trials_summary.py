@@ -9,7 +9,7 @@ import numpy as np
 
 from zfcal.report.contents import Statement
 from zfcal.report.numbers import mean_and_sd
-from zfcal.report.summary import Gap, gaps
+from zfcal.report.summary import OVERFITTING, Gap, gaps
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
 
@@ -37,11 +37,14 @@ def _models(views: Sequence[TrialView]) -> Statement | None:
         return None
     value, ceiling = (_spread([getattr(m, part) for m in known]) for part in ("value", "ceiling"))
     share = [mark.against_ceiling for mark in known if not math.isnan(mark.against_ceiling)]
+    above = sum(mark.value > mark.high for mark in known)
+    more = f" In {above} of them it lies above the range of a perfect model: {OVERFITTING}."
     return Statement(
         question="Do the models behave like the fish?",
         answer=f"In {len(known)} of {len(views)} trials, from {settled_s / 60:g} min on, the "
         f"calibrated model scores S = {value}; a perfect model would score {ceiling}. The "
-        f"published mean over 10 trials is {published:.3f}, on the authors' own data.",
+        f"published mean over 10 trials is {published:.3f}, on the authors' own data."
+        + (more if above else ""),
         figure=(f"{100 * float(np.mean(share)):.0f} %", "of what a perfect model would score")
         if share
         else ("", ""),

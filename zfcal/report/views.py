@@ -122,6 +122,45 @@ CourseKey = tuple[str, str, str | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Published:
+    """By which rule a model was published, and why.
+
+    Parameters
+    ----------
+    rule
+        Its name.
+    because
+        The reason, in words.
+    of_s
+        Second at which the window ends that the model was made of; None where it is not known.
+    """
+
+    rule: str
+    because: str = ""
+    of_s: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuleScore:
+    """What the model of a rule scored on a window after it was made.
+
+    Parameters
+    ----------
+    rule
+        Its name.
+    end_s, made_at_s
+        Seconds at which the window ends that it was judged on, and the one at which it was made.
+    score
+        S; NaN where nothing could be counted.
+    """
+
+    rule: str
+    end_s: int
+    made_at_s: int
+    score: Mark
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
     """The model of one calibration round.
 
@@ -135,6 +174,10 @@ class Round:
         Lower and upper bound by gene name, in the parameter's own unit.
     unidentified
         Names of the parameters that the window does not pin down.
+    intervals_by
+        ``likelihood``, or ``score`` for those of the genomes that score as well.
+    published
+        Why this model was published; None where the file does not say.
     score
         The score of the statistics that it was calibrated on, with its ceiling; None for S.
     score_of
@@ -145,6 +188,8 @@ class Round:
     parameters: Parameters
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     unidentified: frozenset[str] = frozenset()
+    intervals_by: str = "score"
+    published: Published | None = None
     score: Mark | None = None
     score_of: tuple[str, ...] = ()
 
@@ -214,6 +259,9 @@ class TrialView:
         The robot among the fish.
     sources
         The artifacts that were read.
+    rule_scores
+        Forward scores of the rules by which models are published, in the order of their windows;
+        empty where rules were not judged.
     left_out
         One line per file that could not be read.
     label
@@ -234,6 +282,7 @@ class TrialView:
     seen: Seen | None
     integration: Integration
     sources: Sequence[Source]
+    rule_scores: Sequence[RuleScore] = ()
     left_out: Sequence[str] = ()
     label: str = ""
     scoring: str = "paper"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_model, read_model_for, read_result
 from zfcal.artifacts.tables import read_tracks, write_tracks
+from zfcal.calibrate.intervals import Interval, Intervals
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.question import Question
 from zfcal.model.simulate import simulate_tracks
@@ -17,6 +19,7 @@ from zfcal.parameters import to_genes
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.likelihood import estimate
+from zfcal.stages.calibrate.rounds import _intervals_table
 from zfcal.stages.events import LeftOut, Note, say_nothing
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import open_trial
@@ -50,6 +53,37 @@ def test_the_estimate_of_a_window_is_near_the_truth(make_trial):
     part = found.table["parameters"]["centre.kappa_0"]
     assert part["low"] < part["value"] < part["high"]
     assert part["identified"]
+
+
+def test_a_published_gamma_has_the_interval_of_the_estimate_in_its_own_scale():
+    """The centre is out of reach and has the largest published value: 0.5 of it is all of the row.
+
+    The estimate says 0.4 to 0.8 of the largest that it knows, which is 0.2 to 0.4 beside 0.5.
+    """
+    parts = [
+        Interval(name=name, value=value, low=0.0, high=1.0, identified=False)
+        for name, value in (("a.kappa_0", 9.0), ("a.gamma.a", 0.5), ("a.gamma.b", 0.1),
+                            ("a.gamma.c", 1.0))
+    ]  # fmt: skip
+    own = Intervals(parameters=tuple(parts), threshold=0.5, n_compatible=3, within_ceiling=True)
+    found = {
+        "a.kappa_0": {"low": 2.0, "high": 4.0, "identified": True},
+        "a.gamma.a": {"low": 1.0, "high": 1.0, "identified": True},
+        "a.gamma.b": {"low": 0.4, "high": 0.8, "identified": True},
+        "a.gamma.c": {"low": 0.0, "high": 1.0, "identified": False},
+    }
+    result = SimpleNamespace(intervals=own)
+    table = _intervals_table(result, {"parameters": found})
+    assert table["by"] == "likelihood"
+    assert {name: list(row.values()) for name, row in table["parameters"].items()} == {
+        "a.kappa_0": [9.0, 2.0, 4.0, True],
+        "a.gamma.a": [0.5, 0.5, 0.5, True],
+        "a.gamma.b": [0.1, 0.2, 0.4, True],
+        "a.gamma.c": [1.0, 0.0, 1.0, False],
+    }
+    without = _intervals_table(result, None)
+    assert without["by"] == "score"
+    assert list(without["parameters"]["a.kappa_0"].values()) == [9.0, 0.0, 1.0, False]
 
 
 def test_the_estimate_is_the_base_of_a_diagnosis_of_the_same_minutes(make_trial):

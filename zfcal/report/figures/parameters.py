@@ -24,6 +24,16 @@ _OWN = (
 )
 
 
+_ROUNDING = 1e-6
+"""Of values that went through a file."""
+
+_EITHER = "95 % interval, by likelihood or score"
+_INTERVAL = {
+    frozenset({"likelihood"}): "95 % interval of the window's likelihood",
+    frozenset({"score"}): "95 % of the genomes that fit as well",
+}
+
+
 def parameters_picture(rounds: Sequence[Round]) -> Picture | None:
     """Return the picture of all calibrated parameters; None before the first calibration.
 
@@ -59,7 +69,7 @@ def parameters_picture(rounds: Sequence[Round]) -> Picture | None:
         key=_key(zones, calibrated),
         note="One colour per zone: in the upper row the zone where the animal is, in the gamma "
         "panels the zone that attracts it. Only ratios within a gamma panel matter; its largest "
-        "value is 1.",
+        "value is 1. Marks are what was published, which need not lie in the window's interval.",
     )
 
 
@@ -76,6 +86,18 @@ def values_of(round_: Round) -> dict[str, float]:
     return named
 
 
+def outside_of(round_: Round) -> list[str]:
+    """Return the parameters whose published value lies outside the interval of the likelihood."""
+    if round_.intervals_by != "likelihood":
+        return []
+    values = values_of(round_)
+    return [
+        name
+        for name, (low, high) in round_.intervals.items()
+        if name in values and not low - _ROUNDING <= values[name] <= high + _ROUNDING
+    ]
+
+
 def _key(zones: Sequence[str], rounds: Sequence[Round]) -> tuple[Entry, ...]:
     colours, markers = theme.zone_colours(zones), theme.zone_markers(zones)
     mark: Mark = "line" if len(rounds) > 1 else "points"
@@ -86,7 +108,7 @@ def _key(zones: Sequence[str], rounds: Sequence[Round]) -> tuple[Entry, ...]:
         text = "hollow: not identified in that window"
         entries.append(Entry(label=text, colour=theme.MUTED, mark="hollow", marker="o"))
     if any(r.intervals for r in rounds):
-        text = "95 % of the genomes that fit as well"
+        text = _INTERVAL.get(frozenset(r.intervals_by for r in rounds if r.intervals), _EITHER)
         text += ", where identified" if len(rounds) > 1 else ""
         entries.append(Entry(label=text, colour=theme.MUTED, mark="band"))
     return tuple(entries)

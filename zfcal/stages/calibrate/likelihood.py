@@ -142,7 +142,7 @@ def remembered(
     try:
         scene = make_scene(read_stretch(opened, span_s, say_nothing).samples, opened.arena)
         faded = _faded(scene, end_s - LENGTH_S)
-        found = _with_speeds(faded, fit(faded, template))
+        found = _with_speeds(faded, fit(faded, template, level=None))
     except InputError:
         return None
     return to_genome(found.parameters) if math.isfinite(found.nats_per_step) else None

@@ -6,6 +6,7 @@ import functools
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -288,17 +289,8 @@ def result_table(
         "n_renewed": result.n_renewed,
         "baselines": baselines or None,
         "likelihood": likelihood,
-        "intervals": {
-            "threshold": _number(result.intervals.threshold),
-            "n_compatible": result.intervals.n_compatible,
-            "within_ceiling": result.intervals.within_ceiling,
-            "parameters": {
-                part.name: {"value": part.value, "low": part.low, "high": part.high,
-                            "identified": part.identified}
-                for part in result.intervals.parameters
-            },
-        },
-    }  # fmt: skip
+        "intervals": _intervals_table(result, likelihood),
+    }
 
 
 def _published(result: RoundResult) -> dict[str, JSON]:
@@ -319,6 +311,54 @@ def _published(result: RoundResult) -> dict[str, JSON]:
             "forward": dict[str, JSON](record.means()) or None,
         }
     }
+
+
+def _intervals_table(result: RoundResult, likelihood: dict[str, JSON] | None) -> dict[str, JSON]:
+    """Return which values of each parameter the window allows, and what was published.
+
+    By the window's likelihood where it has an estimate, whichever model was published; by the
+    genomes that score as well where it has none.
+    """
+    found: Any = {} if likelihood is None else likelihood["parameters"]
+    values = {part.name: part.value for part in result.intervals.parameters}
+    rows: dict[str, JSON] = {}
+    for part in result.intervals.parameters:
+        own = found.get(part.name)
+        scale = _row_scale(part.name, values, found)
+        rows[part.name] = {
+            "value": part.value,
+            "low": part.low if own is None else own["low"] * scale,
+            "high": part.high if own is None else own["high"] * scale,
+            "identified": part.identified if own is None else own["identified"],
+        }
+    return {
+        "by": "likelihood" if found else "score",
+        "threshold": _number(result.intervals.threshold),
+        "n_compatible": result.intervals.n_compatible,
+        "within_ceiling": result.intervals.within_ceiling,
+        "parameters": rows,
+    }
+
+
+def _row_scale(name: str, values: dict[str, float], found: Any) -> float:
+    """Return by what an estimate's gammas are to be multiplied to stand beside published ones.
+
+    The largest gamma of a published row is 1, and may be that of a zone out of reach. The
+    estimate's is 1 among those that the window tells of.
+    """
+    row, is_gamma, _ = name.partition(".gamma.")
+    if not is_gamma or name not in found or _says_nothing(found[name]):
+        return 1.0
+    told = [
+        value
+        for other, value in values.items()
+        if other.startswith(f"{row}.gamma.") and not _says_nothing(found[other])
+    ]
+    return max(told) or 1.0
+
+
+def _says_nothing(entry: Any) -> bool:
+    return (entry["low"], entry["high"]) == (0.0, 1.0)
 
 
 def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
