@@ -31,11 +31,13 @@ from benchmarks.shared.regressions import Ratio, conclude, parser
 BUILD = ROOT / "build" / "closed-loop"
 WORDS = {
     "calibrated": ("--swims", "calibrated"),
-    "by score": ("--swims", "calibrated", "--champion", "score"),
+    "by score": ("--swims", "calibrated", "--publish", "score"),
     "fixed": ("--swims", "fixed"),
     "random": ("--swims", "random"),
+    "forward": ("--swims", "calibrated", "--publish", "forward"),
 }
-"""Options of the demo by kind of robot; *by score* swims by the published choice of a model."""
+"""Options of the demo by kind of robot: *calibrated* swims by the likelihood estimate, *by score*
+by the published choice of a model, *forward* by the rule that has been better so far."""
 
 KINDS = tuple(WORDS)
 KEPT = "found.json"
@@ -256,6 +258,7 @@ def ratios(found: dict[str, Any]) -> dict[str, Ratio]:
         kind: interval([_mark(t, "S", "value") for t in found["trials"] if t["kind"] == kind])[0]
         / _ceiling(found["trials"], "S")
         for kind in KINDS
+        if any(trial["kind"] == kind for trial in found["trials"])
     }
     return {
         f"robot among the fish, {kind}, over its ceiling": Ratio(value=mean, better="more")
