@@ -68,7 +68,10 @@ def round_options(*, generations: str = "", budget: str = "") -> Decorator:
             "that has models keeps its way]",
         ),
         click.option(
-            "--champion", type=click.Choice(["score", "likely", "likelihood"]), hidden=True
+            "--champion",
+            type=click.Choice(["score", "likely", "likelihood"]),
+            hidden=True,
+            help="The older name of --publish.",
         ),
         click.option(
             "--baselines", is_flag=True, help="Score random search and the last model too."

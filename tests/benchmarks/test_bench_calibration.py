@@ -167,7 +167,7 @@ def test_committed_rounds_are_measured_in_full(script, words, n):
 @pytest.mark.slow
 def test_the_benchmark_of_publishing_runs(command):
     """The parts of the rules are among the whole round."""
-    done = command("calibration/bench_publishing.py", "--minutes", "4", "--budget", "3")
+    done = command("calibration/publishing_cost.py", "--minutes", "4", "--budget", "3")
     found = json.loads(done.stdout)
     seconds = found["seconds"]
     assert 0 < seconds["simulations of the models"] < seconds["all of judging and handing on"]

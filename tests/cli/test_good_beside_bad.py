@@ -62,7 +62,8 @@ def test_statistics_are_not_written_through_a_link_that_leads_outside(zfcal, tri
 
 
 def _round(end):
-    return {f"models/{end}.parquet", f"scores/{end}-model.parquet", f"models/{end}.toml"}
+    scores = {f"scores/{end}-model.parquet", f"scores/{end}-rules.parquet"}
+    return {f"models/{end}.parquet", f"models/{end}.toml"} | scores
 
 
 TAKEN = {
@@ -78,6 +79,7 @@ TAKEN = {
     "models/000120.toml": (CALIBRATE, _round("000180")),
     "models/000120.parquet": (CALIBRATE, _round("000180")),
     "scores/000120-model.parquet": (CALIBRATE, _round("000180")),
+    "scores/000120-rules.parquet": (CALIBRATE, _round("000180")),
     "models/.000120.checkpoint": (CALIBRATE, _round("000120") | _round("000180")),
 }
 

@@ -4,8 +4,8 @@ A simulated trial of four fish and a robot has a few late rounds of one generati
 one with a budget and the default settings, which is measured: the estimate over all minutes,
 the simulations of the rules' models, their scores, and the second judge.
 
-    .venv/bin/python benchmarks/calibration/bench_publishing.py
-    .venv/bin/python benchmarks/calibration/bench_publishing.py --minutes 30 --budget 50
+    .venv/bin/python benchmarks/calibration/publishing_cost.py
+    .venv/bin/python benchmarks/calibration/publishing_cost.py --minutes 30 --budget 50
 """
 
 from __future__ import annotations
