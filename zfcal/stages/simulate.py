@@ -16,6 +16,7 @@ from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.errors import InputError
+from zfcal.model.effects.genome import check_effects
 from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
@@ -115,6 +116,7 @@ def new_trial(root: Path, options: SimulateOptions) -> NewTrial:
         Neither the options nor the trial of the model say who swims where.
     """
     model = read_model(options.model)
+    check_effects(model, of=options.model)
     arena, n_fish, n_robots = options.arena, options.n_fish, options.n_robots
     try:
         home = read_trial(find_trial(options.model))
@@ -177,6 +179,7 @@ def swim(opened: OpenTrial, options: SimulateOptions) -> Tracks:
     """
     trial = opened.trial
     model = read_model_for(options.model, opened.arena, dt_s=trial.dt_s)
+    check_effects(model, of=options.model)
     n_frames = max(1, round(options.duration_s * trial.fps))
     per_step = round(trial.dt_s * trial.fps)
     n_steps = -(-(n_frames - 1) // per_step) + 1

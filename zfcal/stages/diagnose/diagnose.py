@@ -22,6 +22,7 @@ from zfcal.diagnose.findings import Diagnosis
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.question import Tell as Heard
 from zfcal.errors import InputError
+from zfcal.model.effects.genome import check_effects
 from zfcal.parameters import Parameters
 from zfcal.stages.diagnose.findings import FOLDER, Book, Draw, write_findings
 from zfcal.stages.events import Progress, Result, Tell
@@ -127,6 +128,7 @@ def open_case(root: Path, options: DiagnoseOptions) -> Case:
     trial = opened.trial
     model = options.model or newest_model(trial)
     parameters = read_model_for(model, opened.arena, dt_s=trial.dt_s)
+    check_effects(parameters, of=model)
     return Case(opened=opened, options=options, model=model, parameters=parameters)
 
 
