@@ -62,7 +62,12 @@ def test_a_pipeline_ends_in_the_bytes_of_one_command_after_the_other(
     assert piped.stdout.split() == [
         f"a/{name}"
         for end in ("000120", "000180")
-        for name in (f"models/{end}.parquet", f"scores/{end}-model.parquet", f"models/{end}.toml")
+        for name in (
+            f"models/{end}.parquet",
+            f"scores/{end}-model.parquet",
+            f"scores/{end}-rules.parquet",
+            f"models/{end}.toml",
+        )
     ]
     for line in (
         f"init b {INIT.partition(' >')[0]}",

@@ -172,9 +172,11 @@ def test_three_computers_close_the_loop_and_a_cut_link_heals(
     expected = watching.contents(trial)
     ours = computers.roots["tracker"]
     ends_s = time.monotonic() + 20
-    made = {name: data for name, data in expected.items() if not name.endswith("-model.parquet")}
+    own = ("-model.parquet", "-rules.parquet")
+    made = {name: data for name, data in expected.items() if not name.endswith(own)}
     while watching.contents(ours) != made:
         assert time.monotonic() < ends_s, sorted(watching.contents(ours))
         time.sleep(0.2)
     calibrated = watching.contents(computers.roots["calibrator"])
-    assert calibrated["scores/000180-model.parquet"] == expected["scores/000180-model.parquet"]
+    for ending in own:
+        assert calibrated[f"scores/000180{ending}"] == expected[f"scores/000180{ending}"]
