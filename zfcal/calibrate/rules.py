@@ -53,8 +53,8 @@ FIRST_ROUNDS = 2
 """In these no model has been followed by a window yet."""
 
 LEVEL = 0.8
-"""How sure a lead has to be before the model in use changes: less than one in five leads of this
-size is chance."""
+"""How sure a lead has to be before the model in use changes. Of one comparison of independent
+windows one in five leads of this size would be chance; of the best of several rules, more."""
 
 _MOST_MODELS = 60
 """Models that are kept for `NEAREST`, the newest."""
