@@ -33,7 +33,7 @@ from zfcal.report.figures.statistics import histogram_mean
 from zfcal.stages.analyse.analyse import POOLED_FROM_S
 from zfcal.stages.calibrate.holdout import evaluate_model
 from zfcal.stages.calibrate.likelihood import estimate
-from zfcal.stages.calibrate.rounds import score_table
+from zfcal.stages.calibrate.result import score_table
 from zfcal.stages.events import say_nothing
 from zfcal.stages.segments import Segments
 from zfcal.stages.trial_context import OpenTrial

@@ -19,7 +19,7 @@ from zfcal.parameters import to_genes
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.likelihood import estimate
-from zfcal.stages.calibrate.rounds import _intervals_table
+from zfcal.stages.calibrate.result import _intervals_table
 from zfcal.stages.events import LeftOut, Note, say_nothing
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import open_trial

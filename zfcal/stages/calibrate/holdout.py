@@ -30,11 +30,8 @@ from zfcal.model.simulate import Counts, pack, simulate_counts
 from zfcal.parameters import Parameters, to_genes
 from zfcal.stages.calibrate.calibrate import calibrate_options, make_group
 from zfcal.stages.calibrate.likelihood import estimate
-from zfcal.stages.calibrate.rounds import (
-    MODEL,
-    Found,
-    score_table,
-)
+from zfcal.stages.calibrate.result import score_table
+from zfcal.stages.calibrate.rounds import MODEL, Found
 from zfcal.stages.calibrate.searching import (
     CalibrateOptions,
     baseline_scores,

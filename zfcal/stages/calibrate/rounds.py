@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,17 +22,16 @@ from zfcal.artifacts.tables import (
     read_table,
     write_table,
 )
-from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.behaviour.rows import scores_to_rows, statistics_from_rows
-from zfcal.behaviour.scores import NamedScore, Scores
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.rounds import RoundResult
-from zfcal.calibrate.rules import LIKELIHOOD, SAYS, Record
+from zfcal.calibrate.rules import Record
 from zfcal.calibrate.task import Previous
 from zfcal.errors import DamagedError
 from zfcal.model.effects.genome import genome_names
 from zfcal.stages.calibrate.record import write_record
+from zfcal.stages.calibrate.result import or_none, published_table, result_table, score_table
 from zfcal.stages.calibrate.telling import published_fields, published_note
 from zfcal.stages.events import Event, Result
 from zfcal.stages.stage import Write
@@ -181,7 +179,7 @@ class Found:
             **score_table(result.scores, result.ceiling),
             "baselines": self.baselines,
             **published_fields(result),
-            **_published(result),
+            **published_table(result),
         }
 
     def writers(self, places: RoundPlaces, seed: int) -> tuple[Write, ...]:
@@ -239,174 +237,14 @@ def _write_population(path: Path, result: RoundResult, lineage: Lineage) -> None
     extra: dict[str, JSON] = {
         "gene_names": list(_gene_names(result)),
         "champion": result.genes.tolist(),
-        "noise": _number(result.as_previous.noise),
+        "noise": or_none(result.as_previous.noise),
         "generations": result.generations,
     }
     if named is not None:
         # A score of these is not S.
         extra["features"] = list(names)
-        extra["score"] = [_number(value) for value in state.scores.tolist()]
+        extra["score"] = [or_none(value) for value in state.scores.tolist()]
         extra["similarities"] = {
-            name: [_number(value) for value in values.tolist()] for name, values in found.items()
+            name: [or_none(value) for value in values.tolist()] for name, values in found.items()
         }
     write_table(path, make_table(POPULATION, columns), lineage, extra=extra)
-
-
-def result_table(
-    result: RoundResult,
-    baselines: dict[str, JSON],
-    likelihood: dict[str, JSON] | None = None,
-) -> dict[str, JSON]:
-    """Return the table ``[result]`` of a calibrated model.
-
-    Parameters
-    ----------
-    result
-        Of the round.
-    baselines
-        S of each baseline.
-    likelihood
-        The window's maximum-likelihood estimate; None without one.
-
-    Returns
-    -------
-    dict
-        S stands with its ceiling; a value that is NaN is None. Where other features are named,
-        their score stands under ``score``, and what decided by it is called so.
-    """
-    last = result.history[-1]
-    score = "S" if result.scores.named is None else "score"
-    return {
-        "generations": result.generations,
-        "evaluations": result.evaluations,
-        **score_table(result.scores, result.ceiling),
-        "champion": "likely" if result.rule == LIKELIHOOD else result.rule,
-        **_published(result),
-        f"optimiser_{score}": _number(result.optimiser_score),
-        "hypervolume": [_number(line.hypervolume) for line in result.history],
-        f"best_{score}_in_population": _number(last.best_score),
-        "world_changed": result.world_changed,
-        "n_renewed": result.n_renewed,
-        "baselines": baselines or None,
-        "likelihood": likelihood,
-        "intervals": _intervals_table(result, likelihood),
-    }
-
-
-def _published(result: RoundResult) -> dict[str, JSON]:
-    """Return why a model was published, where rules are judged."""
-    if result.handed is None:
-        return {}
-    choice, record = result.handed.choice, result.handed.record
-    lead = choice.lead
-    return {
-        "published": {
-            "rule": choice.rule,
-            "says": SAYS[choice.rule],
-            "because": choice.because,
-            "of_window_end_s": record.in_use.of_s if record.in_use else None,
-            "lead": None if lead is None else _number(lead.mean),
-            "lead_error": None if lead is None else _number(lead.error),
-            "lead_windows": None if lead is None else lead.n,
-            "forward": dict[str, JSON](record.means()) or None,
-        }
-    }
-
-
-def _intervals_table(result: RoundResult, likelihood: dict[str, JSON] | None) -> dict[str, JSON]:
-    """Return which values of each parameter the window allows, and what was published.
-
-    By the window's likelihood where it has an estimate, whichever model was published; by the
-    genomes that score as well where it has none.
-    """
-    found: Any = {} if likelihood is None else likelihood["parameters"]
-    values = {part.name: part.value for part in result.intervals.parameters}
-    rows: dict[str, JSON] = {}
-    for part in result.intervals.parameters:
-        own = found.get(part.name)
-        scale = _row_scale(part.name, values, found)
-        rows[part.name] = {
-            "value": part.value,
-            "low": part.low if own is None else own["low"] * scale,
-            "high": part.high if own is None else own["high"] * scale,
-            "identified": part.identified if own is None else own["identified"],
-        }
-    return {
-        "by": "likelihood" if found else "score",
-        "threshold": _number(result.intervals.threshold),
-        "n_compatible": result.intervals.n_compatible,
-        "within_ceiling": result.intervals.within_ceiling,
-        "parameters": rows,
-    }
-
-
-def _row_scale(name: str, values: dict[str, float], found: Any) -> float:
-    """Return by what an estimate's gammas are to be multiplied to stand beside published ones.
-
-    The largest gamma of a published row is 1, and may be that of a zone out of reach. The
-    estimate's is 1 among those that the window tells of.
-    """
-    row, is_gamma, _ = name.partition(".gamma.")
-    if not is_gamma or name not in found or _says_nothing(found[name]):
-        return 1.0
-    told = [
-        value
-        for other, value in values.items()
-        if other.startswith(f"{row}.gamma.") and not _says_nothing(found[other])
-    ]
-    return max(told) or 1.0
-
-
-def _says_nothing(entry: Any) -> bool:
-    return (entry["low"], entry["high"]) == (0.0, 1.0)
-
-
-def score_table(scores: Scores, ceiling: Ceiling) -> dict[str, JSON]:
-    """Return S, its features and its ceiling as the entries of a table."""
-    mean, low, high = ceiling.of("S")
-    return {
-        "S": _number(scores.S),
-        "ceiling": _number(mean),
-        "ceiling_low": _number(low),
-        "ceiling_high": _number(high),
-        "n_windows": ceiling.n_windows,
-        "against_ceiling": _share(scores.S, mean),
-        "features": {
-            field.name: _number(getattr(scores, field.name))
-            for field in fields(scores)
-            if field.name.startswith("I_")
-        },
-        "n_features": scores.n_features,
-        **_named_table(scores.named, ceiling),
-    }
-
-
-def _named_table(named: NamedScore | None, ceiling: Ceiling) -> dict[str, JSON]:
-    """Return the score of the features that were named, which is not S, and its ceiling."""
-    if named is None:
-        return {}
-    mean, low, high = ceiling.overall
-    return {
-        "score": {
-            "of": list(named.features),
-            "value": _number(named.value),
-            "ceiling": _number(mean),
-            "ceiling_low": _number(low),
-            "ceiling_high": _number(high),
-            "against_ceiling": _share(named.value, mean),
-            "similarities": {
-                name: _number(value)
-                for name, value in zip(named.features, named.similarities, strict=True)
-            },
-            "n_features": named.n_features,
-        }
-    }
-
-
-def _share(value: float, mean: float) -> float | None:
-    """Return a score over its ceiling; None without a ceiling."""
-    return _number(value / mean if mean > 0 else math.nan)
-
-
-def _number(value: float) -> float | None:
-    return None if math.isnan(value) else float(value)

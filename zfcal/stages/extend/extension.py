@@ -38,7 +38,7 @@ from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
 from zfcal.model.simulate import Counts
 from zfcal.parameters import Parameters, to_genes
-from zfcal.stages.calibrate.rounds import result_table, score_table
+from zfcal.stages.calibrate.result import result_table, score_table
 from zfcal.stages.calibrate.searching import CalibrateOptions, run_search
 from zfcal.stages.diagnose.diagnose import Case
 from zfcal.stages.events import Progress, Tell
