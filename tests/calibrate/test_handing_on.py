@@ -21,6 +21,7 @@ from zfcal.calibrate.rules import (
     Forward,
     Record,
 )
+from zfcal.calibrate.task import Previous
 from zfcal.parameters import to_genes
 
 COUNTED = ("distance", "wall", "occupation", "transition", "speed")
@@ -145,12 +146,30 @@ def test_the_compromise_is_half_way_between_best_and_estimate(later, old, forwar
 
 
 def test_a_model_that_is_kept_stays_to_the_bit(later, old, forward):
-    """It says of which window it is, and is not simulated again for the record."""
-    result = calibrate_window(later({KEEP: 0.9, SCORE: 0.5}, old), forward)
+    """It says of which window it is, and is judged as it drives on: with speeds of the new one."""
+    task = later({KEEP: 0.9, SCORE: 0.5}, old)
+    slow = np.zeros_like(task.control.speed)
+    slow[:, 0] = task.control.speed.sum(axis=1)
+    task = replace(task, control=replace(task.control, speed=slow))
+    result = calibrate_window(task, forward)
     in_use = result.handed.record.in_use
     assert (result.rule, in_use.rule, in_use.of_s, in_use.made_at_s) == (KEEP, KEEP, 300, 420)
     assert (result.genes == old.genes).all()
-    assert counts_of(in_use.long_run) == counts_of(old.long_run)
+    runs = task.confirmation(forward).simulate(old.genes[None])
+    driven = runs.as_statistics(0, task.control.zone_names)
+    assert counts_of(in_use.long_run) == counts_of(driven) != counts_of(old.long_run)
+    assert task.confirmation(forward).scores(old.genes[None]).S[0] == result.scores.S
+
+
+def test_before_rules_are_judged_the_last_champion_is_in_use(guided, forward, truth):
+    """Of a trial that was published otherwise until now, not the starting model."""
+    champion = np.clip(truth + 0.1, 0, 1)
+    before = Previous(
+        genes=np.stack([truth, champion]), scores=np.ones(2), champion=champion, noise=0.1
+    )
+    result = calibrate_window(replace(guided, previous=before), forward)
+    (kept,) = [model for model in result.handed.record.models if model.rule == KEEP]
+    np.testing.assert_array_equal(kept.genes, scale_gamma(champion, 3))
 
 
 def test_what_followed_is_judged_before_it_is_chosen(guided, forward, old):

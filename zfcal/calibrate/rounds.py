@@ -7,13 +7,14 @@ of files. What leads to the champion is in ``search``.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
-from zfcal.behaviour.scores import Scores
+from zfcal.behaviour.scores import Scores, compare
 from zfcal.calibrate.ceiling import measure_ceiling, window_noise
 from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
 from zfcal.calibrate.evolve import State
@@ -25,7 +26,6 @@ from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
-    MADE,
     MEMORY,
     NEAREST,
     SCORE,
@@ -236,14 +236,18 @@ def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> Ha
     noise
         Standard deviation of S between windows of one model.
     """
-    end_s, record = task.seeds.window_end_s, task.record
-    record = record.judged(task.control, end_s, noise)
+    end_s = task.seeds.window_end_s
+    record = task.record.judged(task.control, end_s, noise)
     made = _made(task, settings, best)
-    record = record.with_models([made[rule] for rule in MADE if rule in made])
+    record = record.with_models(made.values())
     nearest = record.nearest(task.control)
     if nearest is not None:
-        made[NEAREST] = replace(nearest, rule=NEAREST, made_at_s=end_s)
-    made[KEEP] = replace(made[KEEP], rule=KEEP, made_at_s=end_s)
+        made |= _swum(task, settings, {NEAREST: nearest.genes}, of_s=nearest.of_s)
+    in_use = record.in_use
+    if in_use is None:
+        made |= _swum(task, settings, {KEEP: _first_in_use(task)}, of_s=end_s)
+    else:
+        made |= _swum(task, settings, {KEEP: in_use.genes}, of_s=in_use.of_s)
     choice = record.choose(set(made) - {KEEP}, noise)
     chosen = made[choice.rule]
     record = replace(
@@ -253,36 +257,70 @@ def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> Ha
     )
     if choice.rule == SCORE:
         return HandedOn(choice=choice, record=record, confirmed=None, ceiling=None)
-    confirmed, ceiling = judge(task, settings, chosen.genes[None, :])
-    return HandedOn(choice=choice, record=record, confirmed=confirmed, ceiling=ceiling)
+    confirmed = Confirmed(
+        genes=chosen.genes,
+        scores=compare(chosen.long_run, task.control),
+        long_run=chosen.long_run,
+        candidates=best.candidates,
+    )
+    return HandedOn(
+        choice=choice,
+        record=record,
+        confirmed=confirmed,
+        ceiling=_ceiling_of(task, settings, confirmed),
+    )
 
 
 def _made(task: Task, settings: Settings, best: Confirmed) -> dict[str, Candidate]:
-    """Return the model of each rule that makes one, and the one in use, all simulated alike."""
+    """Return the model of each rule that makes one."""
     n_zones, end_s = len(task.group.template.zones), task.seeds.window_end_s
-    genes = {SCORE: scale_gamma(best.genes, n_zones)}
-    if task.guests is not None:
-        genes[LIKELIHOOD] = scale_gamma(np.atleast_2d(task.guests)[0], n_zones)
-        genes[COMPROMISE] = half_way(genes[SCORE], genes[LIKELIHOOD])
-    if task.memory is not None:
-        genes[MEMORY] = scale_gamma(task.memory, n_zones)
-    in_use = task.record.in_use
-    if in_use is None:
-        genes[KEEP] = to_genome(task.group.template)[: task.n_genes]
-    others = [rule for rule in genes if rule != SCORE]
-    runs = {SCORE: best.long_run}
-    if others:
-        objective = task.confirmation(settings)
-        found = objective.simulate(np.stack([genes[rule] for rule in others]))
-        names = task.control.zone_names
-        runs |= {rule: found.as_statistics(k, names) for k, rule in enumerate(others)}
+    own = scale_gamma(best.genes, n_zones)
     made = {
-        rule: Candidate(
-            rule=rule, made_at_s=end_s, of_s=end_s, genes=genes[rule], long_run=runs[rule]
-        )
-        for rule in genes
+        SCORE: Candidate(rule=SCORE, made_at_s=end_s, of_s=end_s, genes=own, long_run=best.long_run)
     }
-    return made if in_use is None else made | {KEEP: in_use}
+    others = {}
+    if task.guests is not None:
+        others[LIKELIHOOD] = scale_gamma(np.atleast_2d(task.guests)[0], n_zones)
+        others[COMPROMISE] = half_way(own, others[LIKELIHOOD])
+    if task.memory is not None:
+        others[MEMORY] = scale_gamma(task.memory, n_zones)
+    return made | _swum(task, settings, others, of_s=end_s)
+
+
+def _first_in_use(task: Task) -> Floats:
+    """Return the genes of the model that drives before rules are judged, shape (gene,)."""
+    if task.previous is not None:
+        return scale_gamma(task.previous.champion, len(task.group.template.zones))
+    return to_genome(task.group.template)[: task.n_genes]
+
+
+def _swum(
+    task: Task, settings: Settings, genes: Mapping[str, Floats], *, of_s: int
+) -> dict[str, Candidate]:
+    """Return models by rule as the round would hand them on: with the speeds of its window.
+
+    Parameters
+    ----------
+    task, settings
+        Of the round.
+    genes
+        A genome for each rule, shape (gene,), its gamma rows scaled.
+    of_s
+        End of the window that they were made of.
+    """
+    if not genes:
+        return {}
+    found = task.confirmation(settings).simulate(np.stack(list(genes.values())))
+    return {
+        rule: Candidate(
+            rule=rule,
+            made_at_s=task.seeds.window_end_s,
+            of_s=of_s,
+            genes=own,
+            long_run=found.as_statistics(k, task.control.zone_names),
+        )
+        for k, (rule, own) in enumerate(genes.items())
+    }
 
 
 def judge(task: Task, settings: Settings, genes: Floats) -> tuple[Confirmed, Ceiling]:
@@ -296,7 +334,11 @@ def judge(task: Task, settings: Settings, genes: Floats) -> tuple[Confirmed, Cei
         At least one.
     """
     confirmed = confirm(task.confirmation(settings), genes)
-    ceiling = measure_ceiling(
+    return confirmed, _ceiling_of(task, settings, confirmed)
+
+
+def _ceiling_of(task: Task, settings: Settings, confirmed: Confirmed) -> Ceiling:
+    return measure_ceiling(
         task.simulator,
         confirmed.genes,
         long_run=confirmed.long_run,
@@ -304,4 +346,3 @@ def judge(task: Task, settings: Settings, genes: Floats) -> tuple[Confirmed, Cei
         seeds=task.seeds.seeds(Purpose.CEILING, settings.n_windows),
         features=settings.features,
     )
-    return confirmed, ceiling

@@ -9,7 +9,7 @@ models scored on the first window that they had not seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,7 +74,8 @@ class Candidate:
         End of the window that it was made of.
     genes : ndarray, shape (gene,)
     long_run
-        What it does, all agents counted.
+        What it does with the speeds of the window at which it was chosen, as it would be handed
+        on then; all agents counted.
     """
 
     rule: str
@@ -194,7 +195,7 @@ class Record:
         rows = tuple(_row(model, control, end_s, noise) for model in new)
         return replace(self, rows=self.rows + rows)
 
-    def with_models(self, models: Sequence[Candidate]) -> Record:
+    def with_models(self, models: Iterable[Candidate]) -> Record:
         """Return the record with models of a round; those that nobody needs are dropped."""
         whole = (*self.models, *models)
         newest = max((m.made_at_s for m in whole), default=0)
