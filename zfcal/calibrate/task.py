@@ -95,13 +95,18 @@ class Settings:
         object.__setattr__(self, "features", ordered(self.features))
         if self.optimiser not in {"zfcal", "deap"}:
             raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
+        if self.champion == "forward" and not self.is_scored:
+            raise InputError(
+                f"Rules are judged by S, not by {','.join(self.features)}.",
+                hint="With other features than D,W,O,T publish by score or likelihood.",
+            )
         if self.champion not in {"score", "likely", "forward"}:
             raise InputError(
                 f"champion must be 'score', 'likely' or 'forward', got {self.champion!r}."
             )
 
     @property
-    def _is_scored(self) -> bool:
+    def is_scored(self) -> bool:
         """Whether the score is S: of D, W, O and T and nothing else."""
         return self.features == SCORED
 
@@ -109,7 +114,7 @@ class Settings:
     def said(self) -> dict[str, Any]:
         """Return what a lineage says of them; what is usual goes without saying."""
         options = asdict(self)
-        if self._is_scored:
+        if self.is_scored:
             del options["features"]
         else:
             options["features"] = list(self.features)

@@ -230,13 +230,17 @@ def test_what_rounds_of_other_effects_left_is_not_taken_over(trial, in_full, cha
         assert result["published"]["because"] == "no window has followed a model yet"
 
 
-def test_what_rounds_of_the_same_effects_left_is_taken_over(trial, in_full):
-    """The record goes on, though the file of the model has changed."""
+@pytest.mark.parametrize(("strength", "n_rounds"), [(None, 2), (0.31, 1)])
+def test_the_record_goes_on_where_the_model_is_the_same(trial, in_full, strength, n_rounds):
+    """One whose file has changed swims otherwise than those that were judged."""
     forward = of(in_full, trial, champion="forward")
     calibrate(trial, forward, say_nothing, task=Task(ends_s=frozenset({120})))
-    extend(trial, {**START, "turning-bias": {"strength": 0.31}})
+    if strength is not None:
+        extend(trial, {**START, "turning-bias": {"strength": strength}})
     calibrate(trial, forward, say_nothing, task=Task(ends_s=frozenset({180})))
-    assert read_extra(trial / "scores" / "000180-rules.parquet")["n_rounds"] == 2
+    assert read_extra(trial / "scores" / "000180-rules.parquet")["n_rounds"] == n_rounds
+    population = read_lineage(trial / "models" / "000180.parquet")
+    assert "models/000120.parquet" in population.inputs
 
 
 def test_a_pooled_stretch_is_calibrated_with_the_named_model(trial, quick, tmp_path):

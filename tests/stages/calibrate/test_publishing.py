@@ -13,12 +13,13 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_result
 from zfcal.artifacts.tables import RULES, read_extra, read_table, write_table
 from zfcal.calibrate.rules import MADE
-from zfcal.errors import DamagedError
+from zfcal.errors import DamagedError, InputError
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate import calibrate as calibrate_module
 from zfcal.stages.calibrate import holdout
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.holdout import Span, calibrate_span
+from zfcal.stages.calibrate.rounds import RoundPlaces
 from zfcal.stages.events import LeftOut, Made, Note, Progress, Result, UpToDate, say_nothing
 from zfcal.stages.trial_context import Task
 
@@ -303,3 +304,54 @@ def test_the_estimate_is_a_part_of_the_budget(trial, forward, tmp_path, monkeypa
     with pytest.raises(Killed) as caught:
         work(trial, options, say_nothing)
     assert 20.0 < caught.value.args[0] <= 29.7
+
+
+def test_a_record_is_carried_on_by_its_own_round_alone(trial, forward, in_full):
+    """Rounds that are published otherwise leave none, and the next record begins anew."""
+    calibrate(trial, forward, say_nothing, task=Task(ends_s=frozenset({120})))
+    record = RoundPlaces(root=trial, end_s=120).rules
+    old = record.read_bytes()
+    calibrate(trial, in_full, say_nothing, task=Task(ends_s=frozenset({120})))
+    assert not record.exists()
+    record.write_bytes(old)
+    calibrate(trial, forward, say_nothing, task=Task(ends_s=frozenset({180})))
+    path = RoundPlaces(root=trial, end_s=180).rules
+    assert "scores/000120-rules.parquet" not in read_lineage(path).inputs
+    assert read_extra(path)["n_rounds"] == 1
+
+
+def test_rounds_that_none_can_read_do_not_change_the_way(trial, in_full):
+    """Their file is named, and what to say; nothing is made."""
+    calibrate(trial, in_full, say_nothing)
+    for path in (trial / "models").glob("000[1-9]*"):
+        path.write_bytes(b"damaged")
+    asked = dataclasses.replace(in_full, keeps_way=True)
+    with pytest.raises(InputError, match=r"000120\.toml: cannot be read") as caught:
+        calibrate(trial, asked, say_nothing)
+    assert "--publish" in caught.value.hint
+
+
+def test_one_readable_round_says_the_way(trial, in_full):
+    """The population where the model is damaged."""
+    calibrate(trial, in_full, say_nothing, task=Task(ends_s=frozenset({120})))
+    (trial / "models" / "000120.toml").write_bytes(b"damaged")
+    asked = dataclasses.replace(in_full, keeps_way=True)
+    calibrate(trial, asked, say_nothing, task=Task(ends_s=frozenset({120})))
+    assert not list((trial / "scores").glob("*-rules.parquet"))
+
+
+def test_an_estimate_that_is_published_must_be_made(trial, in_full):
+    """Rounds of likelihood do not silently become rounds of score."""
+    likely = dataclasses.replace(
+        in_full, settings=dataclasses.replace(in_full.settings, champion="likely")
+    )
+    calibrate(trial, likely, say_nothing, task=Task(ends_s=frozenset({120})))
+    asked = dataclasses.replace(in_full, keeps_way=True, seed_likelihood=False)
+    with pytest.raises(InputError, match="publish the likelihood estimate"):
+        calibrate(trial, asked, say_nothing)
+
+
+def test_other_features_are_published_by_their_score(in_full):
+    """Rules are judged by S."""
+    with pytest.raises(InputError, match="judged by S, not by D,W"):
+        dataclasses.replace(in_full.settings, champion="forward", features=("D", "W"))

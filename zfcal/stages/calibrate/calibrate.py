@@ -7,7 +7,7 @@ run over all windows and the online run on the newest one are the same code.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, final
@@ -61,18 +61,20 @@ class _Window:
     @property
     def previous(self) -> Path | None:
         """The population from which its round starts: the last one that is there."""
-        return self._last(lambda places: places.population)
+        last = self._last()
+        return None if last is None else last.population
 
     @property
     def rules(self) -> Path | None:
-        """The record of the rules that it carries on."""
-        return self._last(lambda places: places.rules)
+        """The record of the rules that the same round left; None where it left none."""
+        last = self._last()
+        return last.rules if last is not None and is_regular(last.rules) else None
 
-    def _last(self, file: Callable[[RoundPlaces], Path]) -> Path | None:
+    def _last(self) -> RoundPlaces | None:
         window = self.before
-        while window is not None and not is_regular(file(window.places)):
+        while window is not None and not is_regular(window.places.population):
             window = window.before
-        return None if window is None else file(window.places)
+        return None if window is None else window.places
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,21 +184,46 @@ class Calibrate(Stage[_Shared, _Window]):
 
 
 def _as_before(root: Path, options: CalibrateOptions) -> CalibrateOptions:
-    """Return options that publish as the rounds that a trial has, if that is wanted."""
+    """Return options that publish as the rounds that a trial has, if that is wanted.
+
+    Raises
+    ------
+    InputError
+        None of the trial's rounds can be read, or they publish an estimate, which is not made.
+    """
     if not options.keeps_way:
         return options
-    champion: Any = "forward"
-    for end, path in sorted(numbered_of(root / "models", ".toml").items()):
-        if end == 0 or not is_regular(path):
-            continue
-        try:
-            lineage = read_lineage(path)
-        except (InputError, DamagedError):
-            continue
-        if lineage.command == "calibrate":
-            champion = lineage.options.get("champion", "score")
-            break
+    champion = _champion_of(root)
+    if champion is None:
+        champion = "forward" if options.settings.is_scored else "score"
+    if champion == "likely" and not options.seed_likelihood:
+        raise InputError(
+            f"{root}: its rounds publish the likelihood estimate, which is not made.",
+            hint="Say what to publish instead: --publish forward or --publish score.",
+        )
     return replace(options, settings=replace(options.settings, champion=champion))
+
+
+def _champion_of(root: Path) -> Any:
+    """Return by what the first round that can be read publishes; None where there are no rounds."""
+    damaged: list[Path] = []
+    for ending in (".toml", ".parquet"):
+        for end, path in sorted(numbered_of(root / "models", ending).items()):
+            if end == 0 or not is_regular(path):
+                continue
+            try:
+                lineage = read_lineage(path)
+            except (InputError, DamagedError):
+                damaged.append(path)
+                continue
+            if lineage.command == "calibrate":
+                return lineage.options.get("champion", "score")
+    if damaged:
+        raise InputError(
+            f"{damaged[0]}: cannot be read, nor can another round say what the trial publishes.",
+            hint="Say it: --publish forward, score or likelihood.",
+        )
+    return None
 
 
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
@@ -237,7 +264,7 @@ def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
     """Return a round: population, scores and champion; the model is last."""
     places, before = window.places, _Before(window.previous, None)
     champion = shared.options.settings.champion
-    if champion == "forward":
+    if champion == "forward" and _carries_on(shared, before.population, window.rules):
         before = before._replace(rules=window.rules)
     lineage = _lineage(shared, places, before)
     # A dry run that makes the round before makes this one too, whatever the hashes say now.
@@ -256,6 +283,8 @@ def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
         found = _search(shared, places, control, before, key=checkpoint_key(lineage))
         # First, so that no window is ever both passed over and calibrated.
         discard(skipped_path(shared.root, places.end_s))
+        if champion != "forward":
+            discard(places.rules)
         for output, write in zip(outputs, found.writers(places, shared.seed), strict=True):
             yield Draft(
                 output=output.with_options(generations=found.result.generations), write=write
@@ -263,6 +292,23 @@ def _round(shared: _Shared, window: _Window, control: Statistics) -> Item:
         discard(places.checkpoint)
 
     return Item(outputs=outputs, compute=compute)
+
+
+def _carries_on(shared: _Shared, population: Path | None, rules: Path | None) -> bool:
+    """Return whether a record is of the round that left a population, and of this very model.
+
+    A damaged one is: its round is left out by name, rather than that a new record begins.
+    """
+    if population is None or rules is None:
+        return False
+    try:
+        made, record = read_lineage(population), read_lineage(rules)
+    except (InputError, DamagedError):
+        return True
+    opened = shared.opened
+    files = [shared.options.model_of(opened.trial), *opened.arena_files]
+    same = hash_inputs(shared.root, files).items() <= record.inputs.items()
+    return same and replace(record, schema=made.schema) == made
 
 
 class _Before(NamedTuple):
@@ -331,7 +377,7 @@ def _previous(shared: _Shared, path: Path | None) -> Previous | None:
 
 
 def _record(shared: _Shared, path: Path | None) -> Record:
-    """Return the record of the rules; a new one where its models have other effects."""
+    """Return the record of the rules; a new one where there is none to carry on."""
     if path is None or not _has_same_genes(shared, path):
         return Record()
     return read_record(path, shared.opened.arena.zone_names)

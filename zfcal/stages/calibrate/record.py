@@ -49,7 +49,8 @@ def _numbers(row: dict[str, Any]) -> dict[str, float]:
 
 def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...], n_genes: int) -> Candidate:
     genes = np.array(entry["genes"], dtype=np.float64)
-    if entry["rule"] not in RULE_NAMES or genes.shape != (n_genes,) or not np.isfinite(genes).all():
+    are_genes = genes.shape == (n_genes,) and bool(((genes >= 0) & (genes <= 1)).all())
+    if entry["rule"] not in RULE_NAMES or not are_genes:
         raise ValueError(f"a model of rule {entry['rule']!r} with genes of shape {genes.shape}")
     counts = {
         attribute: np.array(entry["counts"][name], dtype=np.int64)

@@ -11,7 +11,10 @@ from zfcal.stages.events import Note
 
 
 def fits_chance(result: RoundResult) -> bool:
-    """Return whether a model scores more than windows of its own do: then it fits chance too."""
+    """Return whether a model scores more than windows of its own do.
+
+    One that was made of the window then fits what happened there by chance as well.
+    """
     _, _, high = result.ceiling.overall
     return bool(result.scores.overall > high)
 
@@ -41,7 +44,7 @@ def published_note(result: RoundResult, end_s: int) -> Note:
     end_s
         End of its window.
     """
-    parts = [f"Window to {end_s} s: publishes {_what(result, end_s)}.", _worth(result)]
+    parts = [f"Window to {end_s} s: publishes {_what(result, end_s)}.", _worth(result, end_s)]
     if means := standing(result):
         listed = ", ".join(f"{rule} {mean:.3f}" for rule, mean in means.items())
         parts.append(f"Forward S so far: {listed}.")
@@ -53,18 +56,25 @@ def _what(result: RoundResult, end_s: int) -> str:
     if result.handed is None:
         return what
     in_use = result.handed.record.in_use
-    if in_use is not None and in_use.of_s != end_s:
+    if in_use is not None and not _is_of(result, end_s):
         what = f"{what}, of the window to {in_use.of_s} s"
     return f"{what} (rule {result.rule}: {result.handed.choice.because})"
 
 
-def _worth(result: RoundResult) -> str:
+def _is_of(result: RoundResult, end_s: int) -> bool:
+    """Return whether a model was made of the round's own window."""
+    in_use = None if result.handed is None else result.handed.record.in_use
+    return in_use is None or in_use.of_s == end_s
+
+
+def _worth(result: RoundResult, end_s: int) -> str:
     mean, low, high = result.ceiling.overall
     name = "S" if result.scores.named is None else "The score"
     score = f"{name} {_three(result.scores.overall)}"
     band = f"{_three(low)} to {_three(high)}"
     if fits_chance(result):
-        return f"{score} is above the band of its ceiling, {_three(mean)} ({band}): it fits chance."
+        said = f"{score} is above the band of its ceiling, {_three(mean)} ({band})"
+        return f"{said}: it fits chance." if _is_of(result, end_s) else f"{said}."
     return f"{score}, ceiling {_three(mean)} ({band})."
 
 
