@@ -37,12 +37,9 @@ class Killed(BaseException):
 
 
 @pytest.fixture(scope="module")
-def analysed(made_once, tmp_path_factory):
+def analysed(analyse_once):
     """Return a trial of 4 minutes with its statistics, which nobody changes."""
-    root = tmp_path_factory.mktemp("analysed") / "trial"
-    shutil.copytree(made_once(240, 3, 0, 1), root)
-    analyse(root, AnalyseOptions(), say_nothing)
-    return root
+    return analyse_once(240)
 
 
 @pytest.fixture
