@@ -323,9 +323,19 @@ def test_rounds_that_none_can_read_do_not_change_the_way(trial, in_full):
     for path in (trial / "models").glob("000[1-9]*"):
         path.write_bytes(b"damaged")
     asked = dataclasses.replace(in_full, keeps_way=True)
-    with pytest.raises(InputError, match=r"000120\.toml: cannot be read") as caught:
+    with pytest.raises(InputError, match=r"000120\.parquet: cannot be read") as caught:
         calibrate(trial, asked, say_nothing)
     assert "--publish" in caught.value.hint
+
+
+def test_a_damaged_model_alone_is_no_round_to_go_on_from(trial, in_full):
+    """No population is beside it: the round is made anew, as in a trial without rounds."""
+    path = trial / "models" / "000120.toml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(b"damaged")
+    asked = dataclasses.replace(in_full, keeps_way=True)
+    calibrate(trial, asked, say_nothing, task=Task(ends_s=frozenset({120})))
+    assert read_lineage(path).options["champion"] == "forward"
 
 
 def test_one_readable_round_says_the_way(trial, in_full):

@@ -205,7 +205,10 @@ def _as_before(root: Path, options: CalibrateOptions) -> CalibrateOptions:
 
 
 def _champion_of(root: Path) -> Any:
-    """Return by what the first round that can be read publishes; None where there are no rounds."""
+    """Return by what the first round that can be read publishes; None where there are no rounds.
+
+    A model without a population is no round that another could go on from.
+    """
     damaged: list[Path] = []
     for ending in (".toml", ".parquet"):
         for end, path in sorted(numbered_of(root / "models", ending).items()):
@@ -214,7 +217,7 @@ def _champion_of(root: Path) -> Any:
             try:
                 lineage = read_lineage(path)
             except (InputError, DamagedError):
-                damaged.append(path)
+                damaged += [path] if ending == ".parquet" else []
                 continue
             if lineage.command == "calibrate":
                 return lineage.options.get("champion", "score")
