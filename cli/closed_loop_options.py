@@ -8,11 +8,12 @@ from typing import Any
 import click
 
 from .durations import seconds
-from .options import POSITIVE, Command, FiniteRange, adds
+from .options import EXISTING, POSITIVE, Command, FiniteRange, adds
 
 _PRESENT = (
     "real_time", "no_video", "duration_s", "generations", "publish", "champion", "budget_s",
-    "robot", "seed", "wariness", "between_sd", "drift_sd", "drift_s", "noise_mm",
+    "robot", "model", "fish_model", "seed", "wariness", "between_sd", "drift_sd", "drift_s",
+    "noise_mm",
 )  # fmt: skip
 
 _FLAGS = {name: f"--{name.replace('_', '-')}" for name in _PRESENT} | {
@@ -57,6 +58,14 @@ _OPTIONS = adds(
         "robot",
         type=click.Choice(["calibrated", "fixed", "random"]),
         help="What the robot swims by.  [default: calibrated]",
+    ),
+    click.option(
+        "--model", type=EXISTING, help="What the robot begins with; effects drive it as well."
+    ),
+    click.option(
+        "--fish-model",
+        type=EXISTING,
+        help="What the fish swim by, effects and all, before they differ and drift.",
     ),
     click.option("--seed", type=click.IntRange(min=0), help="Of everything.  [default: 1]"),
     click.option(

@@ -41,6 +41,7 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
         zfcal demo /tmp/demo --force
         zfcal demo loop --closed-loop --duration 10min
         zfcal demo baseline --closed-loop --no-video --swims random --seed 3
+        zfcal demo on --closed-loop --fish-model fish.toml --model extended.toml
     """
     from zfcal.stages.trial_context import Task
     from zfcal.virtual.demo import run_demo
@@ -73,7 +74,9 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
     if "noise_mm" in given:
         fish["noise_m"] = given["noise_mm"] * M_PER_MM
     loop: dict[str, Any] = {
-        name: given[name] for name in ("duration_s", "robot", "seed") if name in given
+        name: given[name]
+        for name in ("duration_s", "robot", "seed", "model", "fish_model")
+        if name in given
     }
     published = published_by(asked)
     options = LoopOptions(

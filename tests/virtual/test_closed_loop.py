@@ -3,23 +3,27 @@
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from shapely import MultiPoint
 
-from zfcal.artifacts.models import read_model
+from zfcal.artifacts.arenas import load_arena
+from zfcal.artifacts.lineage import Lineage
+from zfcal.artifacts.models import read_model, write_model
 from zfcal.artifacts.pose_files import read_poses
 from zfcal.artifacts.tables import read_tracks
 from zfcal.calibrate.task import Settings
 from zfcal.errors import DamagedError, InputError
+from zfcal.parameters import natural
 from zfcal.stages.events import Note, UpToDate
 from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import FISH, ROBOT
 from zfcal.virtual.closed_loop import closed_loop
 from zfcal.virtual.eyes import VirtualEyes
 from zfcal.virtual.fish import FishOptions
-from zfcal.virtual.trial import LoopOptions, starting_model
+from zfcal.virtual.trial import LoopOptions, fish_of, prepare, starting_model
 
 pytestmark = pytest.mark.slow
 
@@ -201,3 +205,47 @@ def test_eyes_need_no_background_of_their_own(loop):
     eyes = VirtualEyes(opened)
     assert len(eyes.see(truth).agents) >= 4
     eyes.close()
+
+
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory):
+    """Return a model file of fish that are drawn to one side."""
+    arena = load_arena("two-rooms", Path())
+    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
+    effects = {"directional-drift": {"strength": 0.5, "direction_rad": 0.0, "by_slowness": 0.0}}
+    model = dataclasses.replace(natural(zones, dt_s=0.2), effects=effects)
+    path = tmp_path_factory.mktemp("models") / "fish.toml"
+    write_model(path, model, Lineage(schema="zfcal.model/1", command="init", options={}))
+    return path
+
+
+def test_fish_and_robot_begin_with_the_models_that_are_given(tmp_path, drifting):
+    """The robot of 5 s has the effect, and so have the fish; their truth says so."""
+    asked = dataclasses.replace(
+        SHORT, duration_s=5.0, robot="fixed", fish_model=drifting, model=drifting
+    )
+    trial = closed_loop(tmp_path, asked, lambda _: None)
+    for place in (trial, tmp_path / "tank"):
+        assert read_model(place / "models" / "000000.toml") == read_model(drifting)
+    truth = fish_of(prepare(tmp_path, asked, lambda _: None, Task())).truth.parameters
+    assert truth.effects["directional-drift"] == read_model(drifting).effects["directional-drift"]
+
+
+def test_another_model_is_another_experiment(tmp_path, drifting):
+    """It is refused where one has ended, and where one was begun; forced, it is made anew."""
+    plain = dataclasses.replace(SHORT, duration_s=5.0, robot="fixed")
+    trial = closed_loop(tmp_path, plain, lambda _: None)
+    asked = dataclasses.replace(plain, model=drifting)
+    with pytest.raises(InputError, match="another model than this experiment begins with"):
+        closed_loop(tmp_path, asked, lambda _: None)
+    closed_loop(tmp_path, asked, lambda _: None, task=Task(force=True))
+    assert read_model(trial / "models" / "000000.toml") == read_model(drifting)
+    moved = dataclasses.replace(asked, fish_model=trial / "models" / "000000.toml")
+    with pytest.raises(InputError, match="another model"):
+        closed_loop(tmp_path, moved, lambda _: None)
+
+
+def test_a_random_robot_takes_no_model(drifting):
+    """An option that cannot take effect is an error."""
+    with pytest.raises(InputError, match="swims by no model"):
+        LoopOptions(robot="random", model=drifting)

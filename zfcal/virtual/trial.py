@@ -13,14 +13,17 @@ from typing import Literal, Protocol, final
 from shapely import get_coordinates
 
 from zfcal.arena import Arena
+from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.models import SCHEMA as MODEL
-from zfcal.artifacts.models import write_model
+from zfcal.artifacts.models import read_model_for, write_model
 from zfcal.artifacts.pose_messages import POSES
+from zfcal.artifacts.reading.contents import hash_of
 from zfcal.artifacts.validation import read_json
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
+from zfcal.model.effects.genome import check_effects
 from zfcal.parameters import Parameters, ZoneParameters, natural
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import Tell, say_nothing
@@ -31,7 +34,8 @@ from zfcal.stages.track.minutes import Minutes, Origins, Revise
 from zfcal.stages.track.outcome import measured
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FramePoses
-from zfcal.trial import LOOP_NAME
+from zfcal.trial import LOOP_NAME, Trial
+from zfcal.units import default_dt_s
 from zfcal.virtual.fish import FishOptions, VirtualFish
 
 FPS = 15.0
@@ -71,6 +75,11 @@ class LoopOptions:
         with the tracker's noise.
     seed
         Of the fish, the robot, the images and the rounds.
+    fish_model
+        The species: what the fish swim by before they differ and drift, effects and all; None
+        for natural fish.
+    model
+        The robot's starting model, effects and all; None for that of another laboratory.
     n_workers
         Threads of the calibration; None for one a core.
     """
@@ -81,9 +90,16 @@ class LoopOptions:
     settings: Settings = field(default_factory=lambda: LOOP_SETTINGS)
     video: bool = True
     seed: int = 1
+    fish_model: Path | None = None
+    model: Path | None = None
     n_workers: int | None = None
 
     def __post_init__(self) -> None:
+        if self.model is not None and self.robot == "random":
+            raise InputError(
+                f"{self.model}: a random robot swims by no model.",
+                hint="Take --swims calibrated or --swims fixed, or leave --model out.",
+            )
         if not 1.0 <= self.duration_s < _LONGEST_S:
             raise InputError(
                 f"A closed loop needs a duration from 1 s on, got {self.duration_s!r} s.",
@@ -151,12 +167,40 @@ def prepare(folder: Path, options: LoopOptions, tell: Tell, task: Task) -> Exper
     new = NewTrial(
         n_fish=_N_FISH, n_robots=1, fps=FPS, arena=_ARENA, seed=options.seed, source=source
     )
-    made = create_trial(folder / "tank", new, tell, task=task)
-    arena = open_trial(made.root).arena
-    start = starting_model(arena, dt_s=made.dt_s, robot=options.robot)
-    trial = create_trial(folder / "trial", new, tell, task=task, model=start)
-    tank, rig = open_trial(made.root), open_trial(trial.root)
+    arena, dt_s = load_arena(_ARENA, Path()), default_dt_s(FPS)
+    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
+    species = _asked(options.fish_model, arena, dt_s) or natural(zones, dt_s=dt_s)
+    start = _asked(options.model, arena, dt_s)
+    start = start or starting_model(arena, dt_s=dt_s, robot=options.robot)
+    tank, rig = (
+        _begun(create_trial(folder / name, new, tell, task=task, model=model), model, task)
+        for name, model in (("tank", species), ("trial", start))
+    )
     return Experiment(tank=tank, trial=rig, options=options)
+
+
+def _begun(trial: Trial, model: Parameters, task: Task) -> OpenTrial:
+    """Return a trial that begins with a model, which one that was there before may not."""
+    opened, path = open_trial(trial.root), trial.root / trial.model
+    if read_model_for(path, opened.arena, dt_s=trial.dt_s) == model:
+        return opened
+    if not task.force:
+        raise InputError(
+            f"{path}: is another model than this experiment begins with.",
+            hint="Take another directory, or begin anew with --force; the robot begins with "
+            "--model, the fish with --fish-model.",
+        )
+    options: dict[str, JSON] = {"arena": trial.arena, "dt_s": trial.dt_s}
+    write_model(path, model, Lineage(schema=MODEL, command="init", options=options))
+    return opened
+
+
+def _asked(path: Path | None, arena: Arena, dt_s: float) -> Parameters | None:
+    if path is None:
+        return None
+    model = read_model_for(path, arena, dt_s=dt_s)
+    check_effects(model, of=path)
+    return model
 
 
 def _lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
@@ -171,6 +215,8 @@ def _lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
         "steps": options.settings.steps,
         "champion": options.settings.champion,
     }
+    models = {"fish_model": options.fish_model, "model": options.model}
+    said |= {name: hash_of(path) for name, path in models.items() if path is not None}
     return Lineage(schema=schema, command="demo", options=said, seed=options.seed)
 
 
@@ -190,12 +236,13 @@ def is_whole(experiment: Experiment) -> bool:
     said = read_json(place).get("options")
     asked = _lineage_of_loop(LOOP_NAME, experiment.options).options
     there: dict[str, JSON] = said if isinstance(said, dict) else {}
-    other = [name for name, value in asked.items() if there.get(name) != value]
+    named = {*asked, *({"fish_model", "model"} & there.keys())}
+    other = [name for name in sorted(named) if there.get(name) != asked.get(name)]
     if other:
         name = other[0]
         raise InputError(
             f"{experiment.root}: holds another experiment: its {name} is "
-            f"{there.get(name, 'not known')}, asked for {asked[name]}.",
+            f"{there.get(name, 'not known')}, asked for {asked.get(name, 'none')}.",
             hint="Take another directory, or begin anew with --force.",
         )
     return True
@@ -336,7 +383,8 @@ class Files:
 
 
 def fish_of(experiment: Experiment) -> VirtualFish:
-    """Return the fish of an experiment, natural ones but for what the options say."""
+    """Return the fish of an experiment: the tank's model, but for what the options say."""
     tank = experiment.tank
-    zones = tuple((zone.name, zone.follows_walls) for zone in tank.arena.zones)
-    return VirtualFish(natural(zones, dt_s=tank.trial.dt_s), tank, experiment.options.fish)
+    path = tank.trial.root / tank.trial.model
+    species = read_model_for(path, tank.arena, dt_s=tank.trial.dt_s)
+    return VirtualFish(species, tank, experiment.options.fish)
