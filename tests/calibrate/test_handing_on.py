@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from zfcal.behaviour.scores import compare
 from zfcal.calibrate.ceiling import window_noise
 from zfcal.calibrate.group import scale_gamma
 from zfcal.calibrate.rounds import calibrate_window
@@ -12,7 +13,6 @@ from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
-    MADE,
     MEMORY,
     NEAREST,
     RULES,
@@ -128,11 +128,11 @@ def test_without_an_estimate_the_windows_best_is_handed_on(task, forward, small)
 @pytest.mark.parametrize("rule", [SCORE, LIKELIHOOD, COMPROMISE, MEMORY, NEAREST])
 def test_the_rule_that_leads_hands_on_its_model(later, old, forward, rule):
     """Genes of its model, and S by a simulation of them."""
-    task = later({KEEP: 0.5, **dict.fromkeys(MADE, 0.5), rule: 0.9}, old)
+    task = later({**dict.fromkeys(RULES, 0.5), rule: 0.9}, old)
     result = calibrate_window(task, forward)
     assert result.rule == rule
     in_use = result.handed.record.in_use
-    assert in_use.rule == rule
+    assert in_use.rule == result.handed.record.in_charge == rule
     np.testing.assert_allclose(scale_gamma(result.genes, 3), in_use.genes)
     scored = task.confirmation(forward).scores(result.genes[None]).S[0]
     assert scored == result.scores.S
@@ -147,7 +147,7 @@ def test_the_compromise_is_half_way_between_best_and_estimate(later, old, forwar
 
 def test_a_model_that_is_kept_stays_to_the_bit(later, old, forward):
     """It says of which window it is, and is judged as it drives on: with speeds of the new one."""
-    task = later({KEEP: 0.9, SCORE: 0.5}, old)
+    task = later({KEEP: 0.9, NEAREST: 0.5}, old)
     slow = np.zeros_like(task.control.speed)
     slow[:, 0] = task.control.speed.sum(axis=1)
     task = replace(task, control=replace(task.control, speed=slow))
@@ -159,6 +159,29 @@ def test_a_model_that_is_kept_stays_to_the_bit(later, old, forward):
     driven = runs.as_statistics(0, task.control.zone_names)
     assert counts_of(in_use.long_run) == counts_of(driven) != counts_of(old.long_run)
     assert task.confirmation(forward).scores(old.genes[None]).S[0] == result.scores.S
+
+
+def test_the_nearest_model_takes_over_where_it_is_nearer_by_more_than_chance(later, old, forward):
+    """Else the model in use stays: windows of one model differ as much."""
+    task = later({}, old)
+    noise = window_noise(calibrate_window(task, replace(forward, champion="score")).ceiling)
+    found = {}
+    for name, genes in (("poor", 1.0 - old.genes), ("good", task.guests[0])):
+        own = scale_gamma(genes, 3)
+        run = task.confirmation(forward).simulate(own[None])
+        in_use = replace(old, genes=own, long_run=run.as_statistics(0, task.control.zone_names))
+        record = replace(task.record, models=(in_use,), in_use=in_use)
+        result = calibrate_window(replace(task, record=record), forward)
+        (nearest,) = [m for m in result.handed.record.models if m.rule == NEAREST]
+        gain = max(
+            compare(model.long_run, task.control).S
+            for model in result.handed.record.models
+            if model.rule != KEEP
+        ) - (compare(in_use.long_run, task.control).S)
+        found[name] = gain > noise
+        assert (nearest.genes == own).all() == (not found[name])
+        assert nearest.of_s == (420 if found[name] else 300)
+    assert found == {"poor": True, "good": False}
 
 
 def test_before_rules_are_judged_the_last_champion_is_in_use(guided, forward, truth):

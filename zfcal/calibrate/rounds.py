@@ -23,6 +23,7 @@ from zfcal.calibrate.history import Generation
 from zfcal.calibrate.intervals import Intervals, parameter_intervals
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.rules import (
+    CHANGE,
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
@@ -240,20 +241,18 @@ def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> Ha
     record = task.record.judged(task.control, end_s, noise)
     made = _made(task, settings, best)
     record = record.with_models(made.values())
+    made |= _handed_before(task, settings, record)
     nearest = record.nearest(task.control)
     if nearest is not None:
         made |= _swum(task, settings, {NEAREST: nearest.genes}, of_s=nearest.of_s)
-    in_use = record.in_use
-    if in_use is None:
-        made |= _swum(task, settings, {KEEP: _first_in_use(task)}, of_s=end_s)
-    else:
-        made |= _swum(task, settings, {KEEP: in_use.genes}, of_s=in_use.of_s)
+        made[NEAREST] = _changed_for(task, made[NEAREST], made[KEEP], noise)
     choice = record.choose(set(made) - {KEEP}, noise)
     chosen = made[choice.rule]
     record = replace(
         record.with_models([made[rule] for rule in (NEAREST, KEEP) if rule in made]),
         n_rounds=record.n_rounds + 1,
         in_use=chosen,
+        in_charge=choice.in_charge,
     )
     if choice.rule == SCORE:
         return HandedOn(choice=choice, record=record, confirmed=None, ceiling=None)
@@ -285,6 +284,22 @@ def _made(task: Task, settings: Settings, best: Confirmed) -> dict[str, Candidat
     if task.memory is not None:
         others[MEMORY] = scale_gamma(task.memory, n_zones)
     return made | _swum(task, settings, others, of_s=end_s)
+
+
+def _handed_before(task: Task, settings: Settings, record: Record) -> dict[str, Candidate]:
+    """Return the model that drives until this round's does."""
+    if record.in_use is None:
+        of_s = task.seeds.window_end_s
+        return _swum(task, settings, {KEEP: _first_in_use(task)}, of_s=of_s)
+    return _swum(task, settings, {KEEP: record.in_use.genes}, of_s=record.in_use.of_s)
+
+
+def _changed_for(task: Task, nearest: Candidate, kept: Candidate, noise: float) -> Candidate:
+    """Return the nearest model, or the one in use where that is as near but for chance."""
+    gain = compare(nearest.long_run, task.control).S - compare(kept.long_run, task.control).S
+    if gain <= CHANGE * noise:
+        return replace(kept, rule=NEAREST)
+    return nearest
 
 
 def _first_in_use(task: Task) -> Floats:

@@ -3,14 +3,17 @@
 A model that fits a window best fits what happened in it by chance as well, and the most likely
 model is none where the law is wrong. Which of these faults is the larger one differs between
 recordings, and no window that a model was fitted to can tell. So each rule has a record: what its
-models scored on the first window that they had not seen.
+models scored on the first window that they had not seen. One rule is in charge until another one is
+surely better. The first is `NEAREST`: a window chooses among models of which most were made of
+others, so what fits a window by chance is not handed on for long.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import stdtrit
@@ -28,8 +31,8 @@ SCORE, LIKELIHOOD, COMPROMISE, MEMORY, NEAREST, KEEP = RULES = (
     "keep",
 )
 """The best of the window by its score; its likelihood estimate; half way between these two; the
-estimate over all minutes so far, older ones counting less; of all models that were made so far, the
-one that is nearest to the window; the model in use."""
+estimate over all minutes so far, older ones counting less; of all models made so far, the nearest
+to the window, where it is nearer than the one in use by more than chance; the model in use."""
 
 SAYS = {
     SCORE: "the window's best by its score",
@@ -53,8 +56,12 @@ FIRST_ROUNDS = 2
 """In these no model has been followed by a window yet."""
 
 LEVEL = 0.8
-"""How sure a lead has to be before the model in use changes. Of one comparison of independent
-windows one in five leads of this size would be chance; of the best of several rules, more."""
+"""How sure the largest of all leads has to be before another rule takes over: where no rule is
+better than the one in charge, chance makes one of them lead as far in one round of five."""
+
+CHANGE = 1.0
+"""A model nearer to the window than the one in use is taken if its score is higher by so many
+standard deviations of what windows of one model differ by."""
 
 _MOST_MODELS = 60
 """Models that are kept for `NEAREST`, the newest."""
@@ -124,16 +131,25 @@ class Lead:
         Of the differences, window by window, and its standard error.
     n
         Windows.
+    n_apart
+        So many windows that share no sample would say as much.
     """
 
     mean: float
     error: float
     n: int
+    n_apart: float
 
-    @property
-    def is_sure(self) -> bool:
-        """Whether chance alone seldom leads as far."""
-        return self.n > 0 and bool(self.mean > stdtrit(self.n, LEVEL) * self.error)
+    def is_sure(self, n_rules: int) -> bool:
+        """Return whether chance alone seldom leads as far.
+
+        Parameters
+        ----------
+        n_rules
+            Rules of which this one is the best (Bonferroni).
+        """
+        level = 1 - (1 - LEVEL) / n_rules
+        return self.n > 0 and bool(self.mean > stdtrit(self.n_apart, level) * self.error)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,12 +163,15 @@ class Choice:
     because
         In words.
     lead
-        Over the model in use; None where nothing was compared.
+        The largest over the rule that was in charge; None where nothing was compared.
+    in_charge
+        The rule that publishes from now on, until another one is surely better.
     """
 
     rule: str
     because: str
     lead: Lead | None = None
+    in_charge: str = NEAREST
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -169,12 +188,15 @@ class Record:
         Rounds so far.
     in_use
         The model that was handed on last; None before the first round.
+    in_charge
+        The rule that published last, `NEAREST` before rules were judged.
     """
 
     rows: tuple[Forward, ...] = ()
     models: tuple[Candidate, ...] = ()
     n_rounds: int = 0
     in_use: Candidate | None = None
+    in_charge: str = NEAREST
 
     def judged(self, control: Statistics, end_s: int, noise: float) -> Record:
         """Return the record with the models that a window is the first to follow.
@@ -210,7 +232,10 @@ class Record:
         return replace(self, models=tuple(kept))
 
     def nearest(self, control: Statistics) -> Candidate | None:
-        """Return the model made so far that is nearest to a window; None without any."""
+        """Return the model made so far that is nearest to a window; None without any.
+
+        Most of them were made of other windows, so this one is their test.
+        """
         own = [model for model in self.models if model.rule in MADE]
         scores = [np.nan_to_num(compare(m.long_run, control).S, nan=-1.0) for m in own]
         return own[int(np.argmax(scores))] if own else None
@@ -233,14 +258,14 @@ class Record:
             name: {row.window_end_s: row.S for row in self.rows if row.rule == name}
             for name in (rule, over)
         }
-        both = [end for end in by[rule] if end in by[over]]
-        apart = np.array([by[rule][end] - by[over][end] for end in both])
-        apart = apart[~np.isnan(apart)]
-        n = len(apart)
-        if not n:
-            return Lead(mean=math.nan, error=math.nan, n=0)
-        variance = (((apart - apart.mean()) ** 2).sum() + noise**2) / n
-        return Lead(mean=float(apart.mean()), error=float(math.sqrt(variance / n)), n=n)
+        found = {end: by[rule][end] - by[over][end] for end in by[rule] if end in by[over]}
+        ends = sorted(end for end, value in found.items() if not math.isnan(value))
+        if not ends:
+            return Lead(mean=math.nan, error=math.nan, n=0, n_apart=0.0)
+        apart, n_apart = np.array([found[end] for end in ends]), _n_apart(ends)
+        variance = (((apart - apart.mean()) ** 2).sum() + noise**2) / len(ends)
+        error = math.sqrt(variance / n_apart)
+        return Lead(mean=float(apart.mean()), error=error, n=len(ends), n_apart=n_apart)
 
     def choose(self, made: Collection[str], noise: float) -> Choice:
         """Return the rule that publishes.
@@ -252,19 +277,43 @@ class Record:
         noise
             Standard deviation of S between windows of one model.
         """
-        first = LIKELIHOOD if LIKELIHOOD in made else SCORE
-        # Rules may lack a model in some minutes: each is held against `KEEP` on the minutes it has.
-        found = {rule: self.lead(rule, KEEP, noise) for rule in RULES if rule in made}
-        leads = {rule: lead for rule, lead in found.items() if lead.n}
-        if self.n_rounds < FIRST_ROUNDS or not leads:
+        if self.n_rounds < FIRST_ROUNDS:
+            first = LIKELIHOOD if LIKELIHOOD in made else SCORE
             return Choice(rule=first, because="no window has followed a model yet")
-        leader = max(leads, key=lambda rule: leads[rule].mean)
-        lead = leads[leader]
-        if not lead.mean > 0:
-            return Choice(rule=KEEP, because="no rule has done better than to keep it", lead=lead)
-        if not lead.is_sure:
-            return Choice(rule=KEEP, because=f"the lead of {leader} may be chance", lead=lead)
-        return Choice(rule=leader, because="its models have been the better ones", lead=lead)
+        old = self.in_charge
+        # Rules may lack a model in some minutes: each is held against the one in charge on the
+        # minutes that both have.
+        rules = [rule for rule in RULES if rule != old and (rule in made or rule == KEEP)]
+        leads = {rule: self.lead(rule, old, noise) for rule in rules}
+        leads = {rule: lead for rule, lead in leads.items() if lead.n}
+        best = max(leads, key=lambda rule: leads[rule].mean, default=None)
+        lead = None if best is None else leads[best]
+        if best is not None and lead is not None and lead.is_sure(len(leads)):
+            because = f"its models have been better than those of {old}"
+            return Choice(rule=best, because=because, lead=lead, in_charge=best)
+        if old not in {*made, KEEP}:
+            because = f"{old} has no model of this window"
+            return Choice(rule=KEEP, because=because, lead=lead, in_charge=old)
+        return Choice(rule=old, because=_stays(best, lead), lead=lead, in_charge=old)
+
+
+def _stays(best: str | None, lead: Lead | None) -> str:
+    """Return why the rule in charge publishes."""
+    if lead is None or not lead.mean > 0:
+        return "no rule has been better"
+    return f"the lead of {best} may be chance"
+
+
+def _n_apart(ends_s: Sequence[int]) -> float:
+    """Return how many windows that share no sample windows are worth: by the time that they cover.
+
+    Parameters
+    ----------
+    ends_s
+        Where they end, sorted.
+    """
+    covered = WINDOW_S + sum(min(WINDOW_S, later - end) for end, later in pairwise(ends_s))
+    return covered / WINDOW_S
 
 
 def _row(model: Candidate, control: Statistics, end_s: int, noise: float) -> Forward:

@@ -45,7 +45,9 @@ def record():
         )
     )
     models = (model(SCORE, 180, 1), model(KEEP, 180, 2))
-    return Record(rows=rows, models=models, n_rounds=3, in_use=model(SCORE, 120, 3))
+    return Record(
+        rows=rows, models=models, n_rounds=3, in_use=model(SCORE, 120, 3), in_charge=SCORE
+    )
 
 
 def write(path, record):
@@ -62,6 +64,7 @@ def test_a_record_comes_back_to_the_byte(tmp_path, record):
     assert first.read_bytes() == second.read_bytes()
     assert (found.n_rounds, len(found.rows), len(found.models)) == (3, 2, 2)
     assert (found.models[0].genes == record.models[0].genes).all()
+    assert found.in_charge == SCORE
     assert (found.in_use.long_run.transition == record.in_use.long_run.transition).all()
     assert found.rows[0] == record.rows[0]
     assert math.isnan(found.rows[1].S)
@@ -94,6 +97,8 @@ def test_the_table_is_what_the_schema_says(tmp_path, record):
         {"models": [{}]},
         {"models": ["score"]},
         {"in_use": "score"},
+        {"in_charge": "the best"},
+        {"in_charge": None},
         {"in_use": {"rule": "score", "made_at_s": "soon", "of_s": 1, "genes": [0, 0, 0]}},
         {"n_rounds": "many"},
         {"n_rounds": None},

@@ -67,8 +67,8 @@ def rules_picture(scores: Sequence[RuleScore]) -> Picture | None:
             for rule in rules
         ),
         note="Each rule has a model at the end of a window, and is judged by what that scores on "
-        "the first window of 120 s that follows. The rule that leads by more than chance "
-        "publishes next.",
+        "the first window of 120 s that follows. One rule is in charge, and another takes "
+        "over where it leads by more than chance.",
     )
 
 

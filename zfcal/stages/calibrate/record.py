@@ -35,6 +35,7 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
             models=tuple(_candidate(entry, zone_names, n_genes) for entry in models),
             n_rounds=int(extra["n_rounds"]),  # type: ignore[arg-type]
             in_use=None if in_use is None else _candidate(in_use, zone_names, n_genes),
+            in_charge=_rule(extra["in_charge"]),
         )
     except (KeyError, TypeError, ValueError, OverflowError, InputError) as error:
         raise DamagedError(
@@ -47,17 +48,23 @@ def _numbers(row: dict[str, Any]) -> dict[str, float]:
     return {key: math.nan if row[key] is None else row[key] for key in ("S", "low", "high")}
 
 
+def _rule(name: object) -> str:
+    if name not in RULE_NAMES:
+        raise ValueError(f"{name!r} is no rule")
+    return str(name)
+
+
 def _candidate(entry: dict[str, Any], zone_names: tuple[str, ...], n_genes: int) -> Candidate:
     genes = np.array(entry["genes"], dtype=np.float64)
     are_genes = genes.shape == (n_genes,) and bool(((genes >= 0) & (genes <= 1)).all())
-    if entry["rule"] not in RULE_NAMES or not are_genes:
-        raise ValueError(f"a model of rule {entry['rule']!r} with genes of shape {genes.shape}")
+    if not are_genes:
+        raise ValueError(f"a model with genes of shape {genes.shape}")
     counts = {
         attribute: np.array(entry["counts"][name], dtype=np.int64)
         for name, attribute in ATTRIBUTES.items()
     }
     return Candidate(
-        rule=entry["rule"],
+        rule=_rule(entry["rule"]),
         made_at_s=int(entry["made_at_s"]),
         of_s=int(entry["of_s"]),
         genes=genes,
@@ -82,6 +89,7 @@ def write_record(
         "gene_names": list(gene_names),
         "models": [_entry(model) for model in record.models],
         "in_use": None if record.in_use is None else _entry(record.in_use),
+        "in_charge": record.in_charge,
         "n_rounds": record.n_rounds,
     }
     write_table(path, make_table(RULES, columns), lineage, extra=extra)

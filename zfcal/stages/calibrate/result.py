@@ -65,6 +65,7 @@ def published_table(result: RoundResult) -> dict[str, JSON]:
             "rule": choice.rule,
             "says": SAYS[choice.rule],
             "because": choice.because,
+            "in_charge": choice.in_charge,
             "of_window_end_s": record.in_use.of_s if record.in_use else None,
             "lead": None if lead is None else or_none(lead.mean),
             "lead_error": None if lead is None else or_none(lead.error),
