@@ -8,7 +8,7 @@ import pytest
 from zfcal.report.integration import NOT_COMPARED
 from zfcal.report.summary import gaps, statements, worst_features
 from zfcal.report.trials_summary import gaps_of_trials, statements_of_trials
-from zfcal.report.views import FEATURE_NAMES, MODEL, Integration, Mark
+from zfcal.report.views import FEATURE_NAMES, MODEL, Integration, Mark, Published
 
 
 def answer_to(view, start):
@@ -265,6 +265,24 @@ def test_more_than_a_perfect_model_is_overfitting(make_view, course):
     assert "overfitting" in said.answer
     assert "In 0 of 3 windows S lies where" in said.answer
     assert said.figure == ("121 %", "of what a perfect model would score: overfitting")
+
+
+def test_a_model_of_another_window_does_not_overfit(make_view, course):
+    """Of three windows above the range one has a model of its own; two have that of the first."""
+    courses = {(MODEL, "S", None): course([0.97] * 3, ceiling=0.8)}
+    view = make_view(n_windows=3, courses=courses)
+    kept = [
+        replace(each, published=Published(rule="nearest", of_s=120))
+        for each in view.rounds
+        if each.second
+    ]
+    said = answer_to(replace(view, rounds=kept), "Does the model")
+
+    assert "In 1 of 3 windows S lies above it" in said.answer
+    assert (
+        "In 2 of 3 windows S of a model that was made of another window lies above" in said.answer
+    )
+    assert said.figure == ("121 %", "of what a perfect model would score")
 
 
 def test_a_published_value_outside_the_interval_of_the_likelihood_is_named(make_view):

@@ -118,7 +118,7 @@ def _model(view: TrialView) -> Statement | None:
         return None
     known = ~np.isnan(course.value)
     mean, last, n = course.mean(), course.mark(course.last), int(known.sum())
-    above, within = _against_band(course)
+    above, elsewhere, within = _against_band(course, made_elsewhere(view))
     reaches = (
         f"It reaches {_percent(mean)} of its ceiling."
         if not _is_above(mean)
@@ -147,20 +147,42 @@ def _model(view: TrialView) -> Statement | None:
         parts.append("The score alone gives no reason to doubt the model.")
     if above:
         parts.append(f"In {above} of {_windows(n)} S lies above it: {OVERFITTING}.")
+    if elsewhere:
+        parts.append(
+            f"In {elsewhere} of {_windows(n)} S of a model that was made of another window lies "
+            "above it, which is no overfitting: such windows happen to be typical ones."
+        )
     parts.extend(_hidden(view))
     return Statement(
         question="Does the model behave like these fish?",
         answer=" ".join(parts),
-        figure=(_percent(mean), _OF_PERFECT + (_TOO_MUCH if _is_above(mean) else "")),
+        figure=(
+            _percent(mean),
+            _OF_PERFECT + (_TOO_MUCH if _is_above(mean) and above >= elsewhere else ""),
+        ),
     )
 
 
-def _against_band(course: Course) -> tuple[int, int]:
-    """Return in how many windows a score is above the ceiling's range, and in how many within."""
+def made_elsewhere(view: TrialView) -> frozenset[int]:
+    """Return the ends of windows whose published model was made of another one, in seconds."""
+    return frozenset(
+        each.second
+        for each in view.rounds
+        if each.published is not None and each.published.of_s not in {None, each.second}
+    )
+
+
+def _against_band(course: Course, elsewhere: frozenset[int]) -> tuple[int, int, int]:
+    """Return in how many windows a score is above the ceiling's range, and in how many within.
+
+    Above are first those of models that were made of the window, then the others.
+    """
     known = ~(np.isnan(course.value) | np.isnan(course.low))
     value, low, high = course.value[known], course.low[known], course.high[known]
     above = value > np.where(np.isnan(high), np.inf, high)
-    return int(above.sum()), int((~above & (value >= low)).sum())
+    other = np.isin(course.end_s[known], sorted(elsewhere))
+    within = ~above & (value >= low)
+    return int((above & ~other).sum()), int((above & other).sum()), int(within.sum())
 
 
 def _is_above(mark: Mark) -> bool:

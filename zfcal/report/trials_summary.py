@@ -9,7 +9,7 @@ import numpy as np
 
 from zfcal.report.contents import Statement
 from zfcal.report.numbers import mean_and_sd
-from zfcal.report.summary import OVERFITTING, Gap, gaps
+from zfcal.report.summary import OVERFITTING, Gap, gaps, made_elsewhere
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
 
@@ -36,8 +36,10 @@ def _models(views: Sequence[TrialView]) -> Statement | None:
     if not known:
         return None
     value, ceiling = (_spread([getattr(m, part) for m in known]) for part in ("value", "ceiling"))
+    # Models that were made of other windows than they are scored on cannot overfit these.
+    own = [2 * len(made_elsewhere(view)) <= len(view.rounds) for view in views]
     share = [mark.against_ceiling for mark in known if not math.isnan(mark.against_ceiling)]
-    above = sum(mark.value > mark.high for mark in known)
+    above = sum(mark.value > mark.high and own for mark, own in zip(marks, own, strict=True))
     more = f" In {above} of them it lies above the range of a perfect model: {OVERFITTING}."
     return Statement(
         question="Do the models behave like the fish?",
