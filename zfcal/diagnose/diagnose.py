@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,6 +46,7 @@ from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.second_look import second_look
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVALS,
@@ -138,7 +140,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
         lambda: _where(own[0], rows),
         n_workers=question.n_workers,
     )
-    judged = _judged(case, rows, selection, omnibus)
+    judged = _looked_again(case, _judged(case, rows, selection, omnibus))
     return _diagnosis(case, rows, selection, judged, where)
 
 
@@ -166,6 +168,24 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
         halves=halves,
         omnibus=omnibus,
         suspicious=wavers or is_suspicious(case.question, omnibus),
+    )
+
+
+def _looked_again(case: Case, judged: _Judged) -> _Judged:
+    """Return what stands once features were asked what the law of headings lacks."""
+    named = [step for step in judged.kept if not step.choice.best.candidate.effect.on_speed]
+    there = named[0] if named else None
+    # What features put in its place takes the place of what was added after it as well.
+    n = judged.kept.index(there) if there else len(judged.kept)
+    before = judged.kept[n - 1].choice.best.screen if n else case.screen
+    found = second_look(case, before, there)
+    if found is None:
+        return judged
+    return dataclasses.replace(
+        judged,
+        kept=(*judged.kept[:n], found.step),
+        confirmed=(*judged.confirmed[:n], found.confirmed),
+        suspicious=False,
     )
 
 

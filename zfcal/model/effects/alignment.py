@@ -8,6 +8,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, Tilt, attended, evenly
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -100,6 +101,42 @@ def _late(states: Floats, dt_s: float, _random: np.random.Generator) -> Floats:
     return changed
 
 
+_KNOTS_M = (0.0, 0.025, 0.05, 0.1, 0.2, 0.4, 1.0)
+_COMPANY_M = 0.15
+
+
+def _headings(seen: Seen) -> Floats:
+    return seen.heading
+
+
+def _near_and_far(seen: Seen) -> Floats:
+    return np.concatenate([seen.by_distance(_KNOTS_M)[..., :-1], seen.nearest], axis=2)
+
+
+def _of_all(seen: Seen) -> Floats:
+    return np.concatenate([_near_and_far(seen), attended(evenly)(seen)], axis=2)
+
+
+def _summed(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sjd->sbd", _near_and_far(seen), seen.heading))
+
+
+def _mean(seen: Seen) -> Floats:
+    """Return the unit vector of the mean heading of those within 0.15 m."""
+    total = (seen.heading * (seen.distance_m < _COMPANY_M)[..., None]).sum(axis=1)
+    length = np.linalg.norm(total, axis=1)
+    return (total / np.maximum(length, 1e-9)[:, None])[:, None]
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(label="drawn, widely", toward=_headings, weights=_of_all, kappa=3.0),
+    Component(label="drawn", toward=_headings, weights=_of_all, kappa=9.0),
+    Component(label="drawn, as seen", toward=_headings, weights=attended(evenly), kappa=9.0),
+    Tilt(label="leaning", vectors=_summed),
+    Tilt(label="leaning, the mean", vectors=_mean),
+)
+
+
 EFFECT = Effect(
     name="alignment",
     says="Fish turn toward the direction in which their neighbours swim.",
@@ -163,4 +200,5 @@ EFFECT = Effect(
     needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
     other_forms=("generic:heading:neighbour-heading",),
     control=Control(name="neighbours' heading 12 s ago", states=_late),
+    features=lambda _arena: _FEATURES,
 )

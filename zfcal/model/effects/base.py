@@ -38,6 +38,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
+from zfcal.model.effects.features import Feature
 
 MAX_PARAMETERS = 8
 
@@ -130,6 +131,10 @@ def _as_it_is(_arena: Arena) -> Shapes:
     return ({},)
 
 
+def _no_features(_arena: Arena) -> tuple[Feature, ...]:
+    return ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """Something that fish do and that the base model lacks.
@@ -193,6 +198,9 @@ class Effect:
         Another effect that fish with this one may seem to have.
     control
         A negative control that belongs to it.
+    features
+        Of an arena: what its name means for headings, whatever its form; none for an effect on
+        speed.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     needs
@@ -227,6 +235,7 @@ class Effect:
     other_forms: tuple[str, ...] = ()
     looks_like: Likeness | None = None
     control: Control | None = None
+    features: Callable[[Arena], tuple[Feature, ...]] = _no_features
     fixed: tuple[str, ...] = ()
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 

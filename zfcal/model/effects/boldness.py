@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from zfcal.arena import Arena
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
+from zfcal.model.effects.features import Feature, Leaving, Seen
 from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -31,6 +35,15 @@ def _shapes(arena: Arena) -> Shapes:
 
 def _lacks(company: Company) -> str | None:
     return None if company.n_fish > 1 else "a second fish"
+
+
+def _who(seen: Seen) -> Floats:
+    """Return one for each track but the first, shape (step, track - 1)."""
+    tracks = np.unique(seen.track)
+    return (seen.track[:, None] == tracks[1:]).astype(np.float64)
+
+
+_FEATURES: tuple[Feature, ...] = (Leaving(label="who", weights=_who),)
 
 
 EFFECT = Effect(
@@ -63,4 +76,5 @@ EFFECT = Effect(
     identity_s=300.0,
     by_trait=True,
     fixed=("heading_share",),
+    features=lambda _arena: _FEATURES,
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.features import Feature, Leaving, Seen, hats
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -21,6 +23,16 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 
 def _lacks(company: Company) -> str | None:
     return needs_neighbour(company) if company.has_rooms else "rooms"
+
+
+_KNOTS_S = (0.0, 1.0, 2.0, 4.0, 6.0)
+
+
+def _freshly_left(seen: Seen) -> Floats:
+    return hats(seen.left_s, _KNOTS_S)[:, :-1]
+
+
+_FEATURES: tuple[Feature, ...] = (Leaving(label="time", weights=_freshly_left),)
 
 
 EFFECT = Effect(
@@ -63,4 +75,5 @@ EFFECT = Effect(
     lacks=_lacks,
     identity_s=10.0,
     fixed=("heading_share",),
+    features=lambda _arena: _FEATURES,
 )

@@ -4,20 +4,65 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, Tilt
 from zfcal.model.effects.forms import SLOWEST_M_S, SPEED_M_S, cut, tilt
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
 
 _MOST = 4.0
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the direction."""
+    out[0], out[1], out[2] = math.cos(parameters[1]), math.sin(parameters[1]), parameters[4]
+    return parameters[0] if parameters[3] > 0.0 else 0.0
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by their component along the direction, those of slow steps more."""
+    if parameters[3] > 0.0:
+        return 1.0
     along = ux * math.cos(parameters[1]) + uy * math.sin(parameters[1])
     strength = parameters[0] * (SPEED_M_S / max(speed, SLOWEST_M_S)) ** parameters[2]
     return tilt(cut(strength, 0.0, _MOST), along, 1.0)
+
+
+_DIRECTIONS = tuple(float(angle) for angle in np.arange(6) * np.pi / 3)
+_SLOW_M_S = 0.01
+
+
+def _compass(seen: Seen) -> Floats:
+    """Return six directions, the same for all steps, shape (step, 6, 2)."""
+    vectors = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=-1)
+    return np.broadcast_to(vectors, (len(seen.zone), *vectors.shape))
+
+
+def _each(seen: Seen) -> Floats:
+    return np.broadcast_to(np.eye(len(_DIRECTIONS)), (len(seen.zone),) + 2 * (len(_DIRECTIONS),))
+
+
+def _axes(seen: Seen) -> Floats:
+    return np.broadcast_to(np.eye(2), (len(seen.zone), 2, 2))
+
+
+def _carried(seen: Seen) -> Floats:
+    """Return the axes, heavier for slow steps: a current carries fish that swim."""
+    by = 1.0 / np.maximum(seen.own_speed_m_s, _SLOW_M_S)
+    return np.asarray((by / by.mean())[:, None, None] * np.eye(2))
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(label="drawn, widely", toward=_compass, weights=_each, kappa=1.0),
+    Component(label="drawn", toward=_compass, weights=_each, kappa=3.0),
+    Tilt(label="leaning", vectors=_axes),
+    Tilt(label="carried", vectors=_carried),
+)
 
 
 EFFECT = Effect(
@@ -48,10 +93,32 @@ EFFECT = Effect(
             says="How much more slow steps have of it: 0 for all steps alike, as with a light; 1 "
             "for the inverse of the speed, as where a current carries fish that swim.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: all headings lean that way; 1: some are drawn about it, with the strength as "
+            "their weight beside the base's one.",
+        ),
+        EffectParameter(
+            name="kappa",
+            low=0.0,
+            high=30.0,
+            default=2.0,
+            says="Von Mises concentration about the direction of those that are drawn.",
+        ),
     ),
     probe=0.01,
+    component=component,
     factor=factor,
     harmonics=1,
-    shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+    shapes=lambda _arena: (
+        *({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+        *({"direction_rad": fourth * math.pi / 2, "drawn": 1.0} for fourth in range(-1, 3)),
+    ),
+    fixed=("drawn",),
+    needs={"component": ("drawn",)},
     shown_against="wall",
+    features=lambda _arena: _FEATURES,
 )

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, Tilt, hats, only
 from zfcal.model.effects.forms import Hooked, needs_neighbour, tilt
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
@@ -51,6 +55,38 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     if not away_m > 0.0:
         return 1.0
     return tilt(parameters[0] * parameters[3] * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
+
+
+_KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
+
+
+def _middle(seen: Seen) -> tuple[Floats, Floats]:
+    """Return the unit vector to the middle of all others, and hat functions of its distance."""
+    distance = np.where(seen.here, seen.distance_m, 0.0)
+    total = (seen.bearing * distance[..., None]).sum(axis=1)
+    mean = total / np.maximum(seen.here.sum(axis=1), 1)[:, None]
+    far = np.linalg.norm(mean, axis=1)
+    return mean / np.maximum(far, 1e-9)[:, None], hats(far, _KNOTS_M)
+
+
+def _toward(seen: Seen) -> Floats:
+    return only(_middle(seen)[0])
+
+
+def _by_distance(seen: Seen) -> Floats:
+    return only(_middle(seen)[1])
+
+
+def _leaning(seen: Seen) -> Floats:
+    toward, weights = _middle(seen)
+    return np.asarray(weights[..., None] * toward[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0),
+    Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
+    Tilt(label="leaning", vectors=_leaning),
+)
 
 
 EFFECT = Effect(
@@ -104,4 +140,5 @@ EFFECT = Effect(
     lacks=needs_neighbour,
     fixed=("full_m", "leaning"),
     needs={"factor": ("leaning",)},
+    features=lambda _arena: _FEATURES,
 )

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, attended, hats
 from zfcal.model.effects.forms import cut, needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
@@ -18,6 +22,22 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Weigh every neighbour by an exponential of time."""
     later = (state[TIME * n + i] - parameters[1]) / 3600.0
     return math.exp(cut(-parameters[0] * later, -_MOST, _MOST))
+
+
+_KNOTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+
+def _attention(seen: Seen) -> Floats:
+    return np.broadcast_to(
+        hats(seen.time, _KNOTS)[:, None, 1:], (*seen.here.shape, len(_KNOTS) - 1)
+    )
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(
+        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
+    ),
+)
 
 
 EFFECT = Effect(
@@ -48,4 +68,5 @@ EFFECT = Effect(
     fixed=("usual_at_s",),
     per_hour=True,
     shown_against="time",
+    features=lambda _arena: _FEATURES,
 )

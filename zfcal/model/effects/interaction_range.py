@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, attended, hats
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
@@ -12,6 +14,20 @@ from zfcal.model.kernels.hooks import SIGHT
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Take away from what is farther than the range."""
     return 1.0 - parameters[0] * beyond(apart(state, n, i, j), parameters[1])
+
+
+_KNOTS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7)
+
+
+def _attention(seen: Seen) -> Floats:
+    return hats(seen.distance_m, _KNOTS)[..., 1:]
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(
+        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
+    ),
+)
 
 
 EFFECT = Effect(
@@ -41,4 +57,5 @@ EFFECT = Effect(
         {"range_m": range_m} for range_m in (0.06, 0.09, 0.13, 0.19, 0.28, 0.4)
     ),
     lacks=needs_neighbour,
+    features=lambda _arena: _FEATURES,
 )

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, attended, hats
 from zfcal.model.effects.forms import needs_neighbour, quickness
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
@@ -15,6 +19,33 @@ from zfcal.model.kernels.state import SPEED
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh a neighbour by how much faster than 0.07 m/s it swims."""
     return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
+
+
+_KNOTS = (0.0, 0.05, 0.1, 0.15, 0.2)
+
+
+def _attention(seen: Seen) -> Floats:
+    return hats(seen.speed_m_s, _KNOTS)[..., 1:]
+
+
+def _fastest(seen: Seen) -> Floats:
+    chosen = np.zeros(seen.here.shape)
+    quick = np.where(seen.attention > 0, seen.speed_m_s, -1.0)
+    chosen[np.arange(len(chosen)), quick.argmax(axis=1)] = 1.0
+    return chosen[..., None]
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(
+        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
+    ),
+    Component(
+        label="the fastest in view",
+        toward=lambda seen: seen.toward,
+        weights=attended(_fastest),
+        low=-0.98,
+    ),
+)
 
 
 EFFECT = Effect(
@@ -35,4 +66,5 @@ EFFECT = Effect(
     probe=0.01,
     sight=sight,
     lacks=needs_neighbour,
+    features=lambda _arena: _FEATURES,
 )

@@ -6,16 +6,31 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+import shapely
 
+from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
+from zfcal.model.effects.features import Component, Feature, OneOf, Seen, Tilt, hats, only
 from zfcal.model.effects.forms import tilt
 from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import X, Y
 
 _AT_IT_M = 0.02
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the bearing of the place; far from it less, and at it not at all."""
+    dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    away = math.sqrt(dx * dx + dy * dy)
+    if not (away > 0.0 and parameters[4] > 0.0 and parameters[0] > 0.0):
+        return 0.0
+    out[0], out[1], out[2] = dx / away, dy / away, parameters[5]
+    return parameters[0] * away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
 
 
 @hook(FACTOR)
@@ -23,7 +38,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     """Weigh headings by the bearing of the place; far from it less, and at it not at all."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not away > 0.0:
+    if not away > 0.0 or parameters[4] > 0.0:
         return 1.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     return tilt(parameters[0], pull * (ux * dx + uy * dy) / away, pull)
@@ -40,6 +55,58 @@ def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
     pull = 1.0 / (1.0 + (away / values["reach_m"]) ** 4)
     mean = np.average(np.column_stack([dx / away, dy / away]), axis=0, weights=pull)
     return float(np.hypot(*mean))
+
+
+_KNOTS_M = (0.0, 0.15, 0.3, 0.6)
+_PER_SIDE = 7
+_KAPPA = 3.0
+
+
+def _features(arena: Arena) -> tuple[Feature, ...]:
+    """Return features of places all over the tank, seen from everywhere or from their own room."""
+    x_min, y_min, x_max, y_max = arena.outline.bounds
+    spots = [
+        np.array([x, y])
+        for x in np.linspace(x_min, x_max, _PER_SIDE + 2)[1:-1]
+        for y in np.linspace(y_min, y_max, _PER_SIDE + 2)[1:-1]
+        if arena.outline.covers(shapely.Point(x, y))
+    ]
+    _, rooms = find_rooms(arena)
+    asked: list[tuple[Floats, shapely.Polygon | None]] = [(spot, None) for spot in spots]
+    asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
+    return (
+        OneOf(features=tuple(_drawn(spot, room) for spot, room in asked)),
+        OneOf(features=tuple(_leaning(spot, room) for spot, room in asked)),
+    )
+
+
+def _toward(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
+    way = spot - seen.xy_m
+    far = np.linalg.norm(way, axis=1)
+    return way / np.maximum(far, 1e-9)[:, None], hats(far, _KNOTS_M)
+
+
+def _within(seen: Seen, room: shapely.Polygon | None) -> Floats:
+    if room is None:
+        return np.ones(len(seen.xy_m))
+    return np.asarray(shapely.contains_xy(room, seen.xy_m), dtype=np.float64)
+
+
+def _drawn(spot: Floats, room: shapely.Polygon | None) -> Component:
+    return Component(
+        label=f"drawn to {spot[0]:.2f}, {spot[1]:.2f}",
+        toward=lambda seen: only(_toward(seen, spot)[0]),
+        weights=lambda seen: only(_toward(seen, spot)[1] * _within(seen, room)[:, None]),
+        kappa=_KAPPA,
+    )
+
+
+def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
+    def vectors(seen: Seen) -> Floats:
+        toward, weights = _toward(seen, spot)
+        return np.asarray((weights * _within(seen, room)[:, None])[..., None] * toward[:, None])
+
+    return Tilt(label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors)
 
 
 EFFECT = Effect(
@@ -68,12 +135,34 @@ EFFECT = Effect(
             default=0.3,
             says="Distance at which half of the pull is left, in metres.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: all headings lean toward the place; 1: some are drawn about its bearing, with "
+            "the strength as their weight beside the base's one.",
+        ),
+        EffectParameter(
+            name="kappa",
+            low=0.0,
+            high=30.0,
+            default=3.0,
+            says="Von Mises concentration about that bearing of those that are drawn.",
+        ),
     ),
     probe=0.01,
+    component=component,
     factor=factor,
     harmonics=1,
-    shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
+    shapes=lambda arena: (
+        *({"x_m": x, "y_m": y} for x, y in places(arena)),
+        *({"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena)),
+    ),
+    fixed=("drawn",),
+    needs={"component": ("drawn",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.
     looks_like=Likeness(name="directional-drift", share=_one_sided),
+    features=_features,
 )

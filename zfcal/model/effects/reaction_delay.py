@@ -2,8 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen
 from zfcal.model.effects.forms import needs_neighbour
+
+
+def _late(then: Callable[[Seen], Floats], attention: Callable[[Seen], Floats]) -> Component:
+    """Return a share of the attention that goes to where others were, not to where they are."""
+    return Component(
+        label="share",
+        toward=lambda seen: np.concatenate([then(seen), seen.toward], axis=1),
+        weights=lambda seen: np.concatenate([attention(seen), -seen.attention], axis=1)[..., None],
+        high=1.0,
+    )
+
+
+_FEATURES: tuple[Feature, ...] = (
+    replace(_late(lambda s: s.soon_toward, lambda s: s.attention), label="a tenth of a step"),
+    replace(_late(lambda s: s.late_toward, lambda s: s.late_attention), label="a step"),
+)
+
 
 EFFECT = Effect(
     name="reaction-delay",
@@ -50,4 +74,5 @@ EFFECT = Effect(
     lacks=needs_neighbour,
     identity_s=2.4,
     fixed=("delay_s", "felt_m", "whole"),
+    features=lambda _arena: _FEATURES,
 )

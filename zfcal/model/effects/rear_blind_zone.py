@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, attended, hats
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
@@ -20,6 +22,20 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     hx, hy = state[HX * n + i], state[HY * n + i]
     off = abs(math.atan2(hx * dy - hy * dx, hx * dx + hy * dy))
     return 1.0 - parameters[0] / (1.0 + math.exp((parameters[1] - off) / _SOFT_RAD))
+
+
+_KNOTS = (0.0, 1.2, 1.8, 2.1, 2.25, 2.3561)
+
+
+def _attention(seen: Seen) -> Floats:
+    return hats(seen.off_axis_rad, _KNOTS)[..., 1:]
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(
+        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
+    ),
+)
 
 
 EFFECT = Effect(
@@ -49,4 +65,5 @@ EFFECT = Effect(
         {"fov_rad": math.radians(degrees)} for degrees in (60.0, 75.0, 90.0, 105.0, 120.0)
     ),
     lacks=needs_neighbour,
+    features=lambda _arena: _FEATURES,
 )

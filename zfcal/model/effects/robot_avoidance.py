@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, Tilt, attended, hats
 from zfcal.model.effects.forms import apart, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
@@ -42,6 +46,32 @@ def _lacks(company: Company) -> str | None:
     return None if company.n_fish > 0 else "a fish"
 
 
+_ATTENTION_M = (0.0, 0.1, 0.3)
+_KNOTS_M = (0.0, 0.1, 0.2, 0.4)
+
+
+def _attention(seen: Seen) -> Floats:
+    return hats(seen.distance_m, _ATTENTION_M) * seen.is_robot[..., None]
+
+
+def _robots(seen: Seen) -> Floats:
+    return hats(seen.distance_m, _KNOTS_M) * seen.is_robot[..., None]
+
+
+def _leaning(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(
+        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
+    ),
+    Component(label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0),
+    Component(label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0),
+    Tilt(label="leaning", vectors=_leaning),
+)
+
+
 EFFECT = Effect(
     name="robot-avoidance",
     says="Fish attend less to the robot than to a fish, or swim away from it.",
@@ -72,6 +102,7 @@ EFFECT = Effect(
     lacks=_lacks,
     fixed=("flight",),
     needs={"factor": ("flight",)},
+    features=lambda _arena: _FEATURES,
 )
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Feature, Seen, Tilt, Turned
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -12,6 +16,19 @@ from zfcal.model.kernels.hooks import FACTOR
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of the turn that they are; left is positive."""
     return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
+
+
+def _left(seen: Seen) -> Floats:
+    """Return the left of each heading, for each zone apart, shape (step, zone, 2)."""
+    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
+    zones = np.unique(seen.zone)
+    return np.asarray((seen.zone[:, None] == zones)[..., None] * left[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
+    Tilt(label="leaning", vectors=_left),
+)
 
 
 EFFECT = Effect(
@@ -43,4 +60,5 @@ EFFECT = Effect(
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
     fixed=("along_walls",),
     shown_against="wall",
+    features=lambda _arena: _FEATURES,
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
+from zfcal.model.effects.features import Feature, Seen, Turned
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -30,6 +31,13 @@ def _shuffled(states: Floats, _dt_s: float, random: np.random.Generator) -> Floa
     dealt = random.permutation(turn.ravel()).reshape(turn.shape)
     changed[:, PAST_HX], changed[:, PAST_HY] = np.cos(now - dealt), np.sin(now - dealt)
     return changed
+
+
+def _last_turn(seen: Seen) -> Floats:
+    return np.where(seen.follows_walls, 0.0, seen.last_turn_rad)
+
+
+_FEATURES: tuple[Feature, ...] = (Turned(label="offset", by=_last_turn, neighbours=False),)
 
 
 EFFECT = Effect(
@@ -74,4 +82,5 @@ EFFECT = Effect(
     # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep
     # their heading, which is no memory of turns, and what real fish do most.
     control=Control(name="a shuffled turn", states=_shuffled),
+    features=lambda _arena: _FEATURES,
 )

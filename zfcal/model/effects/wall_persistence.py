@@ -5,7 +5,11 @@ The base model forgets it: along a wall both ways are alike.
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.features import Component, Feature, Seen, Tilt
 from zfcal.model.effects.forms import sense_along, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -27,6 +31,28 @@ def _lacks(company: Company) -> str | None:
     return None if company.follows_walls else "a zone that follows walls"
 
 
+def _both_ways(seen: Seen) -> Floats:
+    """Return along the wall as the fish swims, and against it, shape (step, 2, 2)."""
+    along = (seen.along_wall * seen.own_heading).sum(axis=1, keepdims=True)
+    ahead = np.where(along >= 0, 1.0, -1.0) * seen.along_wall
+    return np.stack([ahead, -ahead], axis=1)
+
+
+def _share(seen: Seen) -> Floats:
+    half = np.where(seen.follows_walls, 0.5, 0.0)
+    return np.stack([half, -half], axis=1)[..., None]
+
+
+def _leaning(seen: Seen) -> Floats:
+    return np.asarray((seen.follows_walls[:, None] * seen.own_heading)[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Component(label="share", toward=_both_ways, weights=_share, kappa="own", low=-0.98, high=0.98),
+    Tilt(label="leaning", vectors=_leaning),
+)
+
+
 EFFECT = Effect(
     name="wall-persistence",
     says="Along a wall fish keep the direction in which they already swim.",
@@ -45,4 +71,5 @@ EFFECT = Effect(
     factor=factor,
     lacks=_lacks,
     shown_against="wall",
+    features=lambda _arena: _FEATURES,
 )

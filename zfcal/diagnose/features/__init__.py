@@ -1,0 +1,1 @@
+"""Which name a heading's law lacks, by features in place of forms."""

@@ -1,0 +1,344 @@
+"""What each name's features gain in likelihood, base parameters and lapse refitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import chdtrc, expit, logit
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.features.kernels import tilted
+from zfcal.diagnose.features.law import Columns, Law
+from zfcal.model.effects import Effect
+from zfcal.model.effects.features import Component, Feature, Leaving, OneOf, Tilt, Turned
+from zfcal.model.kernels.landing import ANGLES
+from zfcal.model.kernels.rooms import find_rooms
+
+_UNIFORM = 1 / (2 * math.pi)
+_LAPSE = (1e-6, 0.2)
+_LEAST = 1e-9
+"""Share of the base's density at the heading taken below which a mixture cannot be pushed."""
+
+_OWN = 0.3
+"""Share of the own stimulus' integral below which that of a mixture cannot be pushed: whatever
+fish attend to, their own way is never gone. Columns that are derivatives do not know."""
+
+_MOST_TILT = 4.0
+_MOST_LEAVING = 6.0
+_MOST_TURN = 0.3
+
+_TRIED = (0.005, 0.02, 0.06)
+"""Strengths of a component at which it is first asked for."""
+
+_FITTED = 2
+"""Of features of which the most promising are fitted, so many."""
+
+Objective: TypeAlias = Callable[[Floats], tuple[float, Floats]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gain:
+    """What a feature adds to the log likelihood.
+
+    Parameters
+    ----------
+    name, label
+        Of the effect, and of its feature.
+    log_p : ndarray, shape (step,)
+        Log density that it adds to each step of the law.
+    n_strengths
+        That were fitted.
+    n_tried
+        Features of which this one was the best.
+    """
+
+    name: str
+    label: str
+    log_p: Floats
+    n_strengths: int
+    n_tried: int = 1
+
+    @property
+    def nats(self) -> float:
+        """Log likelihood gained, less what as many idle strengths would gain (Akaike 1974)."""
+        return float(self.log_p.sum()) - self.n_strengths
+
+    def p(self, noise_nats: float = 0.0) -> float:
+        """Return the chance of such a gain where nothing is missing (Wilks 1938).
+
+        Parameters
+        ----------
+        noise_nats
+            What noise of positions alone makes it gain.
+        """
+        ratio = 2 * max(float(self.log_p.sum()) - noise_nats, 0.0)
+        return float(min(1.0, self.n_tried * chdtrc(self.n_strengths, ratio)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fits:
+    """Fits of features to the steps of a law.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    """
+
+    law: Law
+
+    @cached_property
+    def _lapse(self) -> float:
+        return float(np.clip(self.law.lapse.mean(), *_LAPSE))
+
+    @cached_property
+    def _null(self) -> tuple[Floats, Floats]:
+        """Log densities with the base's own columns alone, and where that fit ended."""
+        return self._linear([], [], None)
+
+    def gain(self, name: str, feature: Component | Turned | Tilt | Leaving) -> Gain:
+        """Return what a feature of an effect adds."""
+        if isinstance(feature, Component):
+            at, over = self.law.component(feature)
+            bounds = [(feature.low, feature.high)] * at.shape[1]
+            return self._additive(name, feature.label, (at, over), bounds)
+        if isinstance(feature, Turned):
+            columns = self.law.turned(feature)
+            return self._additive(name, feature.label, columns, [(-_MOST_TURN, _MOST_TURN)])
+        if isinstance(feature, Tilt):
+            return self._tilt(name, feature)
+        return self._leaving(name, feature)
+
+    def best_of(self, name: str, choice: OneOf) -> list[Gain]:
+        """Return what the most promising of some features add."""
+        promise = [self._promise(feature) for feature in choice.features]
+        order = np.argsort(promise)[::-1][:_FITTED]
+        found = [self.gain(name, choice.features[k]) for k in order if promise[k] > 0]
+        n = len(choice.features)
+        return [
+            Gain(name=g.name, label=g.label, log_p=g.log_p, n_strengths=g.n_strengths, n_tried=n)
+            for g in found
+        ]
+
+    def _promise(self, feature: Component | Tilt) -> float:
+        """Return how clear a feature is with all its weights alike: a score, or a gain in nats.
+
+        The score of a component has no variance where the density is next to nothing, so it is
+        asked for by what a few strengths of it gain, the lapse as it is.
+        """
+        if isinstance(feature, Tilt):
+            vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
+            score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
+        else:
+            return self._promise_of(self.law.component(feature, first=True))
+        squares = float((score * score).sum())
+        return float(score.sum()) ** 2 / squares if squares > 0 else 0.0
+
+    def _promise_of(self, columns: Columns) -> float:
+        (at, over), lapse = columns, self._lapse
+        (base_at, base_over), here = self.law.base, np.exp(self.law.log_here)
+        gains = [
+            float(
+                np.log(
+                    (1 - lapse)
+                    * here
+                    * (base_at[:, 0] + share * at.sum(axis=1))
+                    / (base_over[:, 0] + share * over.sum(axis=1))
+                    + lapse * _UNIFORM
+                ).sum()
+            )
+            for share in (0.0, *_TRIED)
+        ]
+        return max(gains[1:]) - gains[0]
+
+    @cached_property
+    def _mean_heading(self) -> Floats:
+        angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
+        whole = self.law.cells.sum(axis=1, keepdims=True)
+        ways = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return np.asarray(self.law.cells @ ways / whole)
+
+    def _additive(
+        self,
+        name: str,
+        label: str,
+        columns: Columns,
+        bounds: Sequence[tuple[float | None, float | None]],
+    ) -> Gain:
+        null, start = self._null
+        log_p, _ = self._linear([columns], bounds, start)
+        return Gain(name=name, label=label, log_p=log_p - null, n_strengths=columns[0].shape[1])
+
+    def _linear(
+        self,
+        added: Sequence[Columns],
+        bounds: Sequence[tuple[float | None, float | None]],
+        start: Floats | None,
+    ) -> tuple[Floats, Floats]:
+        """Return log densities at the best strengths of columns, and these."""
+        own, limits = self.law.own_parameters
+        at = np.concatenate([c[0] for c in (*own, *added)], axis=1)
+        over = np.concatenate([c[1] for c in (*own, *added)], axis=1)
+        base_at, base_over = (column[:, 0] for column in self.law.base)
+        scale = np.maximum(np.abs(at).mean(axis=0) / base_at.mean(), 1e-9)
+        at, over = at / scale, over / scale
+        here, least = np.exp(self.law.log_here), _OWN * self.law.own[1][:, 0]
+
+        def densities(x: Floats) -> tuple[Floats, Floats, Floats]:
+            top = np.maximum(base_at + at @ x[:-1], _LEAST * base_at)
+            whole = np.maximum(base_over + over @ x[:-1], least)
+            return here * top / whole, top, whole
+
+        def objective(x: Floats) -> tuple[float, Floats]:
+            density, top, whole = densities(x)
+            value, share, slope = _mixed(density, x[-1])
+            gradient = at.T @ (share / top) - over.T @ (share / whole)
+            return value, -np.append(gradient, slope)
+
+        x0 = np.zeros(at.shape[1] + 1)
+        x0[-1] = logit(self._lapse)
+        if start is not None:
+            x0[: len(start) - 1], x0[-1] = start[:-1] * scale[: len(start) - 1], start[-1]
+        ranges = [_scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
+        x = _climb(objective, x0, ranges)
+        strengths = np.append(x[:-1] / scale, x[-1])
+        return _log_mixed(densities(x)[0], x[-1]), strengths
+
+    def _tilt(self, name: str, feature: Tilt) -> Gain:
+        vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
+        taken, base = self.law.turns.taken, self._untilted
+        n = len(taken)
+        whole, mean = np.empty(n), np.empty((n, 2))
+        cells, at = self.law.cells, np.exp(self.law.log_here) * self.law.base[0][:, 0]
+
+        def density(x: Floats) -> Floats:
+            vector = np.ascontiguousarray(np.einsum("sbd,b->sd", vectors, x[:-1]))
+            tilted(cells, vector, whole, mean)
+            return np.asarray(at * np.exp((vector * taken).sum(axis=1)) / whole)
+
+        def objective(x: Floats) -> tuple[float, Floats]:
+            value, share, slope = _mixed(density(x), x[-1])
+            gradient = np.einsum("sbd,sd->b", vectors, share[:, None] * (taken - mean))
+            return value, -np.append(gradient, slope)
+
+        n_strengths = vectors.shape[1]
+        x = self._climb_from_null(objective, n_strengths, _MOST_TILT)
+        log_p = _log_mixed(density(x), x[-1]) - base
+        return Gain(name=name, label=feature.label, log_p=log_p, n_strengths=n_strengths)
+
+    @cached_property
+    def _untilted(self) -> Floats:
+        """Log densities by the law on cells, the lapse fitted alone."""
+        at = np.exp(self.law.log_here) * self.law.base[0][:, 0] / self.law.cells.sum(axis=1)
+
+        def objective(x: Floats) -> tuple[float, Floats]:
+            value, _, slope = _mixed(at, x[-1])
+            return value, np.array([-slope])
+
+        x = self._climb_from_null(objective, 0, 0.0)
+        return _log_mixed(at, x[-1])
+
+    def _leaving(self, name: str, feature: Leaving) -> Gain:
+        """Return what a factor on landing between the rooms adds, beside one for each zone."""
+        law, (between, _) = self.law, find_rooms(self.law.scene.arena)
+        share = law.turns.share[:, :, between - 1] / np.maximum(law.turns.share.sum(axis=2), 1)
+        inside = (law.cells * share).sum(axis=1) / law.cells.sum(axis=1)
+        landed = (law.turns.landing == between).astype(np.float64)
+        base = np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1)
+        may = (law.turns.zone != between) & (inside > 0)
+        zones = np.unique(law.turns.zone[may])
+        each = (law.turns.zone[:, None] == zones).astype(np.float64)
+        weights = feature.weights(law.draws[0].seen)
+        may_ = may[:, None].astype(np.float64)
+
+        def fitted(columns: Floats) -> Floats:
+            def density(x: Floats) -> tuple[Floats, Floats]:
+                log_factor = columns @ x[:-1]
+                factor = np.exp(log_factor)
+                whole = 1 - inside + inside * factor
+                return base * np.exp(log_factor * landed) / whole, inside * factor / whole
+
+            def objective(x: Floats) -> tuple[float, Floats]:
+                found, chance = density(x)
+                value, own, slope = _mixed(found, x[-1])
+                return value, -np.append(columns.T @ (own * (landed - chance)), slope)
+
+            x = self._climb_from_null(objective, columns.shape[1], _MOST_LEAVING)
+            return _log_mixed(density(x)[0], x[-1])
+
+        null = fitted(each * may_)
+        log_p = fitted(np.concatenate([each, weights], axis=1) * may_) - null
+        return Gain(name=name, label=feature.label, log_p=log_p, n_strengths=weights.shape[1])
+
+    def _climb_from_null(self, objective: Objective, n: int, most: float) -> Floats:
+        x0 = np.append(np.zeros(n), logit(self._lapse))
+        return _climb(objective, x0, [(-most, most)] * n)
+
+
+def _mixed(density: Floats, level: float) -> tuple[float, Floats, float]:
+    """Return minus the log likelihood with a lapse, the shares that are none, and its slope."""
+    lapse = float(expit(level))
+    mixed = (1 - lapse) * density + lapse * _UNIFORM
+    slope = float(((_UNIFORM - density) / mixed).sum()) * lapse * (1 - lapse)
+    return -float(np.log(mixed).sum()), (1 - lapse) * density / mixed, slope
+
+
+def _log_mixed(density: Floats, level: float) -> Floats:
+    lapse = float(expit(level))
+    return np.log((1 - lapse) * density + lapse * _UNIFORM)
+
+
+def _scaled(
+    pair: tuple[float | None, float | None], scale: float
+) -> tuple[float | None, float | None]:
+    low, high = (None if end is None else end * scale for end in pair)
+    return low, high
+
+
+def _climb(
+    objective: Objective, x0: Floats, bounds: Sequence[tuple[float | None, float | None]]
+) -> Floats:
+    """Return where an objective is least; the last of its arguments is the lapse."""
+    found = minimize(
+        objective,
+        x0,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[*bounds, (float(logit(_LAPSE[0])), float(logit(_LAPSE[1])))],
+        options={"maxiter": 400, "maxfun": 600, "ftol": 1e-10, "gtol": 1e-3, "maxcor": 25},
+    )
+    return np.asarray(found.x)
+
+
+def gains_of(law: Law, effects: Sequence[Effect], *, n_workers: int = 1) -> list[Gain]:
+    """Return what all features of effects add to a law.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    effects
+        Those without features are left out.
+    n_workers
+        Threads; the numbers do not depend on them.
+    """
+    fits = Fits(law=law)
+    # What all of them need, before they are asked side by side.
+    _ = (law.own_parameters, law.cells, fits._null, fits._untilted, fits._mean_heading)  # noqa: SLF001
+    asked = [
+        (effect.name, feature) for effect in effects for feature in effect.features(law.scene.arena)
+    ]
+    with ThreadPoolExecutor(max(1, n_workers)) as pool:
+        found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
+    return [gain for some in found for gain in some]
+
+
+def _gains(fits: Fits, name: str, feature: Feature) -> list[Gain]:
+    return fits.best_of(name, feature) if isinstance(feature, OneOf) else [fits.gain(name, feature)]

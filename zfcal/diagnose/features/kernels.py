@@ -1,0 +1,93 @@
+"""Integrals over the cells of headings that features ask for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from zfcal.arrays import Floats
+from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.von_mises import exponential
+
+
+@kernel
+def bells(  # noqa: PLR0913, PLR0917 - a kernel
+    toward: Floats, kappa: Floats, weight: Floats, taken: Floats, at_taken: Floats, over: Floats
+) -> None:  # fmt: skip
+    """Write von Mises laws, not scaled, at the heading taken and over all cells.
+
+    Parameters
+    ----------
+    toward : ndarray, shape (step, source, 2)
+        Unit vectors; zeros for no source.
+    kappa : ndarray, shape (step,)
+    weight : ndarray, shape (step, cell)
+        Of each cell of headings in the integral.
+    taken : ndarray, shape (step, 2)
+    at_taken, over : ndarray, shape (step, source)
+    """
+    cells = weight.shape[1]
+    gx, gy = np.empty(cells), np.empty(cells)
+    for g in range(cells):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    for s in range(toward.shape[0]):
+        k = kappa[s]
+        for j in range(toward.shape[1]):
+            x, y = toward[s, j, 0], toward[s, j, 1]
+            at_taken[s, j], over[s, j] = 0.0, 0.0
+            if x == 0.0 and y == 0.0:
+                continue
+            at_taken[s, j] = exponential(k * (taken[s, 0] * x + taken[s, 1] * y - 1.0))
+            total = 0.0
+            for g in range(cells):
+                total += weight[s, g] * exponential(k * (gx[g] * x + gy[g] * y - 1.0))
+            over[s, j] = total
+
+
+@kernel
+def bells_on_cells(toward: Floats, kappa: Floats, weight: Floats, cells: Floats) -> None:
+    """Add weighted von Mises laws, not scaled, to a density on cells.
+
+    Parameters
+    ----------
+    toward : ndarray, shape (step, source, 2)
+    kappa : ndarray, shape (step,)
+    weight : ndarray, shape (step, source)
+    cells : ndarray, shape (step, cell)
+    """
+    n = cells.shape[1]
+    gx, gy = np.empty(n), np.empty(n)
+    for g in range(n):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / n), math.sin(2 * math.pi * g / n)
+    for s in range(toward.shape[0]):
+        for j in range(toward.shape[1]):
+            w, x, y = weight[s, j], toward[s, j, 0], toward[s, j, 1]
+            if w == 0.0:
+                continue
+            for g in range(n):
+                cells[s, g] += w * exponential(kappa[s] * (gx[g] * x + gy[g] * y - 1.0))
+
+
+@kernel
+def tilted(density: Floats, vector: Floats, whole: Floats, mean: Floats) -> None:
+    """Write the integral of a density times exp(vector . heading), and the mean heading under it.
+
+    Parameters
+    ----------
+    density : ndarray, shape (step, cell)
+    vector : ndarray, shape (step, 2)
+    whole : ndarray, shape (step,)
+    mean : ndarray, shape (step, 2)
+    """
+    n = density.shape[1]
+    gx, gy = np.empty(n), np.empty(n)
+    for g in range(n):
+        gx[g], gy[g] = math.cos(2 * math.pi * g / n), math.sin(2 * math.pi * g / n)
+    for s in range(density.shape[0]):
+        a, b = vector[s, 0], vector[s, 1]
+        total, x, y = 0.0, 0.0, 0.0
+        for g in range(n):
+            w = density[s, g] * math.exp(a * gx[g] + b * gy[g])
+            total, x, y = total + w, x + w * gx[g], y + w * gy[g]
+        whole[s], mean[s, 0], mean[s, 1] = total, x / total, y / total

@@ -1,0 +1,447 @@
+"""The law of each step as features change it: at the heading taken, and its integral.
+
+A mixture's density and its integral over all headings that land inside are linear in what is added
+to the mixture. So a feature is two numbers for each step and weight, and all else is algebra.
+
+Where positions are measured with an error the law of a step is averaged over draws of where all
+were: the fish before, now and after, the others before and now. What is seen of others changes by
+jumps, and the own error is in the heading and in all bearings at once, so that the law at the
+measured positions is not the law of what was measured. Each draw is divided by the weight of its
+mixture before it is added, as the law is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import i0e
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.features.kernels import bells, bells_on_cells
+from zfcal.model.effects.features import AWAY_M, Component, Seen, Turned
+from zfcal.model.extended import without_effects
+from zfcal.model.fitted import SCALES, Fitted
+from zfcal.model.kernels.landing import ANGLES, PER_CELL
+from zfcal.model.kernels.perception import REPULSION_M
+from zfcal.model.kernels.scene import fill_states, perceive
+from zfcal.model.kernels.state import (
+    HX,
+    HY,
+    KIND,
+    LEFT_S,
+    PAST_HX,
+    PAST_HY,
+    ROOM,
+    SPEED,
+    TAU_X,
+    TAU_Y,
+    TIME,
+    ZONE,
+    X,
+    Y,
+)
+from zfcal.model.packing import pack
+from zfcal.model.scene import Scene, Turns
+from zfcal.model.tank import tank_of
+from zfcal.model.views import View, view_of
+from zfcal.parameters import Parameters
+from zfcal.units import HEADING_MIN_STEP_M
+
+DRAWS = 8
+
+_SOON = 0.1
+"""Share of a step of a response that is a little late."""
+
+_TURN_RAD = 0.02
+"""Half of the angle between the two laws whose difference stands for the derivative."""
+
+_MORE = 1.1
+"""By this factor a concentration is changed for the law's derivative."""
+
+Columns = tuple[Floats, Floats]
+"""Numbers of each step and weight: at the heading taken, and integrated."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Draw:
+    """What the fish saw, and the directions of the base law, of one draw of where all were.
+
+    Parameters
+    ----------
+    seen
+        By the fish of the steps; directions turned so that the heading taken is the measured one.
+    base : ndarray, shape (step, mode, 2)
+        Directions of the base law; the second is zero where there is one.
+    toward, angle_sr : ndarray, shape (step, source, 2) and (step, source)
+        As the model draws to others, effects on sight and all.
+    """
+
+    seen: Seen
+    base: Floats
+    toward: Floats
+    angle_sr: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law:
+    """The fitted law of the steps of a scene.
+
+    Parameters
+    ----------
+    scene, fitted
+        The recording, and the model at its maximum likelihood there.
+    noise_m
+        Standard deviation of a position per coordinate; 0 for positions that are exact.
+    seed
+        Of the draws.
+    """
+
+    scene: Scene
+    fitted: Fitted
+    noise_m: float = 0.0
+    seed: int = 0
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Turns in zones that were fitted."""
+        return np.flatnonzero(self.fitted.used)
+
+    @cached_property
+    def turns(self) -> Turns:
+        """These."""
+        return self.scene.turns.take(self.rows)
+
+    @cached_property
+    def _x(self) -> Floats:
+        return np.stack(self.fitted.x)[self.turns.zone - 1]
+
+    @cached_property
+    def kappa_own(self) -> Floats:
+        """Concentration of the base law, shape (step,)."""
+        return np.asarray(self._x[:, 0] * SCALES[0])
+
+    @cached_property
+    def kappa_f(self) -> Floats:
+        """Concentration about neighbours, shape (step,)."""
+        return np.asarray(self._x[:, 1] * SCALES[1])
+
+    @cached_property
+    def alpha(self) -> Floats:
+        """Weight of neighbours per steradian, shape (step,)."""
+        return np.asarray(self._x[:, 2] * SCALES[2])
+
+    @cached_property
+    def lapse(self) -> Floats:
+        """Share of headings drawn from anywhere, shape (step,)."""
+        return np.asarray(self._x[:, -1])
+
+    @cached_property
+    def weight(self) -> Floats:
+        """Attraction of what each cell of headings lands in, tilts included, shape (step, cell)."""
+        gamma = np.exp(self._x[:, 3:-1])
+        per = 2 * math.pi / ANGLES / PER_CELL
+        made = per * (self.turns.share * gamma[:, None]).sum(axis=2)
+        tilt = self.fitted.view.tilt
+        return np.ascontiguousarray(made * tilt[self.rows] if len(tilt) else made)
+
+    @cached_property
+    def log_here(self) -> Floats:
+        """Log attraction of where the step landed, tilts included, shape (step,)."""
+        gamma = self._x[np.arange(len(self.rows)), 2 + self.turns.landing]
+        taken = self.fitted.view.tilt_taken
+        if len(taken):
+            gamma = gamma + np.log(np.maximum(taken[self.rows], 1e-300))
+        return np.asarray(gamma)
+
+    @cached_property
+    def draws(self) -> tuple[Draw, ...]:
+        """Of where all were; the measured positions alone where these are exact."""
+        if not self.noise_m > 0:
+            return (_draw(self, self.scene.states, self.fitted.view),)
+        random = np.random.default_rng([self.seed, 7])
+        return tuple(self._drawn(random) for _ in range(DRAWS))
+
+    def _drawn(self, random: np.random.Generator) -> Draw:
+        states, arena = self.scene.states, self.scene.arena
+        xy = np.moveaxis(states[:, [X, Y]], 1, 2).copy()
+        xy[~(states[:, ZONE] > 0)] = np.nan
+        moved, _ = arena.settle(xy + self.noise_m * random.standard_normal(xy.shape))
+        clock = (float(states[0, TIME, 0]), self.scene.dt_s)
+        made = fill_states(
+            np.ascontiguousarray(moved), states[0, KIND].copy(), clock, HEADING_MIN_STEP_M / 4,
+            tank_of(arena),
+        )  # fmt: skip
+        # Speeds decide who is fast, and are not what is in doubt.
+        made[:, [SPEED, ROOM, LEFT_S]] = states[:, [SPEED, ROOM, LEFT_S]]
+        there = replace(self.scene, states=made)
+        view = view_of(there, self.fitted.parameters, view_of(there, self._base_model))
+        return _draw(self, made, view)
+
+    @property
+    def _base_model(self) -> Parameters:
+        return without_effects(self.fitted.parameters)
+
+    @cached_property
+    def _weights(self) -> list[Floats]:
+        """Return one over the weight of each draw's mixture, shape (step,), over their mean."""
+        parts = self.fitted.view.parts
+        extra = parts[self.rows, :, 0].sum(axis=1) if parts.shape[1] else 0.0
+        made = [1 / (1 + self.alpha * draw.angle_sr.sum(axis=1) + extra) for draw in self.draws]
+        mean = np.mean(made, axis=0)
+        return [each / mean / len(made) for each in made]
+
+    def mean(self, parts: list[Columns]) -> Columns:
+        """Return the average of columns over the draws."""
+        at, over = zip(*parts, strict=True)
+        weights = self._weights
+        return (
+            sum((w[:, None] * each for w, each in zip(weights[1:], at[1:], strict=True)),
+                weights[0][:, None] * at[0]),
+            sum((w[:, None] * each for w, each in zip(weights[1:], over[1:], strict=True)),
+                weights[0][:, None] * over[0]),
+        )  # fmt: skip
+
+    def bells(self, toward: Floats, kappa: Floats | float) -> Columns:
+        """Return von Mises laws about directions, shape (step, source)."""
+        shape = toward.shape[:2]
+        k = np.broadcast_to(np.asarray(kappa, dtype=np.float64), shape[:1]).copy()
+        at, over = np.empty(shape), np.empty(shape)
+        bells(np.ascontiguousarray(toward), k, self.weight, self.turns.taken, at, over)
+        scale = (1 / (2 * math.pi * i0e(k)))[:, None]
+        return at * scale, over * scale
+
+    def component(self, feature: Component, *, first: bool = False) -> Columns:
+        """Return the columns of a component, shape (step, weight); of the first draw, if asked."""
+
+        def of(draw: Draw) -> Columns:
+            at, over = self.bells(feature.toward(draw.seen), self._kappa(feature.kappa))
+            weights = feature.weights(draw.seen)
+            return (
+                np.asarray(np.einsum("sj,sjb->sb", at, weights)),
+                np.asarray(np.einsum("sj,sjb->sb", over, weights)),
+            )
+
+        if first:
+            return of(self.draws[0])
+        return self.mean([of(draw) for draw in self.draws])
+
+    def _kappa(self, kappa: float | str) -> Floats | float:
+        if isinstance(kappa, str):
+            return self.kappa_own if kappa == "own" else self.kappa_f
+        return kappa
+
+    def turned(self, feature: Turned) -> Columns:
+        """Return the derivative of the law by a turn of its directions, shape (step, 1)."""
+
+        def of(draw: Draw) -> Columns:
+            left, right = (
+                self._mixture(draw, angle, neighbours=feature.neighbours)
+                for angle in (_TURN_RAD, -_TURN_RAD)
+            )
+            by = (feature.by(draw.seen) / (2 * _TURN_RAD))[:, None]
+            return by * (left[0] - right[0]), by * (left[1] - right[1])
+
+        return self.mean([of(draw) for draw in self.draws])
+
+    def _mixture(self, draw: Draw, angle: float, *, neighbours: bool) -> Columns:
+        parts = [self._own(_turn(draw.base, angle))]
+        if neighbours:
+            parts.append(self._social(_turn(draw.toward, angle), draw.angle_sr))
+        return sum(p[0] for p in parts), sum(p[1] for p in parts)  # type: ignore[return-value]
+
+    def _own(self, base: Floats, more: float = 1.0) -> Columns:
+        at, over = self.bells(base, more * self.kappa_own)
+        half = np.where(self.follows, 0.5, 1.0)[:, None]
+        return half * at.sum(axis=1, keepdims=True), half * over.sum(axis=1, keepdims=True)
+
+    def _social(self, toward: Floats, angle_sr: Floats, more: float = 1.0) -> Columns:
+        at, over = self.bells(toward, more * self.kappa_f)
+        weight = self.alpha[:, None] * angle_sr
+        return (
+            (weight * at).sum(axis=1, keepdims=True),
+            (weight * over).sum(axis=1, keepdims=True),
+        )
+
+    @cached_property
+    def follows(self) -> NDArray[np.bool_]:
+        """Whether a step begins in a zone that follows walls, shape (step,)."""
+        known = np.array([zone.follows_walls for zone in self.scene.arena.zones])
+        return np.asarray(known[self.turns.zone - 1])
+
+    @cached_property
+    def own(self) -> Columns:
+        """The own stimulus alone, shape (step, 1)."""
+        return self.mean([self._own(draw.base) for draw in self.draws])
+
+    @cached_property
+    def base(self) -> Columns:
+        """The law as it is, shape (step, 1)."""
+        made = [self.own, self._neighbours()]
+        parts = self.fitted.view.parts
+        for c in range(parts.shape[1]):
+            own = parts[self.rows, c]
+            at, over = self.bells(own[:, None, 1:3], own[:, 3])
+            made.append((own[:, :1] * at, own[:, :1] * over))
+        return sum(m[0] for m in made), sum(m[1] for m in made)  # type: ignore[return-value]
+
+    def _neighbours(self, more: float = 1.0) -> Columns:
+        return self.mean([self._social(d.toward, d.angle_sr, more) for d in self.draws])
+
+    @cached_property
+    def own_parameters(self) -> tuple[list[Columns], list[tuple[float, float]]]:
+        """Columns of the base's parameters in each zone, and bounds of what they may change by."""
+        own = self.own
+        own_more = self.mean([self._own(d.base, _MORE) for d in self.draws])
+        social, social_more = self._neighbours(), self._neighbours(_MORE)
+        changes = (
+            (_less(own_more, own), (-3.0, 3.0)),
+            (social, (-0.9, 6.0)),
+            (_less(social_more, social), (-3.0, 3.0)),
+        )
+        columns, bounds = [], []
+        for zone in np.unique(self.turns.zone):
+            here = (self.turns.zone == zone)[:, None]
+            for (at, over), limits in changes:
+                if np.abs(at * here).max(initial=0.0) > 0:
+                    columns.append((at * here, over * here))
+                    bounds.append(limits)
+        return columns, bounds
+
+    @cached_property
+    def cells(self) -> Floats:
+        """The law on cells of headings, attraction included, shape (step, cell)."""
+        whole = np.zeros(self.weight.shape)
+        own_scale, scale = (1 / (2 * math.pi * i0e(k)) for k in (self.kappa_own, self.kappa_f))
+        half = np.where(self.follows, 0.5, 1.0)
+        for draw, weight in zip(self.draws, self._weights, strict=True):
+            some = np.zeros(whole.shape)
+            modes = np.broadcast_to((half * own_scale)[:, None], draw.base.shape[:2])
+            there = modes * (np.abs(draw.base).sum(axis=2) > 0)
+            bells_on_cells(np.ascontiguousarray(draw.base), self.kappa_own, there, some)
+            social = (self.alpha * scale)[:, None] * draw.angle_sr
+            bells_on_cells(np.ascontiguousarray(draw.toward), self.kappa_f, social, some)
+            whole += weight[:, None] * some
+        parts = self.fitted.view.parts
+        for c in range(parts.shape[1]):
+            own = np.ascontiguousarray(parts[self.rows, c])
+            k = own[:, 3].copy()
+            scaled = (own[:, 0] / (2 * math.pi * i0e(k)))[:, None]
+            bells_on_cells(np.ascontiguousarray(own[:, None, 1:3]), k, scaled, whole)
+        return np.asarray(whole * self.weight)
+
+
+def _less(one: Columns, other: Columns) -> Columns:
+    return one[0] - other[0], one[1] - other[1]
+
+
+def _turn(vectors: Floats, angle: Floats | float) -> Floats:
+    """Return vectors turned to the left, shape (step, source, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def _draw(law: Law, states: Floats, view: View) -> Draw:
+    """Return a draw from the states of everybody."""
+    turns, scene = law.turns, law.scene
+    at, who = turns.at, turns.who
+    own, after = states[at, :, who], states[at + 1, :, who]
+    back = np.zeros(len(at))
+    heading = turns.heading
+    if states is not scene.states:
+        step = after[:, [X, Y]] - own[:, [X, Y]]
+        back = np.arctan2(turns.taken[:, 1], turns.taken[:, 0]) - np.arctan2(step[:, 1], step[:, 0])
+        heading = own[:, [HX, HY]]
+    columns = states.shape[2]
+    others = np.array([[j for j in range(columns) if j != i] for i in range(columns)])[who]
+    seen = _seen(law, states, (own, heading), others)
+    along = own[:, [TAU_X, TAU_Y]] if states is not scene.states else turns.along_wall
+    modes = np.stack([along, -along], axis=1)
+    single = np.stack([heading, np.zeros_like(heading)], axis=1)
+    base = np.where(law.follows[:, None, None], modes, single)
+    if len(view.spin):
+        spin = view.spin[law.rows]
+        base = _turn(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
+    toward, angle = view.toward[law.rows], view.angle_sr[law.rows]
+    if not back.any():
+        return Draw(seen=seen, base=base, toward=toward, angle_sr=angle)
+    return Draw(
+        seen=_turned_back(seen, back),
+        base=_turn(base, back[:, None]),
+        toward=_turn(toward, back[:, None]),
+        angle_sr=angle,
+    )
+
+
+def _seen(law: Law, states: Floats, who: tuple[Floats, Floats], others: NDArray[np.int64]) -> Seen:
+    turns, (own, heading) = law.turns, who
+    at, before = turns.at, np.maximum(turns.at - 1, 0)
+    rows = np.arange(len(at))[:, None]
+
+    def theirs(row: int, when: NDArray[np.int64]) -> Floats:
+        return np.asarray(states[when][:, row][rows, others])
+
+    def to(when_x: Floats, when_y: Floats) -> tuple[Floats, Floats]:
+        away = np.stack([when_x - own[:, X, None], when_y - own[:, Y, None]], axis=-1)
+        distance = np.linalg.norm(away, axis=-1)
+        return away / np.maximum(distance, 1e-9)[..., None], distance
+
+    here = theirs(ZONE, at) > 0
+    now_x, now_y = theirs(X, at), theirs(Y, at)
+    then_x, then_y = theirs(X, before), theirs(Y, before)
+    bearing, distance = to(now_x, now_y)
+    soon, soon_m = to((1 - _SOON) * now_x + _SOON * then_x, (1 - _SOON) * now_y + _SOON * then_y)
+    packed = pack([without_effects(law.fitted.parameters)], law.scene.arena)
+    cos_fov = float(packed.cos_fov[0])
+    toward, angle = perceive(states, at, turns.who, 0, cos_fov)
+    late, late_angle = perceive(states, at, turns.who, 1, cos_fov)
+    cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
+    dot = (heading[:, None] * bearing).sum(axis=-1)
+    past = own[:, [PAST_HX, PAST_HY]]
+    turned = np.arctan2(
+        past[:, 0] * heading[:, 1] - past[:, 1] * heading[:, 0], (past * heading).sum(axis=1)
+    )
+    present = here[..., None]
+    return Seen(
+        attention=law.alpha[:, None] * angle[rows, others],
+        toward=toward[rows, others],
+        late_toward=late[rows, others],
+        soon_toward=np.where(soon_m < REPULSION_M, -1.0, 1.0)[..., None] * soon * present,
+        late_attention=law.alpha[:, None] * late_angle[rows, others],
+        bearing=bearing * present,
+        distance_m=np.where(here, distance, AWAY_M),
+        off_axis_rad=np.abs(np.arctan2(cross, dot)),
+        speed_m_s=theirs(SPEED, at),
+        heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
+        here=here,
+        is_robot=(theirs(KIND, at) > 0) & here,
+        own_heading=heading,
+        along_wall=own[:, [TAU_X, TAU_Y]],
+        xy_m=own[:, [X, Y]],
+        follows_walls=law.follows,
+        zone=turns.zone,
+        track=turns.track,
+        own_speed_m_s=turns.speed_m_s,
+        last_turn_rad=turned,
+        time=at / max(1, len(law.scene.k) - 1),
+        left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
+    )
+
+
+def _turned_back(seen: Seen, back: Floats) -> Seen:
+    """Return what was seen with all directions turned, so that headings are the measured ones."""
+    b = back[:, None]
+    return replace(
+        seen,
+        toward=_turn(seen.toward, b),
+        late_toward=_turn(seen.late_toward, b),
+        soon_toward=_turn(seen.soon_toward, b),
+        bearing=_turn(seen.bearing, b),
+        heading=_turn(seen.heading, b),
+        own_heading=_turn(seen.own_heading, back),
+        along_wall=_turn(seen.along_wall, back),
+    )

@@ -1,0 +1,92 @@
+"""Which effect a law lacks: the name whose features gain most, if that is more than chance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from zfcal.diagnose.features.gains import Gain
+
+LEVEL = 0.02
+"""Chance of a false alarm over all features of all names."""
+
+_SURE = 2.0
+"""Standard errors by which one name must lead another to be told from it (Vuong 1989)."""
+
+Noise = Callable[[Sequence[Gain]], Sequence[float]]
+"""Of some gains: what noise of positions alone makes each of these features gain, in nats."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Told:
+    """What features say that a law lacks.
+
+    Parameters
+    ----------
+    gain
+        Of the name's best feature.
+    p
+        Over the whole family.
+    ties
+        Of names that cannot be told from it, the best first.
+    """
+
+    gain: Gain
+    p: float
+    ties: tuple[Gain, ...]
+
+
+def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
+    """Return which name it is; None where chance may have made all gains.
+
+    Parameters
+    ----------
+    gains
+        Of all features of all names.
+    noise
+        Asked of those alone that stand out; None for positions that are exact.
+    """
+    n_tried = sum(gain.n_tried for gain in _once(gains))
+    clear = [gain for gain in gains if gain.p() * n_tried < LEVEL]
+    if noise is not None and clear:
+        clear = [
+            gain
+            for gain, nats in zip(clear, noise(clear), strict=True)
+            if gain.p(nats) * n_tried < LEVEL
+        ]
+    best = best_by_name(clear)
+    if not best:
+        return None
+    first, *others = best
+    ties = tuple(gain for gain in others if not _is_ahead(first, gain))
+    return Told(gain=first, p=min(1.0, first.p() * n_tried), ties=ties)
+
+
+def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
+    """Return the best feature of each name, the best name first."""
+    found: dict[str, Gain] = {}
+    for gain in gains:
+        if gain.name not in found or gain.nats > found[gain.name].nats:
+            found[gain.name] = gain
+    return sorted(found.values(), key=lambda gain: -gain.nats)
+
+
+def _once(gains: Sequence[Gain]) -> list[Gain]:
+    """Return gains with one of those that are the best of the same features."""
+    seen: set[tuple[str, str]] = set()
+    kept = []
+    for gain in gains:
+        key = (gain.name, gain.label.partition(" to ")[0] if gain.n_tried > 1 else gain.label)
+        if key not in seen:
+            seen.add(key)
+            kept.append(gain)
+    return kept
+
+
+def _is_ahead(one: Gain, other: Gain) -> bool:
+    """Return whether a feature gains more than another one by more than their error."""
+    by = one.log_p - other.log_p
+    error = float(by.std()) * float(np.sqrt(len(by)))
+    return one.nats - other.nats > _SURE * error

@@ -1,0 +1,138 @@
+"""A second look at headings, by features: names what no form of the listed effects shows.
+
+The efficient scores ask for effects in the forms that they have here. Fish may have them in
+others, so each name's features are asked as well. They name what was not named, and take the place
+of what was where they gain more than it does in its own form, by more than the error of the
+difference. The name goes into the model in that form of ours which gains most.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
+from zfcal.diagnose.confirming import Confirmed, confirm
+from zfcal.diagnose.features.gains import Gain, gains_of
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import Told, tell
+from zfcal.diagnose.naming import Choice, Refit, by_sample, refit
+from zfcal.diagnose.null import run_null
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.selection import Best, Step
+from zfcal.model.effects import find_effect
+
+_SURE = 2.0
+"""Standard errors by which a name must gain more than another one."""
+
+_FORMS = 6
+"""Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SecondLook:
+    """An effect that features name.
+
+    Parameters
+    ----------
+    step
+        As one that was selected.
+    confirmed
+        What it gains on held-out steps.
+    """
+
+    step: Step
+    confirmed: Confirmed
+
+
+def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | None:
+    """Return the effect on headings that features name; None where chance may have made it up.
+
+    Parameters
+    ----------
+    case
+        The question, its scene and what is asked for.
+    screen
+        The model, with what was named for speeds.
+    there
+        The first effect on headings that was named. One beyond the list is kept where it gains
+        more than features do, a listed one where it gains as much.
+    """
+    law = _law(case, screen)
+    listed = {each.name for each in case.listed} - set(screen.fitted.parameters.effects)
+    effects = [find_effect(name) for name in sorted(listed)]
+    gains = gains_of(law, effects, n_workers=case.question.n_workers)
+    noise = (lambda clear: _noise_nats(case, clear)) if has_noise(case.question) else None
+    told = tell(gains, noise)
+    if told is None or (there is not None and _stays(there.choice.best, told, law)):
+        return None
+    best = _in_the_model(case, screen, told.gain.name)
+    ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
+    found, score = best
+    step = Step(
+        choice=Choice(best=found, ties=ties, considered=(found, *ties)),
+        best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
+        before=screen,
+    )
+    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
+    if confirmed.pulsed or not confirmed.in_all_minutes:
+        return None
+    return SecondLook(step=step, confirmed=dataclasses.replace(confirmed, holds=True, steady=True))
+
+
+def _law(case: Case, screen: Screen) -> Law:
+    noise_m = noise_of(case.question) if has_noise(case.question) else 0.0
+    return Law(scene=screen.scene, fitted=screen.fitted, noise_m=noise_m, seed=case.question.seed)
+
+
+def _stays(there: Refit, told: Told, law: Law) -> bool:
+    """Return whether what was named is kept beside what features say."""
+    if there.name in {told.gain.name, *(gain.name for gain in told.ties)}:
+        return True
+    by = by_sample(law.scene, law.turns.at, told.gain.log_p) - there.gain
+    error = float(by.std()) * float(np.sqrt(len(by)))
+    ahead = told.gain.nats - there.nats
+    return ahead < -_SURE * error if there.is_generic else ahead < _SURE * error
+
+
+def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
+    """Return what features gain on replicates of the model: their mean and two deviations more."""
+    names = sorted({gain.name for gain in clear})
+    effects = [find_effect(name) for name in names]
+
+    def ask(_number: int, other: Screen) -> list[float]:
+        found = gains_of(_law(case, other), effects)
+        by = {(gain.name, _kind(gain)): float(gain.log_p.sum()) for gain in reversed(found)}
+        return [by.get((gain.name, _kind(gain)), 0.0) for gain in clear]
+
+    n_workers = case.question.n_workers
+    rows = np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))
+    return list(np.maximum(rows.mean(axis=0) + 2.0 * rows.std(axis=0, ddof=1), 0.0))
+
+
+def _kind(gain: Gain) -> str:
+    """Return what a gain is called on another recording: a place is another one there."""
+    return gain.label.partition(" to ")[0] if gain.n_tried > 1 else gain.label
+
+
+def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
+    """Return an effect in the model in that form which gains most, and its score there."""
+    own = [each for each in case.listed if each.name == name]
+    scores = ask_all(screen, own, case.question.n_workers)
+    forms: dict[tuple[float, ...], Score] = {}
+    for score in sorted(scores, key=lambda each: -abs(each.z)):
+        forms.setdefault(_form(score.candidate), score)
+    tried = list(forms.values())[:_FORMS]
+    made = [refit(screen, score, n_workers=case.question.n_workers) for score in tried]
+    k = int(np.argmax([each.worth for each in made]))
+    return made[k], tried[k]
+
+
+def _form(candidate: Candidate) -> tuple[float, ...]:
+    """Return the shapes of a candidate that a fit leaves as they are."""
+    return tuple(candidate.shape[key] for key in candidate.effect.fixed if key in candidate.shape)

@@ -1,0 +1,230 @@
+"""Features in place of forms: what an effect's name means for a heading, whatever its form.
+
+Nobody knows the form in which fish have an effect: a stimulus may be one more component of the
+mixture or a preference that all headings have, near or far, by what is seen or by who is next. So
+a name is a set of features here. Each has weights by hat functions of a distance, a bearing, a
+speed or the time, each weight with a strength of its own. A few strengths of some features
+together come near to any form that the name may have.
+
+The files of effects say which features theirs are. How they are fitted stands in
+`zfcal.diagnose.features`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zfcal.arrays import Floats
+
+AWAY_M = 9.0
+"""In place of the distance to one who is not there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seen:
+    """What the fish of some steps have about them; directions are unit vectors.
+
+    Parameters
+    ----------
+    attention : ndarray, shape (step, other)
+        alpha times the solid angle at which each other agent is seen; 0 for who is not seen.
+    toward, late_toward, soon_toward : ndarray, shape (step, other, 2)
+        Where the base law draws to, away from who is too near: now, where the other was a step
+        before, and a tenth of a step before. Zeros for who is not there.
+    late_attention : ndarray, shape (step, other)
+        As a step before.
+    bearing : ndarray, shape (step, other, 2)
+        To the other.
+    distance_m, off_axis_rad, speed_m_s : ndarray, shape (step, other)
+        Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its speed.
+    heading : ndarray, shape (step, other, 2)
+        Of the other.
+    here, is_robot : ndarray of bool, shape (step, other)
+    own_heading, along_wall, xy_m : ndarray, shape (step, 2)
+    follows_walls : ndarray of bool, shape (step,)
+        Whether the zone does.
+    zone, track : ndarray of int, shape (step,)
+    own_speed_m_s : ndarray, shape (step,)
+        Of the step itself, which is given.
+    last_turn_rad : ndarray, shape (step,)
+        To the left; 0 where it is not known.
+    time : ndarray, shape (step,)
+        Share of the recording that has passed.
+    left_s : ndarray, shape (step,)
+        Since another one left the room.
+    """
+
+    attention: Floats
+    toward: Floats
+    late_toward: Floats
+    soon_toward: Floats
+    late_attention: Floats
+    bearing: Floats
+    distance_m: Floats
+    off_axis_rad: Floats
+    speed_m_s: Floats
+    heading: Floats
+    here: NDArray[np.bool_]
+    is_robot: NDArray[np.bool_]
+    own_heading: Floats
+    along_wall: Floats
+    xy_m: Floats
+    follows_walls: NDArray[np.bool_]
+    zone: NDArray[np.int64]
+    track: NDArray[np.int32]
+    own_speed_m_s: Floats
+    last_turn_rad: Floats
+    time: Floats
+    left_s: Floats
+
+    @property
+    def nearest(self) -> Floats:
+        """One for the nearest other one, else 0, shape (step, other, 1)."""
+        chosen = np.zeros(self.here.shape)
+        chosen[np.arange(len(chosen)), self.distance_m.argmin(axis=1)] = 1.0
+        return (chosen * self.here)[..., None]
+
+    def by_distance(self, knots_m: Sequence[float]) -> Floats:
+        """Return hat functions of the distances, 0 for who is not there."""
+        return hats(self.distance_m, knots_m) * self.here[..., None]
+
+
+Weights: TypeAlias = Callable[[Seen], Floats]
+"""Of a `Seen`: shape (step, source, weight); of a tilt or a landing (step, weight)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Component:
+    """Headings drawn about the directions of some sources: one more component of the mixture.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    toward
+        Unit vectors to the sources, shape (step, source, 2).
+    weights
+        Shape (step, source, weight): a strength is fitted for each weight.
+    kappa
+        Concentration about a source; ``own`` or ``neighbours``: as the base law has it there.
+    low, high
+        Bounds of the strengths.
+    """
+
+    label: str
+    toward: Weights
+    weights: Weights
+    kappa: float | Literal["own", "neighbours"] = "neighbours"
+    low: float = 0.0
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tilt:
+    """A preference of all headings: a factor exp(strength cos(heading - direction)) on the density.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    vectors
+        Direction times weight, shape (step, weight, 2).
+    """
+
+    label: str
+    vectors: Weights
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Turned:
+    """Directions of the law turned to the left by a small angle.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    by
+        The angle at a strength of one, shape (step,).
+    neighbours
+        Whether those to neighbours turn as well.
+    """
+
+    label: str
+    by: Callable[[Seen], Floats]
+    neighbours: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Leaving:
+    """A factor on steps that end between the rooms.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    weights
+        Shape (step, weight): the log of the factor at a strength of one.
+    """
+
+    label: str
+    weights: Weights
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OneOf:
+    """Features of which only the most promising ones are fitted, such as places.
+
+    Parameters
+    ----------
+    features
+        Of one kind.
+    """
+
+    features: tuple[Component, ...] | tuple[Tilt, ...]
+
+
+Feature: TypeAlias = Component | Tilt | Turned | Leaving | OneOf
+
+
+def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
+    """Return the hat functions between knots, which add up to one.
+
+    Parameters
+    ----------
+    values : array_like
+        Beyond the first and last knot they count as there.
+    knots
+        Ascending.
+
+    Returns
+    -------
+    ndarray, shape (..., knot)
+    """
+    at = np.asarray(knots, dtype=np.float64)
+    x = np.clip(np.asarray(values, dtype=np.float64), at[0], at[-1])
+    below = np.clip(np.searchsorted(at, x, side="right") - 1, 0, len(at) - 2)
+    share = (x - at[below]) / (at[below + 1] - at[below])
+    made = np.zeros((*x.shape, len(at)))
+    np.put_along_axis(made, below[..., None], (1 - share)[..., None], -1)
+    np.put_along_axis(made, below[..., None] + 1, share[..., None], -1)
+    return made
+
+
+def only(weights: Floats) -> Floats:
+    """Return weights of a source that is the only one: an axis for it is put in."""
+    return weights[:, None]
+
+
+def attended(weights: Weights) -> Weights:
+    """Return weights of what is seen of the others, with a factor."""
+    return lambda seen: seen.attention[..., None] * weights(seen)
+
+
+def evenly(seen: Seen) -> Floats:
+    """Return one for everybody, shape (step, other, 1)."""
+    return np.ones((*seen.attention.shape, 1))
