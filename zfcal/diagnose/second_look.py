@@ -102,22 +102,19 @@ def _stays(there: Refit, told: Told, law: Law) -> bool:
 
 def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
     """Return what features gain on replicates of the model: their mean and two deviations more."""
-    names = sorted({gain.name for gain in clear})
-    effects = [find_effect(name) for name in names]
+    keys = [gain.key for gain in clear]
+    effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
 
     def ask(_number: int, other: Screen) -> list[float]:
-        found = gains_of(_law(case, other), effects)
-        by = {(gain.name, _kind(gain)): float(gain.log_p.sum()) for gain in reversed(found)}
-        return [by.get((gain.name, _kind(gain)), 0.0) for gain in clear]
+        found = gains_of(_law(case, other), effects, kinds=set(keys))
+        most: dict[tuple[str, str], float] = {}
+        for gain in found:
+            most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))
+        return [most.get(key, 0.0) for key in keys]
 
     n_workers = case.question.n_workers
     rows = np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))
     return list(np.maximum(rows.mean(axis=0) + 2.0 * rows.std(axis=0, ddof=1), 0.0))
-
-
-def _kind(gain: Gain) -> str:
-    """Return what a gain is called on another recording: a place is another one there."""
-    return gain.label.partition(" to ")[0] if gain.n_tried > 1 else gain.label
 
 
 def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -57,6 +57,8 @@ class Gain:
         That were fitted.
     n_tried
         Features of which this one was the best.
+    kind
+        What these are called; empty where it is the only one.
     """
 
     name: str
@@ -64,6 +66,12 @@ class Gain:
     log_p: Floats
     n_strengths: int
     n_tried: int = 1
+    kind: str = ""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Name, and what the feature is called on any recording."""
+        return self.name, self.kind or self.label
 
     @property
     def nats(self) -> float:
@@ -122,10 +130,7 @@ class Fits:
         order = np.argsort(promise)[::-1][:_FITTED]
         found = [self.gain(name, choice.features[k]) for k in order if promise[k] > 0]
         n = len(choice.features)
-        return [
-            Gain(name=g.name, label=g.label, log_p=g.log_p, n_strengths=g.n_strengths, n_tried=n)
-            for g in found
-        ]
+        return [replace(gain, n_tried=n, kind=choice.kind) for gain in found]
 
     def _promise(self, feature: Component | Tilt) -> float:
         """Return how clear a feature is with all its weights alike: a score, or a gain in nats.
@@ -317,8 +322,14 @@ def _climb(
     return np.asarray(found.x)
 
 
-def gains_of(law: Law, effects: Sequence[Effect], *, n_workers: int = 1) -> list[Gain]:
-    """Return what all features of effects add to a law.
+def gains_of(
+    law: Law,
+    effects: Sequence[Effect],
+    *,
+    kinds: Collection[tuple[str, str]] | None = None,
+    n_workers: int = 1,
+) -> list[Gain]:
+    """Return what features of effects add to a law.
 
     Parameters
     ----------
@@ -326,6 +337,8 @@ def gains_of(law: Law, effects: Sequence[Effect], *, n_workers: int = 1) -> list
         Of the steps.
     effects
         Those without features are left out.
+    kinds
+        Names and kinds of those that are asked for; None for all.
     n_workers
         Threads; the numbers do not depend on them.
     """
@@ -333,11 +346,19 @@ def gains_of(law: Law, effects: Sequence[Effect], *, n_workers: int = 1) -> list
     # What all of them need, before they are asked side by side.
     _ = (law.own_parameters, law.cells, fits._null, fits._untilted, fits._mean_heading)  # noqa: SLF001
     asked = [
-        (effect.name, feature) for effect in effects for feature in effect.features(law.scene.arena)
+        (effect.name, feature)
+        for effect in effects
+        for feature in effect.features(law.scene.arena)
+        if kinds is None or (effect.name, kind_of(feature)) in kinds
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
     return [gain for some in found for gain in some]
+
+
+def kind_of(feature: Feature) -> str:
+    """Return what a feature is called on any recording: of places another one is best on each."""
+    return feature.kind if isinstance(feature, OneOf) else feature.label
 
 
 def _gains(fits: Fits, name: str, feature: Feature) -> list[Gain]:

@@ -63,7 +63,7 @@ def bells_on_cells(toward: Floats, kappa: Floats, weight: Floats, cells: Floats)
     for s in range(toward.shape[0]):
         for j in range(toward.shape[1]):
             w, x, y = weight[s, j], toward[s, j, 0], toward[s, j, 1]
-            if w == 0.0:
+            if w == 0.0 or (x == 0.0 and y == 0.0):
                 continue
             for g in range(n):
                 cells[s, g] += w * exponential(kappa[s] * (gx[g] * x + gy[g] * y - 1.0))

@@ -48,7 +48,6 @@ from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, Turns
 from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
-from zfcal.parameters import Parameters
 from zfcal.units import HEADING_MIN_STEP_M
 
 DRAWS = 8
@@ -178,12 +177,8 @@ class Law:
         # Speeds decide who is fast, and are not what is in doubt.
         made[:, [SPEED, ROOM, LEFT_S]] = states[:, [SPEED, ROOM, LEFT_S]]
         there = replace(self.scene, states=made)
-        view = view_of(there, self.fitted.parameters, view_of(there, self._base_model))
+        view = view_of(there, self.fitted.parameters)
         return _draw(self, made, view)
-
-    @property
-    def _base_model(self) -> Parameters:
-        return without_effects(self.fitted.parameters)
 
     @cached_property
     def _weights(self) -> list[Floats]:
@@ -218,7 +213,7 @@ class Law:
         """Return the columns of a component, shape (step, weight); of the first draw, if asked."""
 
         def of(draw: Draw) -> Columns:
-            at, over = self.bells(feature.toward(draw.seen), self._kappa(feature.kappa))
+            at, over = self._bells_of(feature, draw)
             weights = feature.weights(draw.seen)
             return (
                 np.asarray(np.einsum("sj,sjb->sb", at, weights)),
@@ -228,6 +223,19 @@ class Law:
         if first:
             return of(self.draws[0])
         return self.mean([of(draw) for draw in self.draws])
+
+    def _bells_of(self, feature: Component, draw: Draw) -> Columns:
+        if not isinstance(feature.toward, str):
+            return self.bells(feature.toward(draw.seen), self._kappa(feature.kappa))
+        key = (id(draw), feature.toward, feature.kappa)
+        if key not in self._kept:
+            toward = getattr(draw.seen, feature.toward)
+            self._kept[key] = self.bells(toward, self._kappa(feature.kappa))
+        return self._kept[key]
+
+    @cached_property
+    def _kept(self) -> dict[tuple[int, str, float | str], Columns]:
+        return {}
 
     def _kappa(self, kappa: float | str) -> Floats | float:
         if isinstance(kappa, str):
@@ -383,7 +391,7 @@ def _seen(law: Law, states: Floats, who: tuple[Floats, Floats], others: NDArray[
     rows = np.arange(len(at))[:, None]
 
     def theirs(row: int, when: NDArray[np.int64]) -> Floats:
-        return np.asarray(states[when][:, row][rows, others])
+        return np.asarray(states[when[:, None], row, others])
 
     def to(when_x: Floats, when_y: Floats) -> tuple[Floats, Floats]:
         away = np.stack([when_x - own[:, X, None], when_y - own[:, Y, None]], axis=-1)

@@ -75,14 +75,7 @@ def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
 
 def _once(gains: Sequence[Gain]) -> list[Gain]:
     """Return gains with one of those that are the best of the same features."""
-    seen: set[tuple[str, str]] = set()
-    kept = []
-    for gain in gains:
-        key = (gain.name, gain.label.partition(" to ")[0] if gain.n_tried > 1 else gain.label)
-        if key not in seen:
-            seen.add(key)
-            kept.append(gain)
-    return kept
+    return list({gain.key: gain for gain in gains}.values())
 
 
 def _is_ahead(one: Gain, other: Gain) -> bool:

@@ -105,10 +105,6 @@ _KNOTS_M = (0.0, 0.025, 0.05, 0.1, 0.2, 0.4, 1.0)
 _COMPANY_M = 0.15
 
 
-def _headings(seen: Seen) -> Floats:
-    return seen.heading
-
-
 def _near_and_far(seen: Seen) -> Floats:
     return np.concatenate([seen.by_distance(_KNOTS_M)[..., :-1], seen.nearest], axis=2)
 
@@ -129,9 +125,9 @@ def _mean(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="drawn, widely", toward=_headings, weights=_of_all, kappa=3.0),
-    Component(label="drawn", toward=_headings, weights=_of_all, kappa=9.0),
-    Component(label="drawn, as seen", toward=_headings, weights=attended(evenly), kappa=9.0),
+    Component(label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0),
+    Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0),
+    Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
     Tilt(label="leaning", vectors=_summed),
     Tilt(label="leaning, the mean", vectors=_mean),
 )

@@ -107,7 +107,8 @@ class Component:
     label
         Tells it from other features of the effect.
     toward
-        Unit vectors to the sources, shape (step, source, 2).
+        Unit vectors to the sources, shape (step, source, 2); or which field of `Seen` they are, so
+        that what several features need is integrated once.
     weights
         Shape (step, source, weight): a strength is fitted for each weight.
     kappa
@@ -117,7 +118,7 @@ class Component:
     """
 
     label: str
-    toward: Weights
+    toward: Weights | Literal["toward", "heading"]
     weights: Weights
     kappa: float | Literal["own", "neighbours"] = "neighbours"
     low: float = 0.0
@@ -181,10 +182,13 @@ class OneOf:
 
     Parameters
     ----------
+    kind
+        What they are called together.
     features
-        Of one kind.
+        Of one sort.
     """
 
+    kind: str
     features: tuple[Component, ...] | tuple[Tilt, ...]
 
 

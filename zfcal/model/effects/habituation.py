@@ -34,9 +34,7 @@ def _attention(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(
-        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
-    ),
+    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
 )
 
 

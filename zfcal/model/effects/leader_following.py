@@ -36,12 +36,10 @@ def _fastest(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(
-        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
-    ),
+    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
     Component(
         label="the fastest in view",
-        toward=lambda seen: seen.toward,
+        toward="toward",
         weights=attended(_fastest),
         low=-0.98,
     ),

@@ -75,8 +75,8 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     asked: list[tuple[Floats, shapely.Polygon | None]] = [(spot, None) for spot in spots]
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
     return (
-        OneOf(features=tuple(_drawn(spot, room) for spot, room in asked)),
-        OneOf(features=tuple(_leaning(spot, room) for spot, room in asked)),
+        OneOf(kind="drawn", features=tuple(_drawn(spot, room) for spot, room in asked)),
+        OneOf(kind="leaning", features=tuple(_leaning(spot, room) for spot, room in asked)),
     )
 
 

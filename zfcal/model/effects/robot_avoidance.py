@@ -63,9 +63,7 @@ def _leaning(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(
-        label="attention", toward=lambda seen: seen.toward, weights=attended(_attention), low=-0.98
-    ),
+    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
     Component(label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0),
     Component(label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0),
     Tilt(label="leaning", vectors=_leaning),

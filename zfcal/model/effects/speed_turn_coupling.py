@@ -6,7 +6,11 @@ turning less at speed for the model: the same joint law.
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.features import Feature, Seen, Tilt, hats
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -19,6 +23,19 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     straight = state[HX * n + i] * ux + state[HY * n + i] * uy
     quick = quickness(speed + SPEED_M_S - parameters[1])
     return tilt(parameters[0], quick * straight, abs(quick))
+
+
+_KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
+
+
+def _by_speed(seen: Seen) -> Floats:
+    """Return the own heading, weighed by what the step's speed has beside the mean of all steps."""
+    weights = hats(seen.own_speed_m_s, _KNOTS_M_S)
+    weights = (weights - weights.mean(axis=0))[:, 1:]
+    return np.asarray(weights[..., None] * seen.own_heading[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (Tilt(label="by speed", vectors=_by_speed),)
 
 
 EFFECT = Effect(
@@ -49,4 +66,5 @@ EFFECT = Effect(
     fixed=("usual_m_s",),
     shown_against="speed",
     other_forms=("generic:speed:own-turn",),
+    features=lambda _arena: _FEATURES,
 )

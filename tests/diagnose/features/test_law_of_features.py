@@ -1,0 +1,174 @@
+"""The law of each step as features see it: the fitted one, and what is added to it."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.special import i0e
+
+from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
+from zfcal.diagnose.features.law import DRAWS, Law
+from zfcal.model.effects import find_effect
+from zfcal.model.effects.features import Component, Turned
+from zfcal.model.extended import maximise, with_effect
+
+
+@pytest.fixture(scope="module")
+def law(base):
+    """Return that of ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Law(scene=scene, fitted=fitted)
+
+
+def log_p_of(law):
+    """Return log densities by the law's own columns."""
+    at, over = (column[:, 0] for column in law.base)
+    density = np.exp(law.log_here) * at / over
+    return np.log((1 - law.lapse) * density + law.lapse / (2 * math.pi))
+
+
+def test_the_law_is_the_fitted_one(law):
+    """The same density of each heading taken, to the digits of the exponential."""
+    np.testing.assert_allclose(log_p_of(law), law.fitted.log_p[law.rows], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"alignment": {"weight": 8.0}},
+        {"directional-drift": {"strength": 0.5, "direction_rad": 1.0}},
+        {"directional-drift": {"strength": 0.05, "direction_rad": 1.0, "drawn": 1.0}},
+        {"rear-blind-zone": {}},
+        {"alignment": {"weight": 5.0, "turning": 1.0}},
+    ],
+    ids=str,
+)
+def test_the_law_of_a_model_with_effects_is_the_fitted_one(base, effects):
+    """Components, tilts, sight and turns of its directions are in it."""
+    scene, plain = base
+    model = plain.parameters
+    for name, values in effects.items():
+        full = dict(zip(find_effect(name).names, find_effect(name).values(values), strict=True))
+        model = with_effect(model, name, full)
+    fitted = maximise(scene, model, start=plain.x, rounds=0)
+    law = Law(scene=scene, fitted=fitted)
+    np.testing.assert_allclose(log_p_of(law), fitted.log_p[law.rows], atol=1e-6)
+
+
+def test_the_cells_add_up_to_the_integral(law):
+    """The law on cells, attraction included, is what the columns integrate."""
+    np.testing.assert_allclose(law.cells.sum(axis=1), law.base[1][:, 0], rtol=1e-6)
+
+
+def test_von_mises_laws_by_plain_numpy():
+    """At the heading taken and over weighted cells; no source gives nothing."""
+    rng, cells = np.random.default_rng(2), 64
+    angle = rng.uniform(-np.pi, np.pi, (5, 2))
+    toward = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    toward[0, 1] = 0.0
+    kappa, weight = rng.uniform(0, 20, 5), rng.random((5, cells))
+    ways = rng.uniform(-np.pi, np.pi, 5)
+    taken = np.stack([np.cos(ways), np.sin(ways)], axis=-1)
+    at, over = np.empty((5, 2)), np.empty((5, 2))
+    bells(toward, kappa, weight, taken, at, over)
+    grid = 2 * np.pi * np.arange(cells) / cells
+    plain = np.exp(kappa[:, None, None] * (np.cos(grid - angle[..., None]) - 1))
+    plain[0, 1] = 0.0
+    np.testing.assert_allclose(over, (plain * weight[:, None]).sum(axis=-1), rtol=1e-6)
+    here = np.exp(kappa[:, None] * (np.cos(ways[:, None] - angle) - 1))
+    here[0, 1] = 0.0
+    np.testing.assert_allclose(at, here, rtol=1e-6)
+    share = rng.random((5, 2))
+    found = np.zeros((5, cells))
+    bells_on_cells(toward, kappa, share, found)
+    np.testing.assert_allclose(found, (share[..., None] * plain).sum(axis=1), rtol=1e-6)
+
+
+def test_tilts_by_plain_numpy():
+    """The integral of the density times the factor, and the mean heading under it."""
+    rng, cells = np.random.default_rng(4), 64
+    density, vector = rng.random((3, cells)), rng.normal(0, 1, (3, 2))
+    grid = 2 * np.pi * np.arange(cells) / cells
+    ways = np.stack([np.cos(grid), np.sin(grid)], axis=-1)
+    plain = density * np.exp(vector @ ways.T)
+    whole, mean = np.empty(3), np.empty((3, 2))
+    tilted(density, vector, whole, mean)
+    np.testing.assert_allclose(whole, plain.sum(axis=1))
+    np.testing.assert_allclose(mean, plain @ ways / plain.sum(axis=1)[:, None])
+
+
+def test_a_component_over_an_even_tank_integrates_to_its_weight(law):
+    """Where all headings land in one zone the integral of a density is that zone's attraction."""
+    feature = Component(
+        label="east",
+        toward=lambda seen: np.broadcast_to([1.0, 0.0], (len(seen.zone), 1, 2)),
+        weights=lambda seen: np.full((len(seen.zone), 1, 1), 0.3),
+        kappa=4.0,
+    )
+    at, over = law.component(feature)
+    share = law.turns.share
+    even = (share.max(axis=2) == share.sum(axis=2).max()).all(axis=1)
+    even &= (share.argmax(axis=2) == share.argmax(axis=2)[:, :1]).all(axis=1)
+    gamma = law.weight.sum(axis=1) / (2 * math.pi)
+    assert even.sum() > 100
+    np.testing.assert_allclose(over[even, 0], 0.3 * gamma[even], rtol=1e-6)
+    east = np.exp(4 * (law.turns.taken[:, 0] - 1)) / (2 * math.pi * i0e(4.0))
+    np.testing.assert_allclose(at[:, 0], 0.3 * east, rtol=1e-6)
+
+
+def test_a_turn_of_the_directions_is_a_derivative(law):
+    """Of the base's law, by the angle: as a difference quotient of a tenth of the angle is."""
+    whole = Turned(label="x", by=lambda seen: np.ones(len(seen.zone)), neighbours=True)
+    own = Turned(label="x", by=lambda seen: np.ones(len(seen.zone)), neighbours=False)
+    at, over = law.turned(whole)
+    assert at.shape == over.shape == (len(law.rows), 1)
+    assert np.abs(law.turned(own)[0] - at).max() > 0.01
+    # All headings alike, in a tank without walls near: turned, the integral stays as it is.
+    share = law.turns.share
+    even = (share.argmax(axis=2) == share.argmax(axis=2)[:, :1]).all(axis=1)
+    even &= (share.sum(axis=2) == share.sum(axis=2).max()).all(axis=1)
+    assert np.abs(over[even]).max() < 1e-4 * law.base[1][even].max()
+
+
+def test_exact_positions_have_one_draw_and_noisy_ones_several(base):
+    """Draws differ from each other; their mean is near the law at the measured positions."""
+    scene, fitted = base
+    exact, noisy = (Law(scene=scene, fitted=fitted, noise_m=noise) for noise in (0.0, 2e-4))
+    assert (len(exact.draws), len(noisy.draws)) == (1, DRAWS)
+    first, second = noisy.draws[0].seen, noisy.draws[1].seen
+    assert not np.array_equal(first.bearing, second.bearing)
+    np.testing.assert_array_equal(first.speed_m_s, exact.draws[0].seen.speed_m_s)
+    apart = log_p_of(noisy) - log_p_of(exact)
+    assert 0 < np.abs(apart).mean() < 0.05
+
+
+def test_draws_are_the_same_for_a_seed(base):
+    """And others for another one."""
+    scene, fitted = base
+    some = [Law(scene=scene, fitted=fitted, noise_m=5e-4, seed=s).base[0] for s in (1, 1, 2)]
+    np.testing.assert_array_equal(some[0], some[1])
+    assert not np.array_equal(some[0], some[2])
+
+
+def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(base):
+    """What lies straight ahead of the drawn step lies ahead of the measured one as well."""
+    scene, fitted = base
+    noisy = Law(scene=scene, fitted=fitted, noise_m=5e-4)
+    exact = Law(scene=scene, fitted=fitted)
+    turned = [
+        (d.seen.own_heading * exact.draws[0].seen.own_heading).sum(axis=1) for d in noisy.draws
+    ]
+    # Both ends of the step before and of this one move: the angle between them scatters.
+    assert np.mean(turned) > 0.9
+    assert np.std(np.arccos(np.clip(turned, -1, 1))) > 0.01
+
+
+def test_a_law_without_some_zone_leaves_its_turns_out(base):
+    """Where too few turns start nothing is fitted: these have no columns."""
+    scene, fitted = base
+    log_p = fitted.log_p.copy()
+    log_p[scene.turns.zone == 1] = np.nan
+    some = Law(scene=scene, fitted=dataclasses.replace(fitted, log_p=log_p))
+    assert (some.turns.zone != 1).all()
+    assert len(some.base[0]) == len(some.rows) < len(scene.turns)

@@ -1,0 +1,158 @@
+"""Features of effects: hat functions, and what each name asks of a step."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from zfcal.artifacts.arenas import load_arena
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.effects.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
+
+N, OTHERS = 6, 3
+
+
+@pytest.fixture
+def seen():
+    """Return what six steps of fish saw of two fish and a robot, all at random."""
+    rng = np.random.default_rng(3)
+
+    def ways(*shape):
+        angle = rng.uniform(-np.pi, np.pi, shape)
+        return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    robot = np.zeros((N, OTHERS), dtype=bool)
+    robot[:, -1] = True
+    return Seen(
+        attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
+        toward=ways(N, OTHERS),
+        late_toward=ways(N, OTHERS),
+        soon_toward=ways(N, OTHERS),
+        late_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
+        bearing=ways(N, OTHERS),
+        distance_m=rng.uniform(0.03, 0.5, (N, OTHERS)),
+        off_axis_rad=rng.uniform(0, np.pi, (N, OTHERS)),
+        speed_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
+        heading=ways(N, OTHERS),
+        here=np.ones((N, OTHERS), dtype=bool),
+        is_robot=robot,
+        own_heading=ways(N),
+        along_wall=ways(N),
+        xy_m=rng.uniform(0.1, 0.3, (N, 2)),
+        follows_walls=np.arange(N) % 2 == 0,
+        zone=np.arange(N) % 3 + 1,
+        track=np.arange(N, dtype=np.int32) % 3,
+        own_speed_m_s=rng.uniform(0.02, 0.2, N),
+        last_turn_rad=rng.normal(0, 0.3, N),
+        time=np.linspace(0, 1, N),
+        left_s=rng.uniform(0, 9, N),
+    )
+
+
+@pytest.fixture(scope="module")
+def arena():
+    """Return the default arena."""
+    return load_arena("two-rooms", Path())
+
+
+def features_of(name, arena):
+    """Return an effect's features; the first of those of which a few are chosen."""
+    found = find_effect(name).features(arena)
+    return [each.features[0] if isinstance(each, OneOf) else each for each in found]
+
+
+def test_hat_functions_by_hand():
+    """A quarter of the way from 1 to 3; at a knot; beyond both ends."""
+    found = hats([1.5, 1.0, -2.0, 9.0], (0.0, 1.0, 3.0))
+    np.testing.assert_allclose(found, [[0, 0.75, 0.25], [0, 1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+def test_hat_functions_add_up_to_one():
+    """Whatever the values, infinite ones too."""
+    values = np.append(np.random.default_rng(1).normal(0, 3, 100), [np.inf, -np.inf])
+    np.testing.assert_allclose(hats(values, (-2.0, -1.0, 0.5, 2.0)).sum(axis=-1), 1.0)
+
+
+def test_every_effect_on_headings_has_features_and_none_on_speed(arena):
+    """A name without features could not be told from the others."""
+    for effect in all_effects():
+        assert bool(effect.features(arena)) == (not effect.on_speed), effect.name
+
+
+@pytest.mark.parametrize("name", [e.name for e in all_effects() if not e.on_speed])
+def test_features_have_a_number_for_each_step_and_weight(name, arena, seen):
+    """And all of them are finite; labels of a name differ."""
+    found = features_of(name, arena)
+    labels = [each.label for each in found]
+    assert len(set(labels)) == len(labels)
+    for each in found:
+        if isinstance(each, Component):
+            named = isinstance(each.toward, str)
+            toward = getattr(seen, each.toward) if named else each.toward(seen)
+            weights = each.weights(seen)
+            assert weights.shape[:2] == toward.shape[:2]
+            values = (toward, weights)
+        elif isinstance(each, Tilt):
+            values = (each.vectors(seen),)
+            assert values[0].shape[::2] == (N, 2)
+        elif isinstance(each, Turned):
+            values = (each.by(seen),)
+            assert values[0].shape == (N,)
+        else:
+            assert isinstance(each, Leaving)
+            values = (each.weights(seen),)
+            assert values[0].shape[0] == N
+        assert all(np.isfinite(value).all() for value in values)
+
+
+def test_who_is_not_there_has_no_weight(arena, seen):
+    """Nobody is there: nothing about neighbours is left, near or far."""
+    none = np.zeros((N, OTHERS))
+    alone = dataclasses.replace(
+        seen,
+        here=none.astype(bool),
+        is_robot=none.astype(bool),
+        attention=none,
+        late_attention=none,
+        distance_m=none + AWAY_M,
+    )
+    for name in ("alignment", "interaction-range", "reaction-delay", "robot-avoidance"):
+        for each in features_of(name, arena):
+            if isinstance(each, Component):
+                assert not each.weights(alone).any(), (name, each.label)
+
+
+def test_a_late_response_takes_from_the_present_one(arena, seen):
+    """At a strength of one all attention goes to where the others were."""
+    for each in features_of("reaction-delay", arena):
+        weights = each.weights(seen)
+        np.testing.assert_array_equal(weights[:, OTHERS:, 0], -seen.attention)
+        assert (each.low, each.high) == (0.0, 1.0)
+
+
+def test_a_sense_of_travel_is_counted_along_walls_alone(arena, seen):
+    """Half of the mixture one way more, half of it the other way less."""
+    share = features_of("wall-persistence", arena)[0]
+    ahead = share.toward(seen)[:, 0]
+    assert ((ahead * seen.own_heading).sum(axis=1) >= 0).all()
+    np.testing.assert_array_equal(
+        share.weights(seen)[:, 0, 0], np.where(seen.follows_walls, 0.5, 0)
+    )
+
+
+def test_places_of_a_room_pull_those_in_it_alone(arena, seen):
+    """Each spot is asked from everywhere, and from its own room."""
+    first = find_effect("place-preference").features(arena)[0]
+    far = dataclasses.replace(seen, xy_m=np.full((N, 2), 0.9) * [1.0, 0.15])
+    sums = [each.weights(far).sum() for each in first.features]
+    assert 0 < sum(total == 0 for total in sums) < len(sums)
+
+
+def test_the_fastest_in_view_is_one_fish(arena, seen):
+    """Of those that are seen: one that is fast and not seen is none."""
+    weights = find_effect("leader-following").features(arena)[1].weights(
+        dataclasses.replace(seen, speed_m_s=np.tile([0.1, 0.2, 0.3], (N, 1)),
+                            attention=np.tile([1.0, 2.0, 0.0], (N, 1)))
+    )  # fmt: skip
+    np.testing.assert_array_equal(weights[..., 0], np.tile([0.0, 2.0, 0.0], (N, 1)))
