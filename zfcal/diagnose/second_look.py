@@ -96,7 +96,7 @@ def _stays(there: Refit, told: Told, law: Law) -> bool:
         return True
     by = by_sample(law.scene, law.turns.at, told.gain.log_p) - there.gain
     error = float(by.std()) * float(np.sqrt(len(by)))
-    ahead = told.gain.nats - there.nats
+    ahead = float(told.gain.nats - there.nats)
     return ahead < -_SURE * error if there.is_generic else ahead < _SURE * error
 
 

@@ -10,8 +10,8 @@ from scipy.special import i0e
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.model.effects import find_effect
-from zfcal.model.effects.features import Component, Turned
 from zfcal.model.extended import maximise, with_effect
+from zfcal.model.features import Component, Turned
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.law import Columns, Law
 from zfcal.model.effects import Effect
-from zfcal.model.effects.features import Component, Feature, Leaving, OneOf, Tilt, Turned
+from zfcal.model.features import Component, Feature, Leaving, OneOf, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.rooms import find_rooms
 
@@ -122,7 +122,7 @@ class Fits:
             return self._additive(name, feature.label, columns, [(-_MOST_TURN, _MOST_TURN)])
         if isinstance(feature, Tilt):
             return self._tilt(name, feature)
-        return self._leaving(name, feature)
+        return self._leaving(name, feature, find_rooms(self.law.scene.arena)[0])
 
     def best_of(self, name: str, choice: OneOf) -> list[Gain]:
         """Return what the most promising of some features add."""
@@ -250,9 +250,12 @@ class Fits:
         x = self._climb_from_null(objective, 0, 0.0)
         return _log_mixed(at, x[-1])
 
-    def _leaving(self, name: str, feature: Leaving) -> Gain:
-        """Return what a factor on landing between the rooms adds, beside one for each zone."""
-        law, (between, _) = self.law, find_rooms(self.law.scene.arena)
+    def _leaving(self, name: str, feature: Leaving, between: int) -> Gain:
+        """Return what a factor on landing between the rooms adds, beside one for each zone.
+
+        ``between`` is the id of that zone.
+        """
+        law = self.law
         share = law.turns.share[:, :, between - 1] / np.maximum(law.turns.share.sum(axis=2), 1)
         inside = (law.cells * share).sum(axis=1) / law.cells.sum(axis=1)
         landed = (law.turns.landing == between).astype(np.float64)
@@ -345,11 +348,13 @@ def gains_of(
     fits = Fits(law=law)
     # What all of them need, before they are asked side by side.
     _ = (law.own_parameters, law.cells, fits._null, fits._untilted, fits._mean_heading)  # noqa: SLF001
+    has_rooms = find_rooms(law.scene.arena)[0] > 0
     asked = [
         (effect.name, feature)
         for effect in effects
         for feature in effect.features(law.scene.arena)
-        if kinds is None or (effect.name, kind_of(feature)) in kinds
+        if (kinds is None or (effect.name, kind_of(feature)) in kinds)
+        and (has_rooms or not isinstance(feature, Leaving))
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))

@@ -22,8 +22,8 @@ from scipy.special import i0e
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
-from zfcal.model.effects.features import AWAY_M, Component, Seen, Turned
 from zfcal.model.extended import without_effects
+from zfcal.model.features import AWAY_M, Component, Seen, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.perception import REPULSION_M
@@ -365,7 +365,8 @@ def _draw(law: Law, states: Floats, view: View) -> Draw:
         back = np.arctan2(turns.taken[:, 1], turns.taken[:, 0]) - np.arctan2(step[:, 1], step[:, 0])
         heading = own[:, [HX, HY]]
     columns = states.shape[2]
-    others = np.array([[j for j in range(columns) if j != i] for i in range(columns)])[who]
+    each = [[j for j in range(columns) if j != i] for i in range(columns)]
+    others = np.array(each, dtype=np.int64)[who]
     seen = _seen(law, states, (own, heading), others)
     along = own[:, [TAU_X, TAU_Y]] if states is not scene.states else turns.along_wall
     modes = np.stack([along, -along], axis=1)

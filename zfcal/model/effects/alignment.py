@@ -8,8 +8,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen, Tilt, attended, evenly
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
+from zfcal.model.features import Component, Feature, Seen, Tilt, attended, evenly
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE

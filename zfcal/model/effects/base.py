@@ -38,7 +38,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
-from zfcal.model.effects.features import Feature
+from zfcal.model.features import Feature
 
 MAX_PARAMETERS = 8
 

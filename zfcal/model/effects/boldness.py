@@ -7,8 +7,8 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
-from zfcal.model.effects.features import Feature, Leaving, Seen
 from zfcal.model.effects.forms import tilt, way_out
+from zfcal.model.features import Feature, Leaving, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.features import Feature, Leaving, Seen, hats
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
+from zfcal.model.features import Feature, Leaving, Seen, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import LEFT_S, ROOM

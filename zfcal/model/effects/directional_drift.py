@@ -8,8 +8,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen, Tilt
 from zfcal.model.effects.forms import SLOWEST_M_S, SPEED_M_S, cut, tilt
+from zfcal.model.features import Component, Feature, Seen, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
 
@@ -117,7 +117,7 @@ EFFECT = Effect(
         *({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
         *({"direction_rad": fourth * math.pi / 2, "drawn": 1.0} for fourth in range(-1, 3)),
     ),
-    fixed=("drawn",),
+    fixed=("drawn", "kappa"),
     needs={"component": ("drawn",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,

@@ -8,8 +8,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen, Tilt, hats, only
 from zfcal.model.effects.forms import Hooked, needs_neighbour, tilt
+from zfcal.model.features import Component, Feature, Seen, Tilt, hats, only
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
 from zfcal.model.kernels.state import ZONE, X, Y

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen, attended, hats
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
+from zfcal.model.features import Component, Feature, Seen, attended, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 

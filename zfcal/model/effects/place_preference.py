@@ -11,15 +11,16 @@ import shapely
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
-from zfcal.model.effects.features import Component, Feature, OneOf, Seen, Tilt, hats, only
 from zfcal.model.effects.forms import tilt
 from zfcal.model.effects.places import places
+from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, hats, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import X, Y
 
 _AT_IT_M = 0.02
+_FEW = 4
 
 
 @hook(COMPONENT)
@@ -157,9 +158,9 @@ EFFECT = Effect(
     harmonics=1,
     shapes=lambda arena: (
         *({"x_m": x, "y_m": y} for x, y in places(arena)),
-        *({"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena)),
+        *({"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena, _FEW)),
     ),
-    fixed=("drawn",),
+    fixed=("drawn", "kappa"),
     needs={"component": ("drawn",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.

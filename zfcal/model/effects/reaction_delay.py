@@ -9,8 +9,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen
 from zfcal.model.effects.forms import needs_neighbour
+from zfcal.model.features import Component, Feature, Seen
 
 
 def _late(then: Callable[[Seen], Floats], attention: Callable[[Seen], Floats]) -> Component:

@@ -8,8 +8,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.features import Component, Feature, Seen, Tilt, attended, hats
 from zfcal.model.effects.forms import apart, tilt
+from zfcal.model.features import Component, Feature, Seen, Tilt, attended, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
 from zfcal.model.kernels.state import KIND, X, Y

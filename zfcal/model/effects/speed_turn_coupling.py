@@ -10,8 +10,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.features import Feature, Seen, Tilt, hats
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
+from zfcal.model.features import Feature, Seen, Tilt, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY

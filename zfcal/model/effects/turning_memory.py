@@ -6,8 +6,8 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
-from zfcal.model.effects.features import Feature, Seen, Turned
 from zfcal.model.effects.forms import leftward, tilt
+from zfcal.model.features import Feature, Seen, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY

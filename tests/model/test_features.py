@@ -8,7 +8,7 @@ import pytest
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.effects.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
+from zfcal.model.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
 
 N, OTHERS = 6, 3
 

@@ -1,0 +1,193 @@
+"""What features gain: nothing where nothing is missing, and most of what is in whatever form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.features.gains import Fits, Gain, gains_of, kind_of
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import LEVEL, best_by_name, tell
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.extended import maximise
+from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
+
+
+def gain(name, values, *, n_strengths=1, label="one", n_tried=1):
+    """Return what a feature gains at each of some steps."""
+    return Gain(
+        name=name,
+        label=label,
+        log_p=np.asarray(values, dtype=float),
+        n_strengths=n_strengths,
+        n_tried=n_tried,
+    )
+
+
+@pytest.fixture(scope="module")
+def nothing(base):
+    """Return fits to ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Fits(law=Law(scene=scene, fitted=fitted))
+
+
+@pytest.fixture(scope="module")
+def hidden(base, worlds):
+    """Return what makes fits to steps of which each heading is drawn from another law.
+
+    Where everybody was stays as it was: the law is the base's times a factor on its cells.
+    """
+    scene, fitted = base
+
+    def make(factor, seed=5):
+        drawn = worlds.redrawn(scene, fitted, np.random.default_rng(seed), factor)
+        return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+
+    return make
+
+
+def bump(angle, centre, kappa):
+    """Return a von Mises density on cells, shape (turn, cell)."""
+    law = np.exp(kappa * (np.cos(angle - np.asarray(centre)[:, None]) - 1))
+    return law / law.sum(axis=1, keepdims=True) * len(angle) / (2 * math.pi)
+
+
+def test_nothing_is_gained_where_nothing_is_missing(base):
+    """No name is told; the best gains a few nats less its strengths, as chance has it."""
+    scene, fitted = base
+    found = gains_of(Law(scene=scene, fitted=fitted), all_effects())
+    assert tell(found) is None
+    assert {each.name for each in found} == {e.name for e in all_effects() if not e.on_speed}
+    assert -10 < best_by_name(found)[0].nats < 6
+
+
+def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
+    """Of headings 4 % are drawn about north-west, in a wide and lopsided bump: a direction."""
+    _, fitted = base
+    mixture, _, _ = fitted.tables()
+
+    def factor(angle):
+        odd = bump(angle, np.full(len(mixture), 2.3), 2.0)
+        odd = odd + 0.5 * bump(angle, np.full(len(mixture), 1.6), 6.0)
+        return 1 + 0.04 * odd / np.maximum(mixture, 1e-12)
+
+    law = hidden(factor)
+    told = tell(gains_of(law, all_effects()))
+    assert told.gain.name == "directional-drift"
+    assert told.gain.label.startswith("drawn")
+    assert told.p < 1e-6
+
+
+def test_a_tilt_is_told_as_well(base, hidden):
+    """All headings lean to the right of where they would go: handedness."""
+    scene, _ = base
+    heading = np.arctan2(scene.turns.heading[:, 1], scene.turns.heading[:, 0])
+    law = hidden(lambda angle: np.exp(-0.25 * np.sin(angle - heading[:, None])))
+    told = tell(gains_of(law, all_effects()))
+    assert told.gain.name == "turning-bias"
+    assert told.gain.log_p.sum() > 20
+
+
+@pytest.mark.parametrize("name", ["alignment", "turning-bias", "collective-departure"])
+def test_more_strengths_never_lose(nothing, name):
+    """At worst they are zero: the log likelihood is that of the base."""
+    for feature in find_effect(name).features(nothing.law.scene.arena):
+        assert nothing.gain(name, feature).log_p.sum() > -1e-2
+
+
+def test_the_own_way_is_never_gone(nothing):
+    """Derivatives and attention below zero would make a mixture negative, and gain for ever."""
+    wild = Component(
+        label="wild",
+        toward="toward",
+        weights=lambda seen: seen.attention[..., None] * np.ones((1, 1, 1)),
+        low=-50.0,
+    )
+    assert nothing.gain("x", wild).log_p.sum() < 6
+
+
+def test_of_places_a_few_are_fitted_and_all_are_counted(nothing):
+    """Each gain says of how many it is the best, and its chance is that of so many."""
+    drawn = find_effect("place-preference").features(nothing.law.scene.arena)[0]
+    found = nothing.best_of("place-preference", drawn)
+    assert 0 < len(found) <= 2
+    assert {each.n_tried for each in found} == {len(drawn.features)}
+    assert {each.key for each in found} == {("place-preference", "drawn")}
+    one = gain("x", [9.0], n_strengths=2)
+    many = gain("x", [9.0], n_strengths=2, n_tried=50)
+    assert many.p() == pytest.approx(50 * one.p())
+
+
+def test_a_gain_by_hand():
+    """Five nats by two strengths: a chi-square of 10 with two degrees, exp(-5)."""
+    own = gain("x", [3.0, 2.0], n_strengths=2)
+    assert own.nats == pytest.approx(3.0)
+    assert own.p() == pytest.approx(math.exp(-5))
+    assert own.p(noise_nats=2.0) == pytest.approx(math.exp(-3))
+    assert own.p(noise_nats=9.0) == 1.0
+
+
+def test_features_are_asked_by_kind(nothing):
+    """Those that replicates are asked for are these alone."""
+    effects = [find_effect("alignment"), find_effect("place-preference")]
+    found = gains_of(nothing.law, effects, kinds={("place-preference", "leaning")})
+    assert {each.key for each in found} <= {("place-preference", "leaning")}
+    kinds = [kind_of(each) for each in effects[1].features(nothing.law.scene.arena)]
+    assert kinds == ["drawn", "leaning"]
+
+
+def test_numbers_do_not_depend_on_threads(base):
+    """To the digit."""
+    scene, fitted = base
+    effects = [find_effect("group-cohesion"), find_effect("reaction-delay")]
+    one, two = (gains_of(Law(scene=scene, fitted=fitted), effects, n_workers=n) for n in (1, 3))
+    assert [each.key for each in one] == [each.key for each in two]
+    for first, second in zip(one, two, strict=True):
+        np.testing.assert_array_equal(first.log_p, second.log_p)
+
+
+def test_every_sort_of_feature_has_its_fit(base):
+    """Steps of two rooms have all of them."""
+    sorts = set()
+    for effect in all_effects():
+        for feature in effect.features(base[0].arena):
+            sorts.add(type(feature))
+    assert sorts == {Component, Tilt, Turned, Leaving, OneOf}
+
+
+STEPS = np.random.default_rng(8).normal(0.02, 0.1, 4000)
+
+
+def test_the_name_that_gains_most_is_told():
+    """By its best feature, with its chance over all features."""
+    gains = [gain("a", STEPS), gain("a", STEPS / 2, label="two"), gain("b", 0 * STEPS)]
+    told = tell(gains)
+    assert (told.gain.name, told.gain.label, told.ties) == ("a", "one", ())
+    assert told.p == pytest.approx(3 * gains[0].p())
+
+
+def test_names_that_gain_alike_are_tied():
+    """The difference is less than two of its standard errors."""
+    other = STEPS + np.random.default_rng(9).normal(0, 0.05, len(STEPS))
+    told = tell([gain("a", STEPS), gain("b", other - other.mean() + STEPS.mean() - 1e-4)])
+    assert (told.gain.name, [each.name for each in told.ties]) == ("a", ["b"])
+
+
+def test_what_noise_gains_is_taken_off():
+    """Asked of those alone that stand out; one that noise explains falls."""
+    asked = []
+
+    def noise(clear):
+        asked.extend(each.name for each in clear)
+        return [1e3 if each.name == "a" else 0.0 for each in clear]
+
+    told = tell([gain("a", 2 * STEPS), gain("b", STEPS), gain("c", 0 * STEPS)], noise)
+    assert (asked, told.gain.name) == (["a", "b"], "b")
+
+
+def test_chance_tells_a_name_as_seldom_as_the_level_says():
+    """Of 40 features of nothing, chi-squares of one degree: 2000 families."""
+    rng = np.random.default_rng(2)
+    ratios = rng.chisquare(1, (2000, 40)) / 2
+    told = sum(tell([gain(str(k), [r]) for k, r in enumerate(row)]) is not None for row in ratios)
+    assert 0.005 < told / 2000 < LEVEL + 3 * math.sqrt(LEVEL / 2000)

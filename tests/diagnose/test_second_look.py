@@ -1,0 +1,154 @@
+"""Features name what no form of ours shows, and take the place of what gains less."""
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose import diagnose as whole
+from zfcal.diagnose.case import open_case
+from zfcal.diagnose.diagnose import diagnose
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import Told
+from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.question import Question
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.second_look import _noise_nats, _stays, second_look
+from zfcal.model.extended import maximise
+
+
+@pytest.fixture(scope="module")
+def question(tank, fish, record):
+    """Return what asks of ten minutes of fish."""
+
+    def of(effects=None, seed=31, **changes):
+        known = {"noise_m": 0.0, "noise_source": "known", "n_null": 5, "quick": True}
+        return Question(
+            samples=record(seed, effects), arena=tank, model=fish, seed=1, n_workers=2,
+            **{**known, **changes},
+        )  # fmt: skip
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def drawn(question, worlds):
+    """Return a case of steps of which 5 % are drawn about a place, from one room and no farther."""
+    case = open_case(question())
+    scene, fitted = case.scene, case.screen.fitted
+    mixture, _, _ = fitted.tables()
+    own = scene.states[scene.turns.at, :, scene.turns.who]
+    way = np.array([0.8, 0.2]) - own[:, :2]
+    bearing, far = np.arctan2(way[:, 1], way[:, 0]), np.hypot(*way.T)
+
+    def factor(angle):
+        law = np.exp(4.0 * (np.cos(angle - bearing[:, None]) - 1))
+        law *= len(angle) / (2 * math.pi) / law.sum(axis=1, keepdims=True)
+        near = ((own[:, 0] > own[:, 1]) & (far < 0.35))[:, None]
+        return 1 + 0.06 * near * law / np.maximum(mixture, 1e-12)
+
+    there = worlds.redrawn(scene, fitted, np.random.default_rng(3), factor)
+    screen = Screen(scene=there, fitted=maximise(there, fitted.parameters))
+    return dataclasses.replace(case, scene=there, screen=screen)
+
+
+@pytest.mark.slow
+def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
+    """A place, of which some headings are drawn, at where it is."""
+    found = second_look(drawn, drawn.screen, None)
+    best = found.step.choice.best
+    assert best.name == "place-preference"
+    assert best.values["drawn"] == 1.0
+    assert best.values["strength"] > 0.005
+    assert math.hypot(best.values["x_m"] - 0.8, best.values["y_m"] - 0.2) < 0.1
+    assert best.nats > 10
+    assert found.step.best.p < 1e-4
+    assert found.confirmed.holds
+    assert found.confirmed.steady
+    assert found.confirmed.gain_nats_per_step > 0
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_nothing_is_missing(question):
+    """Nor where the model has the effect already."""
+    case = open_case(question())
+    assert second_look(case, case.screen, None) is None
+
+
+def gain(name, values):
+    """Return a gain of one strength at each step."""
+    return Gain(name=name, label="x", log_p=values, n_strengths=1)
+
+
+@pytest.fixture(scope="module")
+def law(base):
+    """Return that of ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Law(scene=scene, fitted=fitted)
+
+
+@pytest.mark.parametrize(
+    ("generic", "share", "stays"),
+    [
+        (False, 1.0, True),
+        (False, 0.5, False),
+        (True, 1.0, False),
+        (True, 0.5, False),
+        (True, 3.0, True),
+    ],
+)
+def test_what_was_named_stays_by_what_it_gains(law, generic, share, stays):
+    """A listed one where it gains as much as features do; one beyond the list has to gain more."""
+    n = len(law.rows)
+    values = np.random.default_rng(4).normal(0.02, 0.1, n)
+    by = np.bincount(law.turns.at, share * values, minlength=len(law.scene.k))
+    # Two forms of one effect differ from step to step.
+    apart = np.random.default_rng(6).normal(0, 0.1, len(by))
+    by += apart - apart.mean()
+    there = SimpleNamespace(name="other", gain=by, nats=by.sum() - 1, is_generic=generic)
+    told = Told(gain=gain("place-preference", values), p=1e-6, ties=())
+    assert _stays(there, told, law) is stays
+
+
+def test_the_same_name_stays_in_its_own_form(law):
+    """And one that features cannot tell from the best."""
+    values = np.full(len(law.rows), 0.1)
+    nothing = np.zeros(len(law.scene.k))
+    there = SimpleNamespace(name="alignment", gain=nothing, nats=0.0, is_generic=False)
+    assert _stays(there, Told(gain=gain("alignment", values), p=0.0, ties=()), law)
+    tied = Told(gain=gain("x", values), p=0.0, ties=(gain("alignment", values),))
+    assert _stays(there, tied, law)
+
+
+@pytest.mark.slow
+def test_noise_alone_gains_something(question):
+    """Of a response that is a little late, on replicates with half a millimetre of noise."""
+    case = open_case(question(noise_m=5e-4))
+    late = Gain(name="reaction-delay", label="a tenth of a step", log_p=np.zeros(3), n_strengths=1)
+    (nats,) = _noise_nats(case, [late])
+    assert 0 < nats < 40
+
+
+@pytest.mark.slow
+def test_a_diagnosis_names_what_features_name(question, monkeypatch):
+    """Where forms named nothing the verdict is that of the features, with a strength."""
+    asked = question({"directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0}})
+    plain = whole._judged
+    kept = []
+
+    def nothing(*args):
+        judged = plain(*args)
+        kept.append([step.choice.best.name for step in judged.kept])
+        return dataclasses.replace(judged, kept=(), confirmed=(), suspicious=True)
+
+    monkeypatch.setattr(whole, "_judged", nothing)
+    found = diagnose(asked, lambda *_: None)
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert effect.name == "directional-drift"
+    assert effect.strength["drawn"] == 1.0
+    assert effect.strength["strength"] == pytest.approx(0.07, abs=0.03)
+    assert effect.gain_nats_per_step > 0
