@@ -172,7 +172,14 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
 
 
 def _looked_again(case: Case, judged: _Judged) -> _Judged:
-    """Return what stands once features were asked what the law of headings lacks."""
+    """Return what stands once features were asked what the law of headings lacks.
+
+    Not where the model came with effects on headings: what these leave over, where the fish have
+    another form of them, would be named.
+    """
+    given = in_model(case.screen.fitted.parameters)
+    if any(not candidate.effect.on_speed for candidate in given):
+        return judged
     named = [step for step in judged.kept if not step.choice.best.candidate.effect.on_speed]
     there = named[0] if named else None
     # What features put in its place takes the place of what was added after it as well.
