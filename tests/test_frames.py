@@ -1,0 +1,147 @@
+"""A trial's artifacts as pandas tables: `zfcal.open`."""
+
+import doctest
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import zfcal
+from zfcal import frames
+from zfcal.artifacts.models import read_model
+from zfcal.artifacts.tables import read_tracks
+from zfcal_cli.main import run
+
+ROOT = Path(__file__).parents[1]
+SAMPLE = ROOT / "data-samples" / "two-rooms"
+QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--seed", "1", "-q")
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory):
+    """Return the sample, analysed and calibrated."""
+    root = tmp_path_factory.mktemp("frames") / "trial"
+    shutil.copytree(SAMPLE, root)
+    assert run(["analyse", str(root), "-q"]) == 0
+    assert run(["calibrate", str(root), *QUICK]) == 0
+    return zfcal.open(root)
+
+
+def test_nothing_heavy_is_loaded_before_it_is_asked_for():
+    """Importing the package loads nothing large; `dir` says what it exports."""
+    code = (
+        "import sys, zfcal; dir(zfcal); "
+        "print([m for m in ('numpy', 'pandas', 'numba', 'scipy', 'matplotlib', 'pyarrow') "
+        "if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+    assert dir(zfcal) == ["TrialTables", "ZfcalError", "__version__", "open"]
+    with pytest.raises(AttributeError, match="no attribute 'close'"):
+        _ = zfcal.close
+
+
+def test_tracks_are_those_of_all_segments_in_the_order_of_time(trial):
+    """Each row of each file once, with kinds as words."""
+    found = trial.tracks()
+    segments = sorted((trial.root / "tracks").glob("*.parquet"))
+    assert len(found) == sum(len(read_tracks(path).time_s) for path in segments)
+    assert found["time_s"].is_monotonic_increasing
+    assert set(found["kind"].unique()) == {"fish", "robot"}
+    first = read_tracks(segments[0])
+    np.testing.assert_array_equal(found["x_m"][: len(first.x_m)], first.x_m)
+    assert isinstance(found["kind"].dtype, pd.CategoricalDtype)
+
+
+def test_scores_have_their_ceilings_and_comparisons(trial):
+    """Of the fish, the robot and the model; the whole tank has no zone."""
+    found = trial.scores()
+    assert {"model-vs-control", "social-vs-control"} <= set(found["compared"])
+    whole = found[(found["feature"] == "S") & (found["compared"] == "model-vs-control")]
+    assert whole["zone"].isna().all()
+    assert whole["ceiling"].between(0, 1).all()
+    assert whole["window_end_s"].is_unique
+
+
+def test_counts_are_whole_numbers_where_a_bin_is_not_defined(trial):
+    """Occupation has no bins: the bin of these is missing, not NaN as a number."""
+    found = trial.stats()
+    assert (found["count"] >= 0).all()
+    assert str(found["bin"].dtype) == "Int64"
+    assert found[found["feature"] == "O"]["bin"].isna().all()
+
+
+def test_parameters_are_those_of_the_model_files(trial):
+    """A row for each of every numbered model, with its interval and the rule that published it."""
+    found = trial.parameters()
+    ends = sorted(int(path.stem) for path in (trial.root / "models").glob("*.toml"))
+    assert list(found["window_end_s"].unique()) == ends
+    last = found[found["window_end_s"] == ends[-1]].set_index("parameter")
+    model = read_model(trial.root / "models" / f"{ends[-1]:06d}.toml")
+    assert last.loc["walls.kappa_0", "value"] == model.zones[1].kappa_0
+    assert last.loc["walls.gamma.centre", "value"] == model.zones[1].gamma["centre"]
+    inside = last.dropna(subset=["low", "high"])
+    assert (inside["low"] <= inside["high"]).all()
+    assert len(inside)
+    start = found[found["window_end_s"] == 0]
+    assert start["low"].isna().all()
+    assert start["identified"].isna().all()
+
+
+def test_forward_scores_are_those_of_the_newest_record(trial):
+    """One row for each rule and judged window."""
+    found = trial.rules()
+    assert list(found.columns) == ["window_end_s", "rule", "made_at_s", "S", "low", "high", "n"]
+
+
+def test_findings_have_a_row_for_each_parameter(trial, tmp_path):
+    """In the order of adding; the verdict stands beside the table."""
+    effect = {
+        "name": "alignment", "says": "x", "strength": {"weight": 2.0, "kappa": 5.0},
+        "interval": {"weight": [1.0, 3.0]}, "gain_nats_per_step": 0.1, "p": 1e-9,
+        "ties": ["a", "b"],
+    }  # fmt: skip
+    path = tmp_path / "findings.json"
+    path.write_text(json.dumps({"verdict": "tie", "effects": [effect]}))
+    found = trial.findings(path)
+    assert found.attrs["verdict"] == "tie"
+    assert list(found["parameter"]) == ["weight", "kappa"]
+    assert (found.loc[0, "low"], found.loc[0, "high"]) == (1.0, 3.0)
+    assert found.loc[1, "low"] is None or np.isnan(found.loc[1, "low"])
+    assert found.loc[0, "ties"] == "a,b"
+
+
+@pytest.mark.parametrize("what", ["stats", "scores", "rules", "findings"])
+def test_what_is_not_there_is_named_with_the_command_that_makes_it(what):
+    """Of the sample, which has tracks and a starting model alone."""
+    with pytest.raises(zfcal.ZfcalError, match="there is nothing to read") as caught:
+        getattr(zfcal.open(SAMPLE), what)()
+    assert "zfcal " in caught.value.hint
+
+
+def test_what_is_no_trial_is_told(tmp_path):
+    """And a file in a trial opens that trial."""
+    with pytest.raises(zfcal.ZfcalError, match=r"trial\.toml"):
+        zfcal.open(tmp_path)
+    assert repr(zfcal.open(SAMPLE / "tracks")) == f"zfcal.open({str(SAMPLE)!r})"
+
+
+def test_a_damaged_segment_is_named(tmp_path):
+    """Its path, and that it is no Parquet."""
+    root = shutil.copytree(SAMPLE, tmp_path / "trial")
+    path = min((root / "tracks").glob("*.parquet"))
+    path.write_bytes(b"no")
+    with pytest.raises(zfcal.ZfcalError, match=path.name):
+        zfcal.open(root).tracks()
+
+
+def test_examples_in_docstrings_give_what_they_show(monkeypatch):
+    """From the project's directory, where the samples are."""
+    monkeypatch.chdir(ROOT)
+    found = doctest.testmod(frames)
+    assert (found.failed, found.attempted) == (0, 4)

@@ -1,0 +1,286 @@
+"""A trial's artifacts as pandas tables, for notebooks and scripts.
+
+Columns are those of the artifacts, with units in their names. All of a trial's files of a kind are
+one table. Nothing is computed or written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, final
+
+import pandas as pd
+import pyarrow as pa
+
+from zfcal.artifacts.models import read_model, read_result
+from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.segments import segment_path, segment_starts
+from zfcal.artifacts.settings import find_trial, read_trial
+from zfcal.artifacts.tables import RULES, SCORES, STATS, TRACKS, read_table
+from zfcal.artifacts.validation import read_json
+from zfcal.errors import InputError
+from zfcal.parameters import Parameters
+from zfcal.trial import Trial
+
+_PARAMETERS = (
+    "window_end_s",
+    "parameter",
+    "value",
+    "low",
+    "high",
+    "identified",
+    "intervals_by",
+    "rule",
+)
+_FINDINGS = (
+    "rank",
+    "effect",
+    "parameter",
+    "value",
+    "low",
+    "high",
+    "gain_nats_per_step",
+    "p",
+    "ties",
+)
+
+
+@final
+class TrialTables:
+    """The artifacts of a trial as pandas tables.
+
+    Parameters
+    ----------
+    trial
+        Its directory, or anything in it.
+
+    Raises
+    ------
+    InputError
+        There is no trial, or its settings are wrong.
+    """
+
+    def __init__(self, trial: str | Path) -> None:
+        self._trial = read_trial(find_trial(Path(trial)))
+
+    @property
+    def trial(self) -> Trial:
+        """Its settings."""
+        return self._trial
+
+    @property
+    def root(self) -> Path:
+        """Its directory."""
+        return self._trial.root
+
+    def tracks(self) -> pd.DataFrame:
+        """Return the positions of everybody in every frame, in the order of time.
+
+        Returns
+        -------
+        DataFrame
+            One row per agent and frame: ``time_s``, ``frame``, ``agent``, ``kind`` (fish or robot),
+            ``x_m``, ``y_m``, ``heading_rad`` (NaN where it is not known), ``confidence``. Who is
+            lost in a frame has no row. Below a confidence of one half a position is a guess.
+
+        Raises
+        ------
+        InputError
+            There are no tracks.
+        DamagedError
+            A segment is damaged.
+        """
+        paths = [segment_path(self.root, start) for start in segment_starts(self.root)]
+        hint = f"First: zfcal track {self.root}, or zfcal import SRC {self.root}"
+        return _joined(paths, TRACKS, self.root / "tracks", hint)
+
+    def stats(self) -> pd.DataFrame:
+        """Return the counts of all windows: one row per window, case, zone, statistic and bin.
+
+        Raises
+        ------
+        InputError
+            There are none.
+        DamagedError
+            A file is damaged.
+        """
+        hint = f"First: zfcal analyse {self.root}"
+        return _joined(self._numbered("stats", ".parquet"), STATS, self.root / "stats", hint)
+
+    def scores(self) -> pd.DataFrame:
+        """Return all scores: one row per window, comparison, feature and zone.
+
+        Returns
+        -------
+        DataFrame
+            ``window_end_s``, ``compared`` (such as ``model-vs-control``), ``feature``, ``zone``
+            (missing for the whole tank), ``value``, ``low``, ``high``, ``ceiling``, ``n_windows``
+            and ``n_features``. A score says little without its ceiling: what a perfect model would
+            score.
+
+        Raises
+        ------
+        InputError
+            There are none.
+        DamagedError
+            A file is damaged.
+        """
+        paths = [*self._numbered("scores", ".parquet"), *self._numbered("scores", "-model.parquet")]
+        hint = f"First: zfcal analyse {self.root}"
+        return _joined(paths, SCORES, self.root / "scores", hint)
+
+    def rules(self) -> pd.DataFrame:
+        """Return the forward scores of the rules by which models are published.
+
+        Returns
+        -------
+        DataFrame
+            ``window_end_s``, ``rule``, ``made_at_s``, ``S``, ``low``, ``high``, ``n``, as in the
+            newest record, which has all rows so far.
+
+        Raises
+        ------
+        InputError
+            No rules were judged.
+        DamagedError
+            The record is damaged.
+        """
+        paths = self._numbered("scores", "-rules.parquet")[-1:]
+        hint = f"First: zfcal calibrate {self.root} --publish forward"
+        return _joined(paths, RULES, self.root / "scores", hint)
+
+    def parameters(self) -> pd.DataFrame:
+        """Return the parameters of all numbered models, those of effects as well.
+
+        Returns
+        -------
+        DataFrame
+            One row per model and parameter: ``window_end_s`` (0 for the starting model),
+            ``parameter`` (``walls.kappa_0``, ``walls.gamma.centre``, ``alignment.weight``),
+            ``value``, the 95 % interval ``low`` to ``high`` and whether it pins the value down,
+            ``identified`` (missing where the file has none), ``intervals_by`` (``likelihood`` or
+            ``score``) and the publishing ``rule``.
+
+        Raises
+        ------
+        InputError
+            There are no models.
+        DamagedError
+            A model is damaged.
+        """
+        places = numbered_of(self.root / "models", ".toml")
+        rows = [row for end, path in sorted(places.items()) for row in _parameter_rows(end, path)]
+        if not rows:
+            raise _nothing(self.root / "models", f"First: zfcal calibrate {self.root}")
+        return pd.DataFrame(rows, columns=list(_PARAMETERS)).astype(
+            {"identified": "boolean", "window_end_s": "int64"}
+        )
+
+    def findings(self, path: str | Path | None = None) -> pd.DataFrame:
+        """Return the effects that a diagnosis names; without any the table is empty.
+
+        Parameters
+        ----------
+        path
+            Of the findings; ``diagnosis/findings.json`` by default. The verdict is in ``attrs``.
+
+        Returns
+        -------
+        DataFrame
+            One row per effect and parameter: ``rank`` from 1 on, ``effect``, ``parameter``,
+            ``value``, ``low``, ``high``, ``gain_nats_per_step``, ``p`` and ``ties`` (names, with
+            commas).
+
+        Raises
+        ------
+        InputError
+            There are no findings.
+        DamagedError
+            They are damaged.
+        """
+        place = self.root / "diagnosis" / "findings.json" if path is None else Path(path)
+        if not place.is_file():
+            raise _nothing(place, f"First: zfcal diagnose {self.root}")
+        found = read_json(place)
+        rows = [row for rank, each in enumerate(found["effects"], 1) for row in _found(rank, each)]
+        table = pd.DataFrame(rows, columns=list(_FINDINGS))
+        table.attrs["verdict"] = found["verdict"]
+        return table
+
+    def _numbered(self, folder: str, ending: str) -> list[Path]:
+        return [path for _, path in sorted(numbered_of(self.root / folder, ending).items())]
+
+    def __repr__(self) -> str:
+        """Return how it was made."""
+        return f"zfcal.open({str(self.root)!r})"
+
+
+def open_trial(trial: str | Path) -> TrialTables:
+    """Return a trial whose artifacts can be read as pandas tables.
+
+    Parameters
+    ----------
+    trial
+        Its directory, or anything in it.
+
+    Raises
+    ------
+    InputError
+        There is no trial, or its settings are wrong.
+
+    Examples
+    --------
+    >>> import zfcal
+    >>> trial = zfcal.open("data-samples/two-rooms")
+    >>> tracks = trial.tracks()
+    >>> sorted(tracks["kind"].unique())
+    ['fish', 'robot']
+    """
+    return TrialTables(trial)
+
+
+def _nothing(place: Path, hint: str) -> InputError:
+    return InputError(f"{place}: there is nothing to read.", hint=hint)
+
+
+def _joined(paths: list[Path], schema: str, place: Path, hint: str) -> pd.DataFrame:
+    if not paths:
+        raise _nothing(place, hint)
+    table = pa.concat_tables([read_table(path, schema) for path in paths]).unify_dictionaries()
+    frame: pd.DataFrame = table.to_pandas()
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if pa.types.is_integer(column.type) and column.null_count:
+            # Where null means "not defined" a whole number stays one.
+            frame[name] = column.to_pandas(integer_object_nulls=True).astype("Int64")
+    return frame
+
+
+def _parameter_rows(end_s: int, path: Path) -> Iterator[tuple[Any, ...]]:
+    result = read_result(path)
+    intervals = result.get("intervals") or {}
+    published = result.get("published") or {}
+    said = intervals.get("parameters", {})
+    for name, value in _values(read_model(path)):
+        row = said.get(name, {})
+        known = (row.get("low"), row.get("high"), row.get("identified"))
+        yield end_s, name, value, *known, intervals.get("by"), published.get("rule")
+
+
+def _values(model: Parameters) -> Iterator[tuple[str, float]]:
+    for zone in model.zones:
+        for key in ("kappa_0", "kappa_f", "alpha"):
+            yield f"{zone.name}.{key}", float(getattr(zone, key))
+        for to, gamma in zone.gamma.items():
+            yield f"{zone.name}.gamma.{to}", float(gamma)
+    for effect, values in model.effects.items():
+        for key, value in values.items():
+            yield f"{effect}.{key}", float(value)
+
+
+def _found(rank: int, effect: dict[str, Any]) -> Iterator[tuple[Any, ...]]:
+    ties = ",".join(effect["ties"])
+    for parameter, value in effect["strength"].items():
+        low, high = effect["interval"].get(parameter, (None, None))
+        gain, p = effect["gain_nats_per_step"], effect["p"]
+        yield rank, effect["name"], parameter, value, low, high, gain, p, ties
