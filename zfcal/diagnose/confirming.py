@@ -40,13 +40,13 @@ _LEAST_VARIANCE = 1e-12
 _OF_OTHERS = 2.0
 """Standard errors that are left of an effect without the fish that asks for it most."""
 
-_PHASES = 20
+PHASES = 20
 """Parts of the time from pulse to pulse."""
 
 MINUTES_S, SECONDS_S = 60.0, 10.0
 """Blocks of time in which an effect is to be of one strength."""
 
-_WAVERS = 3e-3
+WAVERS = 3e-3
 """Chance at which the scores of blocks are no longer of one strength."""
 
 
@@ -249,10 +249,10 @@ def has_pulses(score: Score, scene: Scene) -> bool:
     moves = _judged_by(score, scene)
     series = np.bincount(moves.at, score.steps, len(scene.k)).astype(np.float64)
     found = pulses(series[None], scene.dt_s)
-    if not found.tail <= _WAVERS:
+    if not found.tail <= WAVERS:
         return False
     phase = scene.time_s(moves) / found.period_s % 1
-    return not _one_strength(score.steps, phase * _PHASES // 1)
+    return not _one_strength(score.steps, phase * PHASES // 1)
 
 
 def _one_strength(steps: Floats, block: Floats) -> bool:
@@ -266,7 +266,7 @@ def _one_strength(steps: Floats, block: Floats) -> bool:
     mean = float(sums.sum()) / total
     q, df = float(((sums - mean * information) ** 2 / information).sum()), len(sums) - 1
     spread2 = (q - df) / (total - float((information**2).sum()) / total)
-    return bool(spread2 <= mean**2 or chdtrc(df, q) > _WAVERS)
+    return bool(spread2 <= mean**2 or chdtrc(df, q) > WAVERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -13,15 +13,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
 
+from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
-from zfcal.diagnose.confirming import Confirmed, confirm
+from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
 from zfcal.diagnose.features.gains import Gain, gains_of
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told, tell
+from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.naming import Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
+from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import Best, Step
@@ -80,9 +85,46 @@ def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | 
         before=screen,
     )
     (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
-    if confirmed.pulsed or not confirmed.in_all_minutes:
+    if not (_gains_elsewhere(confirmed) and _is_steady(found.screen, screen)):
         return None
     return SecondLook(step=step, confirmed=dataclasses.replace(confirmed, holds=True, steady=True))
+
+
+def _gains_elsewhere(confirmed: Confirmed) -> bool:
+    """Return whether the form that goes into the model gains on held-out steps.
+
+    What is no effect of the list answers to features of several names a little, and to none of
+    their forms.
+    """
+    return confirmed.gain_nats_per_step > _SURE * confirmed.gain_se
+
+
+def _is_steady(model: Screen, base: Screen) -> bool:
+    """Return whether an effect is there in all minutes, and not in pulses at regular times.
+
+    What it gains at each step, less what it would gain if the fish drew from the model all the
+    time, has mean zero in each minute then, and no period. Its scores may have one: where few
+    moments ask for an effect they are no white noise.
+    """
+    gains, scene = heading_gains(model, base), base.scene
+    at, apart = gains.gain.at, gains.gain.values - gains.expected.values
+    minute = (scene.time_s(scene.turns) // MINUTES_S).astype(np.int64)
+    if not _alike(apart, minute - minute.min()):
+        return False
+    series = np.bincount(at, apart, len(scene.k)).astype(np.float64)
+    found = pulses(series[None], scene.dt_s)
+    if not found.tail <= WAVERS:
+        return True
+    phase = (at * scene.dt_s / found.period_s % 1 * PHASES).astype(np.int64)
+    return _alike(apart, phase)
+
+
+def _alike(apart: Floats, part: NDArray[np.int64]) -> bool:
+    """Return whether steps have mean zero in all parts of a recording, by a chi-square."""
+    sums, squares = np.bincount(part, apart), np.bincount(part, apart**2)
+    told = squares > 0
+    ratio = float((sums[told] ** 2 / squares[told]).sum())
+    return bool(chdtrc(int(told.sum()), ratio) > WAVERS)
 
 
 def _law(case: Case, screen: Screen) -> Law:
