@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from zfcal.behaviour.scores import compare
 from zfcal.calibrate.ceiling import window_noise
 from zfcal.calibrate.group import scale_gamma
-from zfcal.calibrate.rounds import _changed_for, calibrate_window
+from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
@@ -159,42 +158,6 @@ def test_a_model_that_is_kept_stays_to_the_bit(later, old, forward):
     driven = runs.as_statistics(0, task.control.zone_names)
     assert counts_of(in_use.long_run) == counts_of(driven) != counts_of(old.long_run)
     assert task.confirmation(forward).scores(old.genes[None]).S[0] == result.scores.S
-
-
-def test_the_nearest_model_takes_over_where_it_is_nearer_by_more_than_chance(later, old, forward):
-    """Else the model in use stays: windows of one model differ as much."""
-    task = later({}, old)
-    noise = window_noise(calibrate_window(task, replace(forward, champion="score")).ceiling)
-    found = {}
-    for name, genes in (("poor", 1.0 - old.genes), ("good", task.guests[0])):
-        own = scale_gamma(genes, 3)
-        run = task.confirmation(forward).simulate(own[None])
-        in_use = replace(old, genes=own, long_run=run.as_statistics(0, task.control.zone_names))
-        record = replace(task.record, models=(in_use,), in_use=in_use)
-        result = calibrate_window(replace(task, record=record), forward)
-        (nearest,) = [m for m in result.handed.record.models if m.rule == NEAREST]
-        gain = max(
-            compare(model.long_run, task.control).S
-            for model in result.handed.record.models
-            if model.rule != KEEP
-        ) - (compare(in_use.long_run, task.control).S)
-        found[name] = gain > noise
-        assert (nearest.genes == own).all() == (not found[name])
-        assert nearest.of_s == (420 if found[name] else 300)
-    assert found == {"poor": True, "good": False}
-
-
-@pytest.mark.parametrize(("share", "changes"), [(0.9, False), (1.1, True)])
-def test_a_model_is_left_for_one_that_is_nearer_by_a_deviation(task, small, old, share, changes):
-    """Here their scores differ by a share of what windows of one model differ by."""
-    poor = replace(old, rule=KEEP, genes=1.0 - old.genes)
-    run = task.confirmation(small).simulate(poor.genes[None])
-    poor = replace(poor, long_run=run.as_statistics(0, task.control.zone_names))
-    better, worse = (compare(m.long_run, task.control).S for m in (old, poor))
-    assert better > worse
-    found = _changed_for(task, replace(old, rule=NEAREST), poor, (better - worse) / share)
-    assert (found.genes == (old if changes else poor).genes).all()
-    assert found.rule == NEAREST
 
 
 def test_before_rules_are_judged_the_last_champion_is_in_use(guided, forward, truth):

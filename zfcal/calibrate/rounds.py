@@ -23,7 +23,6 @@ from zfcal.calibrate.history import Generation
 from zfcal.calibrate.intervals import Intervals, parameter_intervals
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.rules import (
-    CHANGE,
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
@@ -245,7 +244,6 @@ def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> Ha
     nearest = record.nearest(task.control)
     if nearest is not None:
         made |= _swum(task, settings, {NEAREST: nearest.genes}, of_s=nearest.of_s)
-        made[NEAREST] = _changed_for(task, made[NEAREST], made[KEEP], noise)
     choice = record.choose(set(made) - {KEEP}, noise)
     chosen = made[choice.rule]
     record = replace(
@@ -292,14 +290,6 @@ def _handed_before(task: Task, settings: Settings, record: Record) -> dict[str, 
         of_s = task.seeds.window_end_s
         return _swum(task, settings, {KEEP: _first_in_use(task)}, of_s=of_s)
     return _swum(task, settings, {KEEP: record.in_use.genes}, of_s=record.in_use.of_s)
-
-
-def _changed_for(task: Task, nearest: Candidate, kept: Candidate, noise: float) -> Candidate:
-    """Return the nearest model, or the one in use where that is as near but for chance."""
-    gain = compare(nearest.long_run, task.control).S - compare(kept.long_run, task.control).S
-    if gain <= CHANGE * noise:
-        return replace(kept, rule=NEAREST)
-    return nearest
 
 
 def _first_in_use(task: Task) -> Floats:

@@ -32,7 +32,7 @@ SCORE, LIKELIHOOD, COMPROMISE, MEMORY, NEAREST, KEEP = RULES = (
 )
 """The best of the window by its score; its likelihood estimate; half way between these two; the
 estimate over all minutes so far, older ones counting less; of all models made so far, the nearest
-to the window, where it is nearer than the one in use by more than chance; the model in use."""
+to the window; the model in use."""
 
 SAYS = {
     SCORE: "the window's best by its score",
@@ -58,10 +58,6 @@ FIRST_ROUNDS = 2
 LEVEL = 0.8
 """How sure the largest of all leads has to be before another rule takes over: where no rule is
 better than the one in charge, chance makes one of them lead as far in one round of five."""
-
-CHANGE = 1.0
-"""A model nearer to the window than the one in use is taken if its score is higher by so many
-standard deviations of what windows of one model differ by."""
 
 _MOST_MODELS = 60
 """Models that are kept for `NEAREST`, the newest."""
