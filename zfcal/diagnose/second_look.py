@@ -35,6 +35,10 @@ from zfcal.model.effects import find_effect
 _SURE = 2.0
 """Standard errors by which a name must gain more than another one."""
 
+_BY_ITSELF = 4.0
+"""Standard errors by which features of a name must lead those of all others where no form of ours
+bears it out: such as a response that is late by less than a step."""
+
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
 
@@ -85,7 +89,8 @@ def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | 
         before=screen,
     )
     (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
-    if not (_gains_elsewhere(confirmed) and _is_steady(found.screen, screen)):
+    is_borne_out = _gains_elsewhere(confirmed) and _is_steady(found.screen, screen)
+    if not (is_borne_out or told.lead > _BY_ITSELF):
         return None
     return SecondLook(step=step, confirmed=dataclasses.replace(confirmed, holds=True, steady=True))
 

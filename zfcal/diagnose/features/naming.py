@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from zfcal.diagnose.features.gains import Gain
 
@@ -31,11 +30,14 @@ class Told:
         Over the whole family.
     ties
         Of names that cannot be told from it, the best first.
+    lead
+        By how many standard errors it gains more than any other name; infinite without one.
     """
 
     gain: Gain
     p: float
     ties: tuple[Gain, ...]
+    lead: float = math.inf
 
 
 def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
@@ -60,8 +62,11 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
     if not best:
         return None
     first, *others = best
-    ties = tuple(gain for gain in others if not _is_ahead(first, gain))
-    return Told(gain=first, p=min(1.0, first.p() * n_tried), ties=ties)
+    ties = tuple(gain for gain in others if _lead(first, gain) <= _SURE)
+    lead = min(
+        (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
+    )
+    return Told(gain=first, p=min(1.0, first.p() * n_tried), ties=ties, lead=lead)
 
 
 def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
@@ -78,8 +83,8 @@ def _once(gains: Sequence[Gain]) -> list[Gain]:
     return list({gain.key: gain for gain in gains}.values())
 
 
-def _is_ahead(one: Gain, other: Gain) -> bool:
-    """Return whether a feature gains more than another one by more than their error."""
+def _lead(one: Gain, other: Gain) -> float:
+    """Return by how many standard errors a feature gains more than another one."""
     by = one.log_p - other.log_p
-    error = float(by.std()) * float(np.sqrt(len(by)))
-    return one.nats - other.nats > _SURE * error
+    error = float(by.std()) * math.sqrt(len(by))
+    return (one.nats - other.nats) / max(error, 1e-12)
