@@ -14,6 +14,7 @@ COMMITTED = {
     "calibration.bench_rounds": "calibration.rounds_document",
     "drive.bench_closed_loop": "drive.bench_closed_loop",
     "drive.bench_drive": "drive.bench_drive",
+    "drive.bench_effect_drives": "drive.bench_effect_drives",
     "speed.bench_growth": "speed.growth_document",
     "speed.bench_long": "speed.bench_long",
     "speed.bench_roofline": "speed.bench_roofline",

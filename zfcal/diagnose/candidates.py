@@ -126,6 +126,11 @@ def candidates_of(
     return tuple(made)
 
 
+def further_forms(effect: Effect, arena: Arena) -> tuple[Candidate, ...]:
+    """Return an effect at the shapes in which features alone may find it."""
+    return tuple(_at(effect, shape) for shape in effect.further_shapes(arena))
+
+
 def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[str, str]]:
     """Return the listed effects that a recording can show, and what it lacks for others.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate
+from zfcal.diagnose.candidates import Candidate, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
 from zfcal.diagnose.features.gains import Gain, gains_of
@@ -167,6 +167,7 @@ def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
 def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
     """Return an effect in the model in that form which gains most, and its score there."""
     own = [each for each in case.listed if each.name == name]
+    own += further_forms(find_effect(name), case.scene.arena)
     scores = ask_all(screen, own, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -abs(each.z)):

@@ -131,6 +131,10 @@ def _as_it_is(_arena: Arena) -> Shapes:
     return ({},)
 
 
+def _no_further(_arena: Arena) -> Shapes:
+    return ()
+
+
 def _no_features(_arena: Arena) -> tuple[Feature, ...]:
     return ()
 
@@ -167,6 +171,9 @@ class Effect:
         what.
     shapes
         Of an arena: values of the other parameters at which the effect is asked for.
+    further_shapes
+        Of an arena: shapes in which features may find it (`zfcal.model.features`), and at which it
+        is not asked for otherwise.
     lacks
         Of a recording: what it lacks for this effect to show, None if nothing.
     opposite
@@ -223,6 +230,7 @@ class Effect:
     by_landing: bool = False
     lag: str | None = None
     shapes: Callable[[Arena], Shapes] = _as_it_is
+    further_shapes: Callable[[Arena], Shapes] = _no_further
     lacks: Callable[[Company], str | None] = _always
     opposite: str = ""
     identity_s: float = 0.0

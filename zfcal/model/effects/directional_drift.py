@@ -113,9 +113,9 @@ EFFECT = Effect(
     component=component,
     factor=factor,
     harmonics=1,
-    shapes=lambda _arena: (
-        *({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
-        *({"direction_rad": fourth * math.pi / 2, "drawn": 1.0} for fourth in range(-1, 3)),
+    shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+    further_shapes=lambda _arena: tuple(
+        {"direction_rad": eighth * math.pi / 4, "drawn": 1.0} for eighth in range(-3, 5)
     ),
     fixed=("drawn", "kappa"),
     needs={"component": ("drawn",)},

@@ -20,7 +20,6 @@ from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import X, Y
 
 _AT_IT_M = 0.02
-_FEW = 4
 
 
 @hook(COMPONENT)
@@ -156,9 +155,9 @@ EFFECT = Effect(
     component=component,
     factor=factor,
     harmonics=1,
-    shapes=lambda arena: (
-        *({"x_m": x, "y_m": y} for x, y in places(arena)),
-        *({"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena, _FEW)),
+    shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
+    further_shapes=lambda arena: tuple(
+        {"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena)
     ),
     fixed=("drawn", "kappa"),
     needs={"component": ("drawn",)},
