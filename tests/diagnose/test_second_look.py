@@ -152,3 +152,14 @@ def test_a_diagnosis_names_what_features_name(question, monkeypatch):
     assert effect.strength["drawn"] == 1.0
     assert effect.strength["strength"] == pytest.approx(0.07, abs=0.03)
     assert effect.gain_nats_per_step > 0
+
+
+@pytest.mark.slow
+def test_features_are_not_asked_where_noise_is_not_known(question, monkeypatch):
+    """What it makes of a law would be named."""
+    asked = []
+    monkeypatch.setattr(whole, "second_look", lambda *args: asked.append(args))
+    diagnose(question(noise_m=None, noise_source="unknown"), lambda *_: None)
+    assert asked == []
+    diagnose(question(), lambda *_: None)
+    assert len(asked) == 1

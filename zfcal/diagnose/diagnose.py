@@ -175,10 +175,11 @@ def _looked_again(case: Case, judged: _Judged) -> _Judged:
     """Return what stands once features were asked what the law of headings lacks.
 
     Not where the model came with effects on headings: what these leave over, where the fish have
-    another form of them, would be named.
+    another form of them, would be named. Nor where nobody knows by how much positions err: what
+    noise makes of a law would be named.
     """
     given = in_model(case.screen.fitted.parameters)
-    if any(not candidate.effect.on_speed for candidate in given):
+    if case.question.noise_m is None or any(not candidate.effect.on_speed for candidate in given):
         return judged
     named = [step for step in judged.kept if not step.choice.best.candidate.effect.on_speed]
     there = named[0] if named else None
