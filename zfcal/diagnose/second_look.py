@@ -22,7 +22,7 @@ from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
 from zfcal.diagnose.features.gains import Gain, gains_of
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Told, tell
+from zfcal.diagnose.features.naming import LEVEL, Told, tell
 from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.naming import Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
@@ -89,36 +89,36 @@ def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | 
         before=screen,
     )
     (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
-    is_borne_out = _gains_elsewhere(confirmed) and _is_steady(found.screen, screen)
+    is_borne_out = _gains(found) and _is_steady(confirmed, found.screen, screen)
     if not (is_borne_out or told.lead > _BY_ITSELF):
         return None
     return SecondLook(step=step, confirmed=dataclasses.replace(confirmed, holds=True, steady=True))
 
 
-def _gains_elsewhere(confirmed: Confirmed) -> bool:
-    """Return whether the form that goes into the model gains on held-out steps.
+def _gains(form: Refit) -> bool:
+    """Return whether the form that goes into the model gains more than chance by itself.
 
     What is no effect of the list answers to features of several names a little, and to none of
-    their forms.
+    their forms. On held-out steps a form is not asked: that would halve the power.
     """
-    return confirmed.gain_nats_per_step > _SURE * confirmed.gain_se
+    return bool(chdtrc(form.n_free, 2 * max(float(form.gain.sum()), 0.0)) < LEVEL)
 
 
-def _is_steady(model: Screen, base: Screen) -> bool:
+def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:
     """Return whether an effect is there in all minutes, and not in pulses at regular times.
 
-    What it gains at each step, less what it would gain if the fish drew from the model all the
-    time, has mean zero in each minute then, and no period. Its scores may have one: where few
-    moments ask for an effect they are no white noise.
+    Its scores say so, or what it gains at each step less what it would gain if the fish drew from
+    the model all the time: that has mean zero in each minute, and no period. Neither is normal
+    where few moments ask for an effect: scores where they are far apart, gains where they are rare.
     """
     gains, scene = heading_gains(model, base), base.scene
     at, apart = gains.gain.at, gains.gain.values - gains.expected.values
     minute = (scene.time_s(scene.turns) // MINUTES_S).astype(np.int64)
-    if not _alike(apart, minute - minute.min()):
+    if not (confirmed.in_all_minutes or _alike(apart, minute - minute.min())):
         return False
     series = np.bincount(at, apart, len(scene.k)).astype(np.float64)
     found = pulses(series[None], scene.dt_s)
-    if not found.tail <= WAVERS:
+    if not confirmed.pulsed or not found.tail <= WAVERS:
         return True
     phase = (at * scene.dt_s / found.period_s % 1 * PHASES).astype(np.int64)
     return _alike(apart, phase)
