@@ -1,6 +1,7 @@
 """What features gain: nothing where nothing is missing, and most of what is in whatever form."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,16 +116,17 @@ def test_of_places_a_few_are_fitted_and_all_are_counted(nothing):
     assert {each.key for each in found} == {("place-preference", "drawn")}
     one = gain("x", [9.0], n_strengths=2)
     many = gain("x", [9.0], n_strengths=2, n_tried=50)
-    assert many.p() == pytest.approx(50 * one.p())
+    assert many.p == pytest.approx(50 * one.p)
 
 
 def test_a_gain_by_hand():
     """Five nats by two strengths: a chi-square of 10 with two degrees, exp(-5)."""
     own = gain("x", [3.0, 2.0], n_strengths=2)
     assert own.nats == pytest.approx(3.0)
-    assert own.p() == pytest.approx(math.exp(-5))
-    assert own.p(noise_nats=2.0) == pytest.approx(math.exp(-3))
-    assert own.p(noise_nats=9.0) == 1.0
+    assert own.p == pytest.approx(math.exp(-5))
+    noisy = replace(own, noise_nats=2.0)
+    assert (noisy.nats, noisy.p) == (pytest.approx(1.0), pytest.approx(math.exp(-3)))
+    assert replace(own, noise_nats=9.0).p == 1.0
 
 
 def test_features_are_asked_by_kind(nothing):
@@ -163,7 +165,7 @@ def test_the_name_that_gains_most_is_told():
     gains = [gain("a", STEPS), gain("a", STEPS / 2, label="two"), gain("b", 0 * STEPS)]
     told = tell(gains)
     assert (told.gain.name, told.gain.label, told.ties) == ("a", "one", ())
-    assert told.p == pytest.approx(3 * gains[0].p())
+    assert told.p == pytest.approx(3 * gains[0].p)
 
 
 def test_names_that_gain_alike_are_tied():
@@ -183,6 +185,16 @@ def test_what_noise_gains_is_taken_off():
 
     told = tell([gain("a", 2 * STEPS), gain("b", STEPS), gain("c", 0 * STEPS)], noise)
     assert (asked, told.gain.name) == (["a", "b"], "b")
+
+
+def test_a_name_is_told_by_what_noise_leaves_of_its_gain():
+    """The one that gains most falls behind, and the chance that is told is that of what is left."""
+    told = tell(
+        [gain("a", 2 * STEPS), gain("b", 1.5 * STEPS)],
+        lambda clear: [1.5 * STEPS.sum() if each.name == "a" else 1.0 for each in clear],
+    )
+    assert told.gain.name == "b"
+    assert told.p == pytest.approx(2 * replace(gain("b", 1.5 * STEPS), noise_nats=1.0).p)
 
 
 def test_chance_tells_a_name_as_seldom_as_the_level_says():

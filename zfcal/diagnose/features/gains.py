@@ -59,6 +59,8 @@ class Gain:
         Features of which this one was the best.
     kind
         What these are called; empty where it is the only one.
+    noise_nats
+        What noise of positions alone makes it gain.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Gain:
     n_strengths: int
     n_tried: int = 1
     kind: str = ""
+    noise_nats: float = 0.0
 
     @property
     def key(self) -> tuple[str, str]:
@@ -75,18 +78,13 @@ class Gain:
 
     @property
     def nats(self) -> float:
-        """Log likelihood gained, less what as many idle strengths would gain (Akaike 1974)."""
-        return float(self.log_p.sum()) - self.n_strengths
+        """Log likelihood gained, less what noise and as many idle strengths would (Akaike 1974)."""
+        return float(self.log_p.sum()) - self.noise_nats - self.n_strengths
 
-    def p(self, noise_nats: float = 0.0) -> float:
-        """Return the chance of such a gain where nothing is missing (Wilks 1938).
-
-        Parameters
-        ----------
-        noise_nats
-            What noise of positions alone makes it gain.
-        """
-        ratio = 2 * max(float(self.log_p.sum()) - noise_nats, 0.0)
+    @property
+    def p(self) -> float:
+        """Chance of such a gain where nothing is missing (Wilks 1938)."""
+        ratio = 2 * max(float(self.log_p.sum()) - self.noise_nats, 0.0)
         return float(min(1.0, self.n_tried * chdtrc(self.n_strengths, ratio)))
 
 

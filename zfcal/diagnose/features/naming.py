@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from zfcal.diagnose.features.gains import Gain
 
@@ -51,13 +51,11 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
         Asked of those alone that stand out; None for positions that are exact.
     """
     n_tried = sum(gain.n_tried for gain in _once(gains))
-    clear = [gain for gain in gains if gain.p() * n_tried < LEVEL]
+    clear = [gain for gain in gains if gain.p * n_tried < LEVEL]
     if noise is not None and clear:
-        clear = [
-            gain
-            for gain, nats in zip(clear, noise(clear), strict=True)
-            if gain.p(nats) * n_tried < LEVEL
-        ]
+        known = zip(clear, noise(clear), strict=True)
+        clear = [replace(gain, noise_nats=nats) for gain, nats in known]
+        clear = [gain for gain in clear if gain.p * n_tried < LEVEL]
     best = best_by_name(clear)
     if not best:
         return None
@@ -66,7 +64,7 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
-    return Told(gain=first, p=min(1.0, first.p() * n_tried), ties=ties, lead=lead)
+    return Told(gain=first, p=min(1.0, first.p * n_tried), ties=ties, lead=lead)
 
 
 def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
