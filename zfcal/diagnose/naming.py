@@ -35,7 +35,7 @@ HEAT_TURNS = 8000
 
 _BLOCK_S = 10.0
 
-_SURE = 2.0
+SURE = 2.0
 """Standard errors by which one suspect must beat another."""
 
 _RICHER = 2
@@ -270,7 +270,7 @@ def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]
     order = sorted(refits, key=lambda each: -each.worth)
     best, ties = order[0], []
     for other in order[1:]:
-        if best.over(other) > _SURE:
+        if best.over(other) > SURE:
             continue
         # It gains as much. If it falls beside the best one, which stands beside it, then
         # it is a shadow; if both fall they say the same, and if both stand neither does all.

@@ -22,18 +22,15 @@ from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
 from zfcal.diagnose.features.gains import Gain, gains_of
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import LEVEL, Told, tell
+from zfcal.diagnose.features.naming import Told, tell
 from zfcal.diagnose.heldout import heading_gains
-from zfcal.diagnose.naming import Choice, Refit, by_sample, refit
+from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import Best, Step
+from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.model.effects import find_effect
-
-_SURE = 2.0
-"""Standard errors by which a name must gain more than another one."""
 
 _BY_ITSELF = 4.0
 """Standard errors by which features of a name must lead those of all others where no form of ours
@@ -144,7 +141,7 @@ def _stays(there: Refit, told: Told, law: Law) -> bool:
     by = by_sample(law.scene, law.turns.at, told.gain.log_p) - there.gain
     error = float(by.std()) * float(np.sqrt(len(by)))
     ahead = float(told.gain.nats - there.nats)
-    return ahead < -_SURE * error if there.is_generic else ahead < _SURE * error
+    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
 
 
 def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:

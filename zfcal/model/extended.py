@@ -61,7 +61,9 @@ holds at a maximum alone."""
 LOG_GAMMA_SPAN = 7.0
 """An attraction below e^-7 of the largest one is not told from zero."""
 
-_LAPSE = (1e-6, 0.2)
+LAPSE = (1e-6, 0.2)
+"""Least and largest share of headings drawn from anywhere."""
+
 _FIRST_LAPSE = 0.005
 _DIFFERENCE = 1e-4
 """Of a parameter's range, and at most so much in its unit: places may be 100 m away."""
@@ -320,8 +322,8 @@ def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, f
 def limits_of(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floats]:
     """Return within which a zone's parameters are looked for; a gamma that is told has no top."""
     least = np.where(turns.reachable, -LOG_GAMMA_SPAN, 0.0)
-    low = np.concatenate([bounds.low, least, [_LAPSE[0]]])
-    high = np.concatenate([bounds.high, np.full(x.size - 4, np.inf), [_LAPSE[1]]])
+    low = np.concatenate([bounds.low, least, [LAPSE[0]]])
+    high = np.concatenate([bounds.high, np.full(x.size - 4, np.inf), [LAPSE[1]]])
     high[3:-1][~turns.reachable] = 0.0
     return low, high
 

@@ -24,6 +24,9 @@ from zfcal.arrays import Floats
 AWAY_M = 9.0
 """In place of the distance to one who is not there."""
 
+_LEAST = -0.98
+"""The lowest strength of what a mixture has already: two hundredths of it are left."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Seen:
@@ -227,6 +230,19 @@ def only(weights: Floats) -> Floats:
 def attended(weights: Weights) -> Weights:
     """Return weights of what is seen of the others, with a factor."""
     return lambda seen: seen.attention[..., None] * weights(seen)
+
+
+def factor_on_attention(weights: Weights, label: str = "attention") -> Component:
+    """Return a factor on what fish attend to of the others: 1 + strength times weight, never none.
+
+    Parameters
+    ----------
+    weights
+        Shape (step, other, weight).
+    label
+        Of the feature.
+    """
+    return Component(label=label, toward="toward", weights=attended(weights), low=_LEAST)
 
 
 def evenly(seen: Seen) -> Floats:

@@ -8,7 +8,8 @@ import pytest
 
 from zfcal.diagnose.features.gains import Fits, Gain, gains_of, kind_of
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import LEVEL, best_by_name, tell
+from zfcal.diagnose.features.naming import best_by_name, tell
+from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned

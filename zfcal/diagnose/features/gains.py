@@ -17,12 +17,12 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.law import Columns, Law
 from zfcal.model.effects import Effect
+from zfcal.model.extended import LAPSE
 from zfcal.model.features import Component, Feature, Leaving, OneOf, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.rooms import find_rooms
 
 _UNIFORM = 1 / (2 * math.pi)
-_LAPSE = (1e-6, 0.2)
 _LEAST = 1e-9
 """Share of the base's density at the heading taken below which a mixture cannot be pushed."""
 
@@ -102,7 +102,7 @@ class Fits:
 
     @cached_property
     def _lapse(self) -> float:
-        return float(np.clip(self.law.lapse.mean(), *_LAPSE))
+        return float(np.clip(self.law.lapse.mean(), *LAPSE))
 
     @cached_property
     def _null(self) -> tuple[Floats, Floats]:
@@ -136,11 +136,10 @@ class Fits:
         The score of a component has no variance where the density is next to nothing, so it is
         asked for by what a few strengths of it gain, the lapse as it is.
         """
-        if isinstance(feature, Tilt):
-            vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
-            score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
-        else:
+        if isinstance(feature, Component):
             return self._promise_of(self.law.component(feature, first=True))
+        vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
+        score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
         squares = float((score * score).sum())
         return float(score.sum()) ** 2 / squares if squares > 0 else 0.0
 
@@ -317,7 +316,7 @@ def _climb(
         x0,
         jac=True,
         method="L-BFGS-B",
-        bounds=[*bounds, (float(logit(_LAPSE[0])), float(logit(_LAPSE[1])))],
+        bounds=[*bounds, (float(logit(LAPSE[0])), float(logit(LAPSE[1])))],
         options={"maxiter": 400, "maxfun": 600, "ftol": 1e-10, "gtol": 1e-3, "maxcor": 25},
     )
     return np.asarray(found.x)

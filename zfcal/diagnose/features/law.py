@@ -191,14 +191,11 @@ class Law:
 
     def mean(self, parts: list[Columns]) -> Columns:
         """Return the average of columns over the draws."""
-        at, over = zip(*parts, strict=True)
-        weights = self._weights
-        return (
-            sum((w[:, None] * each for w, each in zip(weights[1:], at[1:], strict=True)),
-                weights[0][:, None] * at[0]),
-            sum((w[:, None] * each for w, each in zip(weights[1:], over[1:], strict=True)),
-                weights[0][:, None] * over[0]),
-        )  # fmt: skip
+        at, over = (
+            np.sum([w[:, None] * each for w, each in zip(self._weights, some, strict=True)], axis=0)
+            for some in zip(*parts, strict=True)
+        )
+        return at, over
 
     def bells(self, toward: Floats, kappa: Floats | float) -> Columns:
         """Return von Mises laws about directions, shape (step, source)."""

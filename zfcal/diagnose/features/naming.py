@@ -7,12 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from zfcal.diagnose.features.gains import Gain
-
-LEVEL = 0.02
-"""Chance of a false alarm over all features of all names."""
-
-_SURE = 2.0
-"""Standard errors by which one name must lead another to be told from it (Vuong 1989)."""
+from zfcal.diagnose.naming import SURE
+from zfcal.diagnose.selection import LEVEL
 
 Noise = Callable[[Sequence[Gain]], Sequence[float]]
 """Of some gains: what noise of positions alone makes each of these features gain, in nats."""
@@ -60,7 +56,7 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
     if not best:
         return None
     first, *others = best
-    ties = tuple(gain for gain in others if _lead(first, gain) <= _SURE)
+    ties = tuple(gain for gain in others if _lead(first, gain) <= SURE)
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.features import Component, Feature, Seen, attended, hats
+from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import TIME
@@ -33,9 +33,7 @@ def _attention(seen: Seen) -> Floats:
     )
 
 
-_FEATURES: tuple[Feature, ...] = (
-    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
-)
+_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
 
 
 EFFECT = Effect(

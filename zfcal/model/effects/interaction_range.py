@@ -5,7 +5,7 @@ from __future__ import annotations
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
-from zfcal.model.features import Component, Feature, Seen, attended, hats
+from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 
@@ -16,16 +16,14 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     return 1.0 - parameters[0] * beyond(apart(state, n, i, j), parameters[1])
 
 
-_KNOTS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7)
+_KNOTS_M = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7)
 
 
 def _attention(seen: Seen) -> Floats:
-    return hats(seen.distance_m, _KNOTS)[..., 1:]
+    return hats(seen.distance_m, _KNOTS_M)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (
-    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
-)
+_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
 
 
 EFFECT = Effect(

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour, quickness
-from zfcal.model.features import Component, Feature, Seen, attended, hats
+from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import SPEED
@@ -21,11 +21,11 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
 
 
-_KNOTS = (0.0, 0.05, 0.1, 0.15, 0.2)
+_KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
 
 
 def _attention(seen: Seen) -> Floats:
-    return hats(seen.speed_m_s, _KNOTS)[..., 1:]
+    return hats(seen.speed_m_s, _KNOTS_M_S)[..., 1:]
 
 
 def _fastest(seen: Seen) -> Floats:
@@ -36,13 +36,8 @@ def _fastest(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
-    Component(
-        label="the fastest in view",
-        toward="toward",
-        weights=attended(_fastest),
-        low=-0.98,
-    ),
+    factor_on_attention(_attention),
+    factor_on_attention(_fastest, label="the fastest in view"),
 )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,19 +12,21 @@ from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import Component, Feature, Seen
 
 
-def _late(then: Callable[[Seen], Floats], attention: Callable[[Seen], Floats]) -> Component:
+def _late(
+    label: str, toward: Callable[[Seen], Floats], attention: Callable[[Seen], Floats]
+) -> Component:
     """Return a share of the attention that goes to where others were, not to where they are."""
     return Component(
-        label="share",
-        toward=lambda seen: np.concatenate([then(seen), seen.toward], axis=1),
+        label=label,
+        toward=lambda seen: np.concatenate([toward(seen), seen.toward], axis=1),
         weights=lambda seen: np.concatenate([attention(seen), -seen.attention], axis=1)[..., None],
         high=1.0,
     )
 
 
 _FEATURES: tuple[Feature, ...] = (
-    replace(_late(lambda s: s.soon_toward, lambda s: s.attention), label="a tenth of a step"),
-    replace(_late(lambda s: s.late_toward, lambda s: s.late_attention), label="a step"),
+    _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention),
+    _late("a step", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
 )
 
 

@@ -7,7 +7,7 @@ import math
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import Component, Feature, Seen, attended, hats
+from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import HX, HY, X, Y
@@ -24,16 +24,14 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     return 1.0 - parameters[0] / (1.0 + math.exp((parameters[1] - off) / _SOFT_RAD))
 
 
-_KNOTS = (0.0, 1.2, 1.8, 2.1, 2.25, 2.3561)
+_KNOTS_RAD = (0.0, 1.2, 1.8, 2.1, 2.25, 2.3561)
 
 
 def _attention(seen: Seen) -> Floats:
-    return hats(seen.off_axis_rad, _KNOTS)[..., 1:]
+    return hats(seen.off_axis_rad, _KNOTS_RAD)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (
-    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
-)
+_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
 
 
 EFFECT = Effect(

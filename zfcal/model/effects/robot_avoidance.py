@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import apart, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, attended, hats
+from zfcal.model.features import Component, Feature, Seen, Tilt, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR, SIGHT
 from zfcal.model.kernels.state import KIND, X, Y
@@ -63,7 +63,7 @@ def _leaning(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="attention", toward="toward", weights=attended(_attention), low=-0.98),
+    factor_on_attention(_attention),
     Component(label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0),
     Component(label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0),
     Tilt(label="leaning", vectors=_leaning),
