@@ -1,0 +1,236 @@
+"""What fish saw, and where the base law drew them, of one draw of where all were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.arrays import Floats
+from zfcal.model.extended import without_effects
+from zfcal.model.features import AWAY_M, Seen
+from zfcal.model.kernels.perception import REPULSION_M
+from zfcal.model.kernels.scene import fill_states, perceive
+from zfcal.model.kernels.state import (
+    HX,
+    HY,
+    KIND,
+    LEFT_S,
+    PAST_HX,
+    PAST_HY,
+    ROOM,
+    SPEED,
+    TAU_X,
+    TAU_Y,
+    TIME,
+    ZONE,
+    X,
+    Y,
+)
+from zfcal.model.packing import pack
+from zfcal.model.scene import Scene, Turns
+from zfcal.model.tank import tank_of
+from zfcal.model.views import View, view_of
+from zfcal.parameters import Parameters
+from zfcal.units import HEADING_MIN_STEP_M
+
+_SOON = 0.1
+"""Share of a step of a response that is a little late."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Steps:
+    """The steps of a law, and what of it bears on what is seen.
+
+    Parameters
+    ----------
+    scene
+        The recording.
+    parameters
+        The model, effects and all.
+    rows : ndarray of int, shape (step,)
+        Places of the steps among the scene's turns.
+    turns
+        These turns.
+    follows : ndarray of bool, shape (step,)
+        Whether a step begins in a zone that follows walls.
+    alpha : ndarray, shape (step,)
+        Weight of neighbours per steradian.
+    """
+
+    scene: Scene
+    parameters: Parameters
+    rows: NDArray[np.intp]
+    turns: Turns
+    follows: NDArray[np.bool_]
+    alpha: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Draw:
+    """What the fish saw, and the directions of the base law, of one draw of where all were.
+
+    Parameters
+    ----------
+    seen
+        By the fish of the steps; directions turned so that the heading taken is the measured one.
+    base : ndarray, shape (step, mode, 2)
+        Directions of the base law; the second is zero where there is one.
+    toward, angle_sr : ndarray, shape (step, source, 2) and (step, source)
+        As the model draws to others, effects on sight and all.
+    """
+
+    seen: Seen
+    base: Floats
+    toward: Floats
+    angle_sr: Floats
+
+
+def turn(vectors: Floats, angle: Floats | float) -> Floats:
+    """Return vectors turned to the left, shape (step, source, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def drawn(steps: Steps, noise_m: float, random: np.random.Generator) -> Draw:
+    """Return a draw of where all may have been, by the error of the measured positions.
+
+    Parameters
+    ----------
+    steps
+        Of the law.
+    noise_m
+        Standard deviation of a position per coordinate.
+    random
+        Source of the errors.
+    """
+    states, arena = steps.scene.states, steps.scene.arena
+    xy = np.moveaxis(states[:, [X, Y]], 1, 2).copy()
+    xy[~(states[:, ZONE] > 0)] = np.nan
+    moved, _ = arena.settle(xy + noise_m * random.standard_normal(xy.shape))
+    clock = (float(states[0, TIME, 0]), steps.scene.dt_s)
+    made = fill_states(
+        np.ascontiguousarray(moved), states[0, KIND].copy(), clock, HEADING_MIN_STEP_M / 4,
+        tank_of(arena),
+    )  # fmt: skip
+    # Speeds decide who is fast, and are not what is in doubt.
+    made[:, [SPEED, ROOM, LEFT_S]] = states[:, [SPEED, ROOM, LEFT_S]]
+    return draw_of(steps, made, view_of(replace(steps.scene, states=made), steps.parameters))
+
+
+def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
+    """Return a draw from the states of everybody.
+
+    Parameters
+    ----------
+    steps
+        Of the law.
+    states : ndarray, shape (sample, state, agent)
+        The scene's own, or others in which all are somewhere near.
+    view
+        What the model makes of these.
+    """
+    turns, scene = steps.turns, steps.scene
+    at, who = turns.at, turns.who
+    own, after = states[at, :, who], states[at + 1, :, who]
+    back = np.zeros(len(at))
+    heading = turns.heading
+    if states is not scene.states:
+        step = after[:, [X, Y]] - own[:, [X, Y]]
+        back = np.arctan2(turns.taken[:, 1], turns.taken[:, 0]) - np.arctan2(step[:, 1], step[:, 0])
+        heading = own[:, [HX, HY]]
+    columns = states.shape[2]
+    each = [[j for j in range(columns) if j != i] for i in range(columns)]
+    others = np.array(each, dtype=np.int64)[who]
+    seen = _seen(steps, states, (own, heading), others)
+    along = own[:, [TAU_X, TAU_Y]] if states is not scene.states else turns.along_wall
+    modes = np.stack([along, -along], axis=1)
+    single = np.stack([heading, np.zeros_like(heading)], axis=1)
+    base = np.where(steps.follows[:, None, None], modes, single)
+    if len(view.spin):
+        spin = view.spin[steps.rows]
+        base = turn(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
+    toward, angle = view.toward[steps.rows], view.angle_sr[steps.rows]
+    if not back.any():
+        return Draw(seen=seen, base=base, toward=toward, angle_sr=angle)
+    return Draw(
+        seen=_turned_back(seen, back),
+        base=turn(base, back[:, None]),
+        toward=turn(toward, back[:, None]),
+        angle_sr=angle,
+    )
+
+
+def _seen(
+    steps: Steps, states: Floats, who: tuple[Floats, Floats], others: NDArray[np.int64]
+) -> Seen:
+    """Return what was seen, from the own states and headings and the others' columns."""
+    turns, (own, heading) = steps.turns, who
+    at, before = turns.at, np.maximum(turns.at - 1, 0)
+    rows = np.arange(len(at))[:, None]
+
+    def theirs(row: int, when: NDArray[np.int64]) -> Floats:
+        return np.asarray(states[when[:, None], row, others])
+
+    def to(when_x: Floats, when_y: Floats) -> tuple[Floats, Floats]:
+        away = np.stack([when_x - own[:, X, None], when_y - own[:, Y, None]], axis=-1)
+        distance = np.linalg.norm(away, axis=-1)
+        return away / np.maximum(distance, 1e-9)[..., None], distance
+
+    here = theirs(ZONE, at) > 0
+    now_x, now_y = theirs(X, at), theirs(Y, at)
+    then_x, then_y = theirs(X, before), theirs(Y, before)
+    bearing, distance = to(now_x, now_y)
+    soon, soon_m = to((1 - _SOON) * now_x + _SOON * then_x, (1 - _SOON) * now_y + _SOON * then_y)
+    packed = pack([without_effects(steps.parameters)], steps.scene.arena)
+    cos_fov = float(packed.cos_fov[0])
+    toward, angle = perceive(states, at, turns.who, 0, cos_fov)
+    late, late_angle = perceive(states, at, turns.who, 1, cos_fov)
+    cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
+    dot = (heading[:, None] * bearing).sum(axis=-1)
+    past = own[:, [PAST_HX, PAST_HY]]
+    turned = np.arctan2(
+        past[:, 0] * heading[:, 1] - past[:, 1] * heading[:, 0], (past * heading).sum(axis=1)
+    )
+    present = here[..., None]
+    return Seen(
+        attention=steps.alpha[:, None] * angle[rows, others],
+        toward=toward[rows, others],
+        late_toward=late[rows, others],
+        soon_toward=np.where(soon_m < REPULSION_M, -1.0, 1.0)[..., None] * soon * present,
+        late_attention=steps.alpha[:, None] * late_angle[rows, others],
+        bearing=bearing * present,
+        distance_m=np.where(here, distance, AWAY_M),
+        off_axis_rad=np.abs(np.arctan2(cross, dot)),
+        speed_m_s=theirs(SPEED, at),
+        heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
+        here=here,
+        is_robot=(theirs(KIND, at) > 0) & here,
+        own_heading=heading,
+        along_wall=own[:, [TAU_X, TAU_Y]],
+        xy_m=own[:, [X, Y]],
+        follows_walls=steps.follows,
+        zone=turns.zone,
+        track=turns.track,
+        own_speed_m_s=turns.speed_m_s,
+        last_turn_rad=turned,
+        time=at / max(1, len(steps.scene.k) - 1),
+        left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
+    )
+
+
+def _turned_back(seen: Seen, back: Floats) -> Seen:
+    """Return what was seen with all directions turned, so that headings are the measured ones."""
+    b = back[:, None]
+    return replace(
+        seen,
+        toward=turn(seen.toward, b),
+        late_toward=turn(seen.late_toward, b),
+        soon_toward=turn(seen.soon_toward, b),
+        bearing=turn(seen.bearing, b),
+        heading=turn(seen.heading, b),
+        own_heading=turn(seen.own_heading, back),
+        along_wall=turn(seen.along_wall, back),
+    )
