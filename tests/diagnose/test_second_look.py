@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose import diagnose as whole
+from zfcal.diagnose import second_look as looking
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import diagnose
 from zfcal.diagnose.features.gains import Gain
@@ -17,6 +18,7 @@ from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.second_look import _noise_nats, _stays, second_look
+from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 
 
@@ -58,7 +60,7 @@ def drawn(question, worlds):
 @pytest.mark.slow
 def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
     """A place, of which some headings are drawn, at where it is."""
-    found = second_look(drawn, drawn.screen, None)
+    found = second_look(drawn, ())
     best = found.step.choice.best
     assert best.name == "place-preference"
     assert best.values["drawn"] == 1.0
@@ -75,7 +77,7 @@ def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
 def test_nothing_is_named_where_nothing_is_missing(question):
     """Nor where the model has the effect already."""
     case = open_case(question())
-    assert second_look(case, case.screen, None) is None
+    assert second_look(case, ()) is None
 
 
 def gain(name, values):
@@ -154,12 +156,45 @@ def test_a_diagnosis_names_what_features_name(question, monkeypatch):
     assert effect.gain_nats_per_step > 0
 
 
-@pytest.mark.slow
-def test_features_are_not_asked_where_noise_is_not_known(question, monkeypatch):
+@pytest.fixture
+def asked(monkeypatch):
+    """Return what features are asked of, once they are; they then name nothing."""
+    calls = []
+    monkeypatch.setattr(looking, "_named", lambda *args: calls.append(args))
+    return calls
+
+
+def test_features_are_asked_of_the_model_as_it_is(question, asked):
+    """Where positions are known to be exact, and nothing was named."""
+    case = open_case(question())
+    assert second_look(case, ()) is None
+    assert asked == [(case, case.screen, None)]
+
+
+def test_features_are_not_asked_where_noise_is_not_known(question, asked):
     """What it makes of a law would be named."""
-    asked = []
-    monkeypatch.setattr(whole, "second_look", lambda *args: asked.append(args))
-    diagnose(question(noise_m=None, noise_source="unknown"), lambda *_: None)
+    assert second_look(open_case(question(noise_m=None, noise_source="unknown")), ()) is None
     assert asked == []
-    diagnose(question(), lambda *_: None)
-    assert len(asked) == 1
+
+
+def test_features_are_not_asked_beside_effects_that_the_model_came_with(question, fish, asked):
+    """On headings: of speeds they say nothing."""
+    for name, values, n in (("turning-bias", {"strength": 0.2}, 0), ("crowding", {}, 1)):
+        own = dict(zip(find_effect(name).names, find_effect(name).values(values), strict=True))
+        model = dataclasses.replace(fish, effects={name: own})
+        assert second_look(open_case(dataclasses.replace(question(), model=model)), ()) is None
+        assert len(asked) == n
+
+
+def test_the_first_effect_on_headings_is_held_against_features(question, asked):
+    """In the model before it: those on speed stay, and all after it goes."""
+
+    def step(name, screen):
+        effect = SimpleNamespace(effect=find_effect(name))
+        best = SimpleNamespace(candidate=effect, screen=screen)
+        return SimpleNamespace(choice=SimpleNamespace(best=best))
+
+    case = open_case(question())
+    kept = (step("crowding", "with crowding"), step("alignment", "x"), step("fatigue", "y"))
+    second_look(case, kept)
+    assert asked == [(case, "with crowding", kept[1])]

@@ -172,23 +172,11 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
 
 
 def _looked_again(case: Case, judged: _Judged) -> _Judged:
-    """Return what stands once features were asked what the law of headings lacks.
-
-    Not where the model came with effects on headings: what these leave over, where the fish have
-    another form of them, would be named. Nor where nobody knows by how much positions err: what
-    noise makes of a law would be named.
-    """
-    given = in_model(case.screen.fitted.parameters)
-    if case.question.noise_m is None or any(not candidate.effect.on_speed for candidate in given):
-        return judged
-    named = [step for step in judged.kept if not step.choice.best.candidate.effect.on_speed]
-    there = named[0] if named else None
-    # What features put in its place takes the place of what was added after it as well.
-    n = judged.kept.index(there) if there else len(judged.kept)
-    before = judged.kept[n - 1].choice.best.screen if n else case.screen
-    found = second_look(case, before, there)
+    """Return what stands once features were asked what the law of headings lacks."""
+    found = second_look(case, judged.kept)
     if found is None:
         return judged
+    n = found.n_before
     return dataclasses.replace(
         judged,
         kept=(*judged.kept[:n], found.step),

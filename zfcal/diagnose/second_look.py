@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, further_forms
+from zfcal.diagnose.candidates import Candidate, further_forms, in_model
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
 from zfcal.diagnose.features.gains import Gain, gains_of
@@ -50,25 +50,44 @@ class SecondLook:
         As one that was selected.
     confirmed
         What it gains on held-out steps.
+    n_before
+        So many of the effects named without features stay before it; it takes the place of those
+        that were added after them.
     """
 
     step: Step
     confirmed: Confirmed
+    n_before: int
 
 
-def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | None:
-    """Return the effect on headings that features name; None where chance may have made it up.
+def second_look(case: Case, kept: Sequence[Step]) -> SecondLook | None:
+    """Return the effect on headings that features name; None where nothing is to be changed.
+
+    Features are not asked where the model came with effects on headings: what these leave over,
+    where the fish have another form of them, would be named. Nor where nobody knows by how much
+    positions err: what noise makes of a law would be named.
 
     Parameters
     ----------
     case
         The question, its scene and what is asked for.
-    screen
-        The model, with what was named for speeds.
-    there
-        The first effect on headings that was named. One beyond the list is kept where it gains
-        more than features do, a listed one where it gains as much.
+    kept
+        What was named without features. Of effects on headings the first is held against them:
+        one beyond the list is kept where it gains more than features do, a listed one where it
+        gains as much.
     """
+    given = in_model(case.screen.fitted.parameters)
+    if case.question.noise_m is None or any(not each.effect.on_speed for each in given):
+        return None
+    on_headings = [not step.choice.best.candidate.effect.on_speed for step in kept]
+    n = on_headings.index(True) if any(on_headings) else len(kept)
+    screen = kept[n - 1].choice.best.screen if n else case.screen
+    found = _named(case, screen, kept[n] if n < len(kept) else None)
+    return None if found is None else SecondLook(step=found[0], confirmed=found[1], n_before=n)
+
+
+def _named(case: Case, screen: Screen, there: Step | None) -> tuple[Step, Confirmed] | None:
+    """Return what features name in a model, and what it gains on held-out steps."""
     law = _law(case, screen)
     listed = {each.name for each in case.listed} - set(screen.fitted.parameters.effects)
     effects = [find_effect(name) for name in sorted(listed)]
@@ -77,9 +96,8 @@ def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | 
     told = tell(gains, noise)
     if told is None or (there is not None and _stays(there.choice.best, told, law)):
         return None
-    best = _in_the_model(case, screen, told.gain.name)
+    found, score = _in_the_model(case, screen, told.gain.name)
     ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
-    found, score = best
     step = Step(
         choice=Choice(best=found, ties=ties, considered=(found, *ties)),
         best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
@@ -89,7 +107,7 @@ def second_look(case: Case, screen: Screen, there: Step | None) -> SecondLook | 
     is_borne_out = _gains(found) and _is_steady(confirmed, found.screen, screen)
     if not (is_borne_out or told.lead > _BY_ITSELF):
         return None
-    return SecondLook(step=step, confirmed=dataclasses.replace(confirmed, holds=True, steady=True))
+    return step, dataclasses.replace(confirmed, holds=True, steady=True)
 
 
 def _gains(form: Refit) -> bool:
