@@ -118,7 +118,8 @@ def _model(view: TrialView) -> Statement | None:
         return None
     known = ~np.isnan(course.value)
     mean, last, n = course.mean(), course.mark(course.last), int(known.sum())
-    above, elsewhere, within = _against_band(course, made_elsewhere(view))
+    above, elsewhere, within = _against_band(course, view.made_elsewhere)
+    overfits = _is_above(mean) and above >= elsewhere
     reaches = (
         f"It reaches {_percent(mean)} of its ceiling."
         if not _is_above(mean)
@@ -156,19 +157,7 @@ def _model(view: TrialView) -> Statement | None:
     return Statement(
         question="Does the model behave like these fish?",
         answer=" ".join(parts),
-        figure=(
-            _percent(mean),
-            _OF_PERFECT + (_TOO_MUCH if _is_above(mean) and above >= elsewhere else ""),
-        ),
-    )
-
-
-def made_elsewhere(view: TrialView) -> frozenset[int]:
-    """Return the ends of windows whose published model was made of another one, in seconds."""
-    return frozenset(
-        each.second
-        for each in view.rounds
-        if each.published is not None and each.published.of_s not in {None, each.second}
+        figure=(_percent(mean), _OF_PERFECT + (_TOO_MUCH if overfits else "")),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from zfcal.report.contents import Statement
 from zfcal.report.numbers import mean_and_sd
-from zfcal.report.summary import OVERFITTING, Gap, gaps, made_elsewhere
+from zfcal.report.summary import OVERFITTING, Gap, gaps
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
 
@@ -37,9 +37,9 @@ def _models(views: Sequence[TrialView]) -> Statement | None:
         return None
     value, ceiling = (_spread([getattr(m, part) for m in known]) for part in ("value", "ceiling"))
     # Models that were made of other windows than they are scored on cannot overfit these.
-    own = [2 * len(made_elsewhere(view)) <= len(view.rounds) for view in views]
+    own = [2 * len(view.made_elsewhere) <= len(view.rounds) for view in views]
     share = [mark.against_ceiling for mark in known if not math.isnan(mark.against_ceiling)]
-    above = sum(mark.value > mark.high and own for mark, own in zip(marks, own, strict=True))
+    above = sum(mark.value > mark.high and may for mark, may in zip(marks, own, strict=True))
     more = f" In {above} of them it lies above the range of a perfect model: {OVERFITTING}."
     return Statement(
         question="Do the models behave like the fish?",

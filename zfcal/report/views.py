@@ -294,6 +294,15 @@ class TrialView:
         return self.label or self.root.resolve().name
 
     @property
+    def made_elsewhere(self) -> frozenset[int]:
+        """Ends of windows whose published model was made of another window, in seconds."""
+        return frozenset(
+            each.second
+            for each in self.rounds
+            if each.published is not None and each.published.of_s not in {None, each.second}
+        )
+
+    @property
     def calibrated(self) -> Round | None:
         """The last round's model; None before the first."""
         return next((r for r in reversed(self.rounds) if r.second > 0), None)
