@@ -10,6 +10,9 @@ from pathlib import Path
 from zfcal.errors import InputError
 
 CONFIG_NAME = "trial.toml"
+FIRST_MODEL = "models/000000.toml"
+"""The starting model of a trial that is made, relative to it."""
+
 LOOP_NAME = "closed-loop.json"
 """What a virtual closed loop was asked for, written when it has ended."""
 
@@ -53,7 +56,7 @@ class Trial:
     fps: float
     dt_s: float
     seed: int
-    model: str = "models/000000.toml"
+    model: str = FIRST_MODEL
     source: str = ""
     cameras: dict[str, dict[str, str]] | None = None
 

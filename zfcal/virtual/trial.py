@@ -34,7 +34,7 @@ from zfcal.stages.track.minutes import Minutes, Origins, Revise
 from zfcal.stages.track.outcome import measured
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FramePoses
-from zfcal.trial import LOOP_NAME, Trial
+from zfcal.trial import FIRST_MODEL, LOOP_NAME
 from zfcal.units import default_dt_s
 from zfcal.virtual.fish import FishOptions, VirtualFish
 
@@ -173,25 +173,30 @@ def prepare(folder: Path, options: LoopOptions, tell: Tell, task: Task) -> Exper
     start = _asked(options.model, arena, dt_s)
     start = start or starting_model(arena, dt_s=dt_s, robot=options.robot)
     tank, rig = (
-        _begun(create_trial(folder / name, new, tell, task=task, model=model), model, task)
+        _begun(folder / name, new, model, tell, task)
         for name, model in (("tank", species), ("trial", start))
     )
     return Experiment(tank=tank, trial=rig, options=options)
 
 
-def _begun(trial: Trial, model: Parameters, task: Task) -> OpenTrial:
-    """Return a trial that begins with a model, which one that was there before may not."""
+def _begun(root: Path, new: NewTrial, model: Parameters, tell: Tell, task: Task) -> OpenTrial:
+    """Return a trial that begins with a model; one that begins with another is not touched.
+
+    Raises
+    ------
+    InputError
+        There is one with another model, and it is not forced.
+    """
+    if task.force:
+        (root / FIRST_MODEL).unlink(missing_ok=True)
+    trial = create_trial(root, new, tell, task=task, model=model)
     opened, path = open_trial(trial.root), trial.root / trial.model
-    if read_model_for(path, opened.arena, dt_s=trial.dt_s) == model:
-        return opened
-    if not task.force:
+    if read_model_for(path, opened.arena, dt_s=trial.dt_s) != model:
         raise InputError(
             f"{path}: is another model than this experiment begins with.",
             hint="Take another directory, or begin anew with --force; the robot begins with "
             "--model, the fish with --fish-model.",
         )
-    options: dict[str, JSON] = {"arena": trial.arena, "dt_s": trial.dt_s}
-    write_model(path, model, Lineage(schema=MODEL, command="init", options=options))
     return opened
 
 
@@ -216,7 +221,7 @@ def _lineage_of_loop(schema: str, options: LoopOptions) -> Lineage:
         "champion": options.settings.champion,
     }
     models = {"fish_model": options.fish_model, "model": options.model}
-    said |= {name: hash_of(path) for name, path in models.items() if path is not None}
+    said |= {name: None if path is None else hash_of(path) for name, path in models.items()}
     return Lineage(schema=schema, command="demo", options=said, seed=options.seed)
 
 
@@ -236,13 +241,12 @@ def is_whole(experiment: Experiment) -> bool:
     said = read_json(place).get("options")
     asked = _lineage_of_loop(LOOP_NAME, experiment.options).options
     there: dict[str, JSON] = said if isinstance(said, dict) else {}
-    named = {*asked, *({"fish_model", "model"} & there.keys())}
-    other = [name for name in sorted(named) if there.get(name) != asked.get(name)]
+    other = [name for name, value in asked.items() if there.get(name) != value]
     if other:
         name = other[0]
         raise InputError(
             f"{experiment.root}: holds another experiment: its {name} is "
-            f"{there.get(name, 'not known')}, asked for {asked.get(name, 'none')}.",
+            f"{there.get(name, 'not known')}, asked for {asked[name]}.",
             hint="Take another directory, or begin anew with --force.",
         )
     return True
