@@ -14,7 +14,7 @@ import pytest
 import zfcal
 from zfcal import frames
 from zfcal.artifacts.models import read_model
-from zfcal.artifacts.tables import read_tracks
+from zfcal.artifacts.tables import RULES, read_table, read_tracks
 from zfcal_cli.main import run
 
 ROOT = Path(__file__).parents[1]
@@ -95,8 +95,12 @@ def test_parameters_are_those_of_the_model_files(trial):
 
 def test_forward_scores_are_those_of_the_newest_record(trial):
     """One row for each rule and judged window."""
+    newest = max((trial.root / "scores").glob("*-rules.parquet"))
+    table = read_table(newest, RULES)
     found = trial.rules()
-    assert list(found.columns) == ["window_end_s", "rule", "made_at_s", "S", "low", "high", "n"]
+    assert list(found.columns) == table.column_names
+    assert found["rule"].tolist() == table.column("rule").to_pylist()
+    assert len(found) > 0
 
 
 def test_findings_have_a_row_for_each_parameter(trial, tmp_path):
@@ -107,13 +111,28 @@ def test_findings_have_a_row_for_each_parameter(trial, tmp_path):
         "ties": ["a", "b"],
     }  # fmt: skip
     path = tmp_path / "findings.json"
-    path.write_text(json.dumps({"verdict": "tie", "effects": [effect]}))
+    path.write_text(json.dumps(findings_of([effect])))
     found = trial.findings(path)
     assert found.attrs["verdict"] == "tie"
     assert list(found["parameter"]) == ["weight", "kappa"]
     assert (found.loc[0, "low"], found.loc[0, "high"]) == (1.0, 3.0)
     assert found.loc[1, "low"] is None or np.isnan(found.loc[1, "low"])
     assert found.loc[0, "ties"] == "a,b"
+
+
+def findings_of(effects):
+    """Return findings with these effects, as a diagnosis writes them."""
+    known = {"schema": "zfcal.findings/1", "where": [], "screened": []}
+    return {**known, "verdict": "tie", "effects": effects}
+
+
+@pytest.mark.parametrize("text", ["{", json.dumps({"effects": 3}), json.dumps(findings_of([{}]))])
+def test_findings_that_are_none_are_named(trial, tmp_path, text):
+    """No JSON, or not what a diagnosis writes."""
+    path = tmp_path / "findings.json"
+    path.write_text(text)
+    with pytest.raises(zfcal.ZfcalError, match=r"findings\.json"):
+        trial.findings(path)
 
 
 @pytest.mark.parametrize("what", ["stats", "scores", "rules", "findings"])

@@ -5,14 +5,19 @@
 
 from importlib import import_module
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from zfcal.errors import ZfcalError
+    from zfcal.frames import TrialTables
+    from zfcal.frames import TrialTables as open  # noqa: A004, N813
 
 __version__ = version("zfcal")
 
 _LAZY = {
     "TrialTables": ("zfcal.frames", "TrialTables"),
     "ZfcalError": ("zfcal.errors", "ZfcalError"),
-    "open": ("zfcal.frames", "open_trial"),
+    "open": ("zfcal.frames", "TrialTables"),
 }
 """What it exports, by the module that has it: pandas is loaded when it is asked for."""
 

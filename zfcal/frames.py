@@ -18,7 +18,7 @@ from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.artifacts.tables import RULES, SCORES, STATS, TRACKS, read_table
-from zfcal.artifacts.validation import read_json
+from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters
 from zfcal.trial import Trial
@@ -59,6 +59,14 @@ class TrialTables:
     ------
     InputError
         There is no trial, or its settings are wrong.
+
+    Examples
+    --------
+    >>> import zfcal
+    >>> trial = zfcal.open("data-samples/two-rooms")
+    >>> tracks = trial.tracks()
+    >>> sorted(tracks["kind"].unique())
+    ['fish', 'robot']
     """
 
     def __init__(self, trial: str | Path) -> None:
@@ -195,14 +203,15 @@ class TrialTables:
         Raises
         ------
         InputError
-            There are no findings.
+            There are no findings, or they are not what a diagnosis writes.
         DamagedError
-            They are damaged.
+            They are no JSON.
         """
         place = self.root / "diagnosis" / "findings.json" if path is None else Path(path)
         if not place.is_file():
             raise _nothing(place, f"First: zfcal diagnose {self.root}")
         found = read_json(place)
+        check(found, "findings", place)
         rows = [row for rank, each in enumerate(found["effects"], 1) for row in _found(rank, each)]
         table = pd.DataFrame(rows, columns=list(_FINDINGS))
         table.attrs["verdict"] = found["verdict"]
@@ -214,30 +223,6 @@ class TrialTables:
     def __repr__(self) -> str:
         """Return how it was made."""
         return f"zfcal.open({str(self.root)!r})"
-
-
-def open_trial(trial: str | Path) -> TrialTables:
-    """Return a trial whose artifacts can be read as pandas tables.
-
-    Parameters
-    ----------
-    trial
-        Its directory, or anything in it.
-
-    Raises
-    ------
-    InputError
-        There is no trial, or its settings are wrong.
-
-    Examples
-    --------
-    >>> import zfcal
-    >>> trial = zfcal.open("data-samples/two-rooms")
-    >>> tracks = trial.tracks()
-    >>> sorted(tracks["kind"].unique())
-    ['fish', 'robot']
-    """
-    return TrialTables(trial)
 
 
 def _nothing(place: Path, hint: str) -> InputError:
