@@ -25,7 +25,7 @@ from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from benchmarks.shared.measuring import ROOT, load, machine, table
+from benchmarks.shared.measuring import ROOT, load, machine, table, zfcal
 from benchmarks.shared.regressions import Ratio, conclude, parser
 
 BUILD = ROOT / "build" / "closed-loop"
@@ -59,10 +59,10 @@ def run_one(kind: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
     words = ["--closed-loop", "--duration", f"{minutes}min", *WORDS[kind], "--seed", str(seed)]
     words += [] if options.video else ["--no-video"]
     try:
-        _zfcal("demo", str(folder), *words)
+        zfcal("demo", str(folder), *words)
     except subprocess.CalledProcessError:
         # Of hours of work one trial may meet with a computer that is too busy.
-        _zfcal("demo", str(folder), *words)
+        zfcal("demo", str(folder), *words)
     took_s = time.monotonic() - begin
     report = folder / "trial" / "report" / "integration.json"
     robot = json.loads(report.read_text(encoding="utf-8"))["trials"][0]["robot_vs_fish"]
@@ -83,11 +83,6 @@ def _folder(kind: str, seed: int, options: argparse.Namespace) -> Path:
     name = f"{kind.replace(' ', '-')}-{seed}-{options.minutes}min"
     folder: Path = options.build / (f"{name}-video" if options.video else name)
     return folder
-
-
-def _zfcal(*words: str) -> None:
-    line = [sys.executable, "-m", "zfcal_cli.main", *words, "-q"]
-    subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
 
 
 def _rounds(trial: Path) -> list[dict[str, Any]]:

@@ -24,7 +24,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from benchmarks.shared.measuring import load, machine, table
+from benchmarks.shared.measuring import load, machine, table, zfcal
 from benchmarks.shared.regressions import Ratio, conclude, parser
 from zfcal.arrays import Floats
 from zfcal.artifacts.lineage import Lineage
@@ -64,12 +64,6 @@ def measure(seconds: int, busy: int) -> dict[str, Any]:
             document = json.loads(driver.communicate()[0])
     found: dict[str, Any] = document["results"][0]["latency"]
     return found
-
-
-def zfcal(*words: object) -> None:
-    """Run a command to its end."""
-    given = [*ZFCAL, *map(str, words), "-q"]
-    subprocess.run(given, check=True, stdout=subprocess.DEVNULL)
 
 
 @contextlib.contextmanager

@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
@@ -29,7 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from benchmarks.drive.bench_closed_loop import interval
-from benchmarks.shared.measuring import ROOT, load, machine, table
+from benchmarks.shared.measuring import ROOT, load, machine, table, zfcal
 from benchmarks.shared.regressions import Ratio, conclude, parser
 from zfcal.arena import Arena
 from zfcal.artifacts.arenas import load_arena
@@ -67,7 +66,7 @@ def run_one(kind: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
     named = _diagnosed(trial)
     starts = {"base": _estimated(folder / "base.toml", trial, None, options)}
     if named:
-        _zfcal("extend", str(trial), *_effort(options))
+        zfcal("extend", str(trial), *_effort(options))
         model = trial / "models" / "extended.toml"
         starts["extended"] = _estimated(folder / "extended.toml", trial, model, options)
     robots = {
@@ -102,7 +101,7 @@ def _arena() -> Arena:
 
 def _loop(folder: Path, seed: int, minutes: int, fish: Path, *words: str) -> Path:
     about = ["--closed-loop", "--no-video", "--force", "--duration", f"{minutes}min"]
-    _zfcal("demo", str(folder), *about, "--seed", str(seed), "--fish-model", str(fish), *words)
+    zfcal("demo", str(folder), *about, "--seed", str(seed), "--fish-model", str(fish), *words)
     return folder / "trial"
 
 
@@ -112,7 +111,7 @@ def _effort(options: argparse.Namespace) -> list[str]:
 
 def _diagnosed(trial: Path) -> list[str]:
     """Return the effects that the diagnosis names."""
-    _zfcal("diagnose", str(trial), "--quick", "--workers", "1")
+    zfcal("diagnose", str(trial), "--quick", "--workers", "1")
     path = trial / "diagnosis" / "findings.json"
     found = json.loads(path.read_text(encoding="utf-8"))
     return [effect["name"] for effect in found["effects"]] if found["verdict"] == "named" else []
@@ -122,7 +121,7 @@ def _estimated(path: Path, trial: Path, model: Path | None, options: argparse.Na
     """Write the likelihood estimate of the whole recording."""
     words = ["--window", f"0:{60 * options.recorded}", "--publish", "likelihood", "-o", str(path)]
     words += [] if model is None else ["--model", str(model)]
-    _zfcal("calibrate", str(trial), *words, *_effort(options))
+    zfcal("calibrate", str(trial), *words, *_effort(options))
     return path
 
 
@@ -136,11 +135,6 @@ def _driven(
     robot = json.loads(text)["trials"][0]["robot_vs_fish"]
     features: dict[str, Any] = robot["features"] if robot else {}
     return features
-
-
-def _zfcal(*words: str) -> None:
-    line = [sys.executable, "-m", "zfcal_cli.main", *words, "-q"]
-    subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
 
 
 def measure_all(options: argparse.Namespace) -> dict[str, Any]:

@@ -6,6 +6,8 @@ import json
 import os
 import platform
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -30,6 +32,12 @@ def machine() -> str:
 def load() -> float:
     """Return the load of the last minute: above the number of cores others were at work."""
     return os.getloadavg()[0]
+
+
+def zfcal(*words: object) -> None:
+    """Run a command of zfcal to its end, silently."""
+    line = [sys.executable, "-m", "zfcal_cli.main", *map(str, words), "-q"]
+    subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
 
 
 def median_s(run: Callable[[], object], *, repeats: int, clock: Callable[[], float]) -> float:
