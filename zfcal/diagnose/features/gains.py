@@ -1,4 +1,8 @@
-"""What each name's features gain in likelihood, base parameters and lapse refitted."""
+"""What each name's features gain in likelihood.
+
+Components and turns are fitted with the base's parameters and the lapse (Wilks 1938, Annals of
+Mathematical Statistics 9: 60-62); tilts and leaving with the lapse, against the base as it is.
+"""
 
 from __future__ import annotations
 
