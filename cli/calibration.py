@@ -9,8 +9,10 @@ import click
 
 from .durations import seconds
 from .options import EXISTING, Decorator, adds, population_option, seed_option, workers_option
+from .published import as_asked, published_options
 
 if TYPE_CHECKING:
+    from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.trial_context import Task
 
@@ -73,6 +75,7 @@ def round_options(*, generations: str = "", budget: str = "") -> Decorator:
             hidden=True,
             help="The older name of --publish.",
         ),
+        published_options,
         click.option(
             "--baselines", is_flag=True, help="Score random search and the last model too."
         ),
@@ -89,11 +92,12 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
     click.UsageError
         Two options contradict each other, or one could not take effect.
     """
-    from zfcal.behaviour.features.registry import SCORED, further
+    from zfcal.behaviour.features.registry import SCORED
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.trial_context import Task
 
+    options = as_asked(options)
     _check_together(options)
     settings = Settings(
         population=options["population"],
@@ -103,9 +107,13 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         optimiser=options["optimiser"],
         champion=CHAMPIONS[published_by(options) or "score"],
         features=options.get("features", SCORED),
+        n_confirmed=options["confirm"],
+        diversity=options["diversity"],
+        renews=options["renewal"],
+        sampler=options["sampler"],
     )
-    if options.get("cluster") is not None and further(settings.features):
-        raise click.UsageError("--cluster counts D, W, O, T and V: no other --features.")
+    if options.get("cluster") is not None:
+        _check_on_cluster(settings)
     chosen = CalibrateOptions(
         settings=settings,
         budget_s=options["budget_s"],
@@ -121,6 +129,13 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         return Task(dry_run=options["dry_run"], force=options["force"], ends_s=ends_s)
 
     return chosen, task
+
+
+def _check_on_cluster(settings: Settings) -> None:
+    from zfcal.behaviour.features.registry import further
+
+    if further(settings.features):
+        raise click.UsageError("--cluster counts D, W, O, T and V: no other --features.")
 
 
 CHAMPIONS: dict[str, Any] = {

@@ -27,7 +27,8 @@ _DEFAULT_BUDGET_S = 50.0
 _OWN = {"trial", "stages", "poll", "once", "until_idle_s"}
 _OF_CALIBRATE = {
     "generations", "budget_s", "population", "runs", "steps", "optimiser", "seed_likelihood",
-    "champion", "publish", "model", "baselines", "seed", "workers",
+    "champion", "publish", "model", "baselines", "seed", "workers", "as_published", "confirm",
+    "diversity", "renewal", "sampler",
 }  # fmt: skip
 _NOT_HERE = {"window": None, "held_out": None, "output": None, "cluster": None}
 

@@ -11,6 +11,7 @@ import pytest
 from zfcal.calibrate import evolve, evolve_deap
 from zfcal.calibrate.evolve import (
     begin,
+    diversities_in,
     mean_distances,
     overall_score,
     score_and_diversities,
@@ -58,6 +59,23 @@ def test_mean_distances_by_hand():
     """A 3-4-5 triangle: (3 + 4) / 2, (3 + 5) / 2, (4 + 5) / 2."""
     triangle = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]])
     np.testing.assert_allclose(mean_distances(triangle), [3.5, 4.0, 4.5])
+
+
+def test_distances_to_the_first_points_alone_by_hand():
+    """Of the same triangle: 3 / 1 and 3 / 1 for the first two, (4 + 5) / 2 for the third."""
+    triangle = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]])
+    np.testing.assert_allclose(mean_distances(triangle, 2), [3.0, 3.0, 4.5])
+    np.testing.assert_array_equal(mean_distances(triangle, 5), mean_distances(triangle))
+
+
+def test_diversity_in_the_population_does_not_depend_on_other_offspring():
+    """What an offspring is worth stays the same, whoever is born beside it."""
+    genes = np.random.default_rng(2).random((12, 18))
+    features = plain_features(genes)
+    objectives = diversities_in(8)
+    together, alone = objectives(genes, features), objectives(genes[:9], features[:9])
+    np.testing.assert_array_equal(together[:9], alone)
+    assert not np.allclose(score_and_diversities(genes, features)[:9], together[:9])
 
 
 def test_mean_distances_do_not_change_by_a_shift_or_a_null_column():

@@ -38,6 +38,16 @@ def test_the_champion_is_the_best_of_ten_by_a_second_look(task, small):
     assert scores.max() == result.scores.S
 
 
+def test_without_a_second_look_the_searchs_own_score_chooses(task, small):
+    """The best of the last population; its score is reported as the search saw it."""
+    seen = []
+    plain = calibrate_window(task, replace(small, n_confirmed=0), watch=seen.append)
+    last = seen[-1].state
+    assert (plain.genes == last.genes[np.argmax(last.scores)]).all()
+    assert plain.scores.S == plain.optimiser_score == last.scores.max()
+    assert plain.ceiling.overall[0] > 0
+
+
 def test_nobody_good_is_lost_on_the_way(task, small, truth):
     """The ten are of all that was evaluated, not of the last population alone."""
     last = search(task, small)
@@ -198,6 +208,16 @@ def test_a_world_that_has_changed_renews_a_fifth(task, small, result, window, tr
     assert second.world_changed
     assert second.n_renewed == 4
     assert second.evaluations == 104
+
+
+def test_nobody_is_renewed_where_that_is_not_wanted(task, small, result, window, truth):
+    """The very round that renews a fifth otherwise."""
+    other = replace(
+        task, control=window(genes=1.0 - truth), previous=replace(result.as_previous, noise=0.01)
+    )
+    assert calibrate_window(other, small).n_renewed > 0
+    kept = calibrate_window(other, replace(small, renews=False))
+    assert (kept.n_renewed, kept.world_changed) == (0, False)
 
 
 def test_a_round_on_the_truths_window_comes_near_its_ceiling(task, small, truth):

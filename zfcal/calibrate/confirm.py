@@ -13,6 +13,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.behaviour.scores import Scores
 from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.evolve import State
 from zfcal.calibrate.objective import Objective, score_each
 from zfcal.errors import InputError
 
@@ -61,6 +62,29 @@ def confirm(objective: Objective, genes: Floats) -> Confirmed:
         long_run=found.as_statistics(best, objective.control.zone_names),
         candidates=candidates,
     )
+
+
+def unconfirmed(evaluation: Objective, long: Objective, population: State) -> Confirmed:
+    """Return the best of a population by the search's own score, as the published rig did.
+
+    That score is luck in part: the best of hundreds on one set of random numbers.
+
+    Parameters
+    ----------
+    evaluation
+        What the search maximised; simulated once more, it gives the same score with its parts.
+    long
+        With long runs, which say what the genome does. They choose nothing.
+    population
+        The last one of a search.
+    """
+    best = int(np.argmax(np.nan_to_num(population.scores, nan=-1.0)))
+    genes = population.genes[best]
+    (scores,) = score_each(
+        evaluation.simulate(genes[None, :]), evaluation.control, evaluation.features
+    )
+    run = long.simulate(genes[None, :]).as_statistics(0, long.control.zone_names)
+    return Confirmed(genes=genes, scores=scores, long_run=run, candidates=population.scores)
 
 
 def best_distinct(genes: Floats, scores: Floats, n: int) -> Floats:

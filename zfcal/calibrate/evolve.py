@@ -96,23 +96,27 @@ def overall_score(features: Floats) -> Floats:
     return geometric_mean(np.ascontiguousarray(features))[0]
 
 
-def mean_distances(points: Floats) -> Floats:
+def mean_distances(points: Floats, n_among: int | None = None) -> Floats:
     """Return the mean Euclidean distance of each point to the others.
 
     Parameters
     ----------
     points : ndarray, shape (point, dimension)
         NaN counts as 0, so that a null feature sets nobody apart.
+    n_among
+        Distances are those to the first so many points; None for all.
 
     Returns
     -------
     ndarray, shape (point,)
-        0 for a single point.
+        0 where there is no other point.
     """
-    squares = np.zeros((len(points), len(points)))
+    n = len(points) if n_among is None else min(n_among, len(points))
+    squares = np.zeros((len(points), n))
     for column in np.nan_to_num(points, nan=0.0).T:
-        squares += np.square(column[:, None] - column[None, :])
-    return np.asarray(np.sqrt(squares).sum(axis=1) / max(len(points) - 1, 1))
+        squares += np.square(column[:, None] - column[None, :n])
+    others = n - (np.arange(len(points)) < n)
+    return np.asarray(np.sqrt(squares).sum(axis=1) / np.maximum(others, 1))
 
 
 def score_and_diversities(genes: Floats, features: Floats) -> Floats:
@@ -132,6 +136,27 @@ def score_and_diversities(genes: Floats, features: Floats) -> Floats:
     """
     scores = np.nan_to_num(overall_score(features), nan=0.0)
     return np.column_stack([scores, mean_distances(genes), mean_distances(features)])
+
+
+def diversities_in(population: int) -> Objectives:
+    """Return the same three objectives with distances to the current population alone.
+
+    By the words of Cazenille et al. both diversities are mean distances to the individuals of
+    the current population. Where parents and offspring are ranked together, those are the
+    parents, which come first.
+
+    Parameters
+    ----------
+    population
+        Individuals of the current population.
+    """
+
+    def objectives(genes: Floats, features: Floats) -> Floats:
+        scores = np.nan_to_num(overall_score(features), nan=0.0)
+        apart = (mean_distances(genes, population), mean_distances(features, population))
+        return np.column_stack([scores, *apart])
+
+    return objectives
 
 
 def begin(

@@ -9,20 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats, Ints, Seeds
-from zfcal.behaviour.statistics import Statistics
+from zfcal.behaviour.statistics import ATTRIBUTES, Statistics
 from zfcal.calibrate.recorded import Runs, count_recorded
 from zfcal.errors import InputError
 from zfcal.model.effects import find_effect
 from zfcal.model.effects.genome import check_genomes, from_genome
+from zfcal.model.kernels.state import GRID
 from zfcal.model.simulate import Counts, pack_genes, simulate_counts
 from zfcal.parameters import Parameters, n_genes
+
+Sampler = Literal["exact", "grid"]
 
 _MIN_SPEEDS = 10
 """A zone with fewer measured speeds borrows those of all zones."""
@@ -131,6 +134,9 @@ class Group:
         Agents, all driven by the candidate.
     n_workers
         Threads; the numbers do not depend on it.
+    sampler
+        How headings are drawn: ``exact``, or ``grid``, the paper's numeric way. One law, other
+        random numbers.
     """
 
     arena: Arena
@@ -138,6 +144,7 @@ class Group:
     n_fish: int
     n_robots: int
     n_workers: int = 1
+    sampler: Sampler = "exact"
 
     @property
     def n_agents(self) -> int:
@@ -168,6 +175,11 @@ class Group:
             With leading axes (genome, run).
         """
         check_genomes(genes, self.template)
+        if self.sampler == "grid":
+            tables = self.record(
+                genes, tuple(ATTRIBUTES), n_counted=n_counted, n_steps=n_steps, seeds=seeds
+            )
+            return Counts(**{ATTRIBUTES[name]: table for name, table in tables.items()})
         return simulate_counts(
             pack_genes(genes, self.template, self.arena),
             self.arena,
@@ -208,6 +220,7 @@ class Group:
                 n_steps=n_steps,
                 seeds=seeds,
                 n_threads=self.n_workers,
+                grid=GRID if self.sampler == "grid" else 0,
             ),
         )
 

@@ -1,4 +1,6 @@
-"""Statistics that the compiled simulation does not count, from the tracks of simulated groups.
+"""What the compiled simulation does not count, from the tracks of simulated groups.
+
+Statistics beside D, W, O, T and V, and everything where headings are drawn by the numeric sampler.
 
 The same seeds give the same paths as where D, W, O, T and V are counted on the fly. To
 record the paths and to look at them with the registry costs more than the simulation.
@@ -38,6 +40,8 @@ class Runs(NamedTuple):
         The same for all models.
     n_threads
         The numbers do not depend on it.
+    grid
+        Angles of the numeric sampler's grid; 0 for the exact sampler.
     """
 
     n_agents: int
@@ -46,6 +50,7 @@ class Runs(NamedTuple):
     n_steps: int
     seeds: Seeds
     n_threads: int = 1
+    grid: int = 0
 
 
 def count_recorded(
@@ -74,10 +79,10 @@ def count_recorded(
     def one(job: int) -> dict[str, Ints]:
         packed, seed = models[job // len(seeds)], np.uint64(seeds[job % len(seeds)])
         burn_in = burn_in_steps(packed.dt_s)
-        if is_crowd(runs.n_agents, packed):
+        if not runs.grid and is_crowd(runs.n_agents, packed):
             record = record_crowd_run(seed, people, burn_in, runs.n_steps, packed, tank)
         else:
-            record = record_run(seed, people, burn_in, runs.n_steps, packed, tank, 0)
+            record = record_run(seed, people, burn_in, runs.n_steps, packed, tank, runs.grid)
         located = locate(_as_samples(record[:, : runs.n_counted, :2], packed.dt_s), arena)
         inside = located.take(located.zone > 0)
         everybody = np.ones(len(inside), dtype=np.bool_)

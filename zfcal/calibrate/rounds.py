@@ -16,7 +16,7 @@ from zfcal.arrays import Floats
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.scores import Scores, compare
 from zfcal.calibrate.ceiling import measure_ceiling, window_noise
-from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm
+from zfcal.calibrate.confirm import Confirmed, best_distinct, confirm, unconfirmed
 from zfcal.calibrate.evolve import State
 from zfcal.calibrate.group import Purpose, express, scale_gamma
 from zfcal.calibrate.history import Generation
@@ -153,7 +153,8 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
     """Choose the champion of a search and say what its score is worth.
 
     The ten best of all that the search evaluated are simulated anew; the best by
-    that simulation is the champion, and its S there is the one that is reported.
+    that simulation is the champion, and its S there is the one that is reported. Where none
+    is to be simulated anew, the search's own S chooses and is reported.
     Where the likely one is asked for, the estimate is the champion if the window scores
     against it as its own windows do, less one standard deviation of them: the best of many
     scores fits what happened by chance. Of windows of the true model one in six scores less.
@@ -189,6 +190,11 @@ def conclude(task: Task, settings: Settings, progress: Progress) -> RoundResult:
 
 
 def _best(task: Task, settings: Settings, progress: Progress) -> tuple[Confirmed, Ceiling]:
+    if settings.n_confirmed == 0:
+        confirmed = unconfirmed(
+            task.evaluation(settings), task.confirmation(settings), progress.state
+        )
+        return confirmed, _ceiling_of(task, settings, confirmed)
     return judge(
         task, settings, best_distinct(progress.genes, progress.scores, settings.n_confirmed)
     )

@@ -5,6 +5,7 @@ It knows when to stop but not what comes of it: the champion is chosen in ``roun
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,14 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.behaviour.features.registry import SCORED
 from zfcal.calibrate import evolve, evolve_deap
-from zfcal.calibrate.evolve import Evaluate, State, overall_score
+from zfcal.calibrate.evolve import (
+    Evaluate,
+    Objectives,
+    State,
+    diversities_in,
+    overall_score,
+    score_and_diversities,
+)
 from zfcal.calibrate.group import Purpose, SeedSource, Simulator
 from zfcal.calibrate.history import Generation, describe
 from zfcal.calibrate.objective import simulate_named
@@ -101,7 +109,7 @@ def search(
         that one would have.
     """
     limit = _limit(settings, deadline)
-    optimiser = _OPTIMISERS[settings.optimiser]
+    step = functools.partial(_OPTIMISERS[settings.optimiser].step, objectives=_objectives(settings))
     evaluate = task.evaluation(settings)
     per_generation = task.work(
         n_genomes=settings.population, n_runs=settings.runs, n_steps=settings.steps
@@ -121,7 +129,7 @@ def search(
         progress = resume
     while progress.state.generation < limit and pace.allows(per_generation + closing):
         pace.start()
-        progress = advance(progress, evaluate, optimiser.step)
+        progress = advance(progress, evaluate, step)
         pace.finish(per_generation)
         _show(watch, progress)
     return progress
@@ -131,6 +139,12 @@ def _limit(settings: Settings, deadline: Deadline | None) -> float:
     if settings.generations is not None:
         return settings.generations
     return DEFAULT_GENERATIONS if deadline is None else math.inf
+
+
+def _objectives(settings: Settings) -> Objectives:
+    if settings.diversity == "population":
+        return diversities_in(settings.population)
+    return score_and_diversities
 
 
 def _show(watch: Watch | None, progress: Progress) -> None:
@@ -180,15 +194,17 @@ def begin(task: Task, settings: Settings, evaluate: Evaluate) -> Progress:
 
     Nothing that was scored on an old window survives: everybody is simulated again.
     Where the probe finds that the world has changed, the worst fifth by crowded rank
-    is replaced by random genomes.
+    is replaced by random genomes, unless the settings say that it stays.
     """
-    start = _OPTIMISERS[settings.optimiser].begin
+    start = functools.partial(
+        _OPTIMISERS[settings.optimiser].begin, objectives=_objectives(settings)
+    )
     seed = task.seeds.sequence(Purpose.EVOLUTION)
     genes = first_population(task, settings)
     features = evaluate(genes)
     parts: tuple[tuple[Floats, Floats], ...] = ((genes, features),)
     state = start(genes, features, seed=seed)
-    changed = task.previous is not None and world_changed(
+    changed = (settings.renews and task.previous is not None) and world_changed(
         task.previous,
         overall_score(features),
         rng=task.seeds.generator(Purpose.PROBE),

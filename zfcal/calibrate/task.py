@@ -15,6 +15,7 @@ from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.evolve import GROUP
 from zfcal.calibrate.group import (
     Purpose,
+    Sampler,
     SeedSource,
     Simulator,
     with_measured_speeds,
@@ -27,6 +28,11 @@ from zfcal.parameters import n_genes
 from zfcal.units import BURN_IN_S, WINDOW_S
 
 DEFAULT_GENERATIONS = 15
+_WORDS = {
+    "optimiser": ("zfcal", "deap"),
+    "diversity": ("merged", "population"),
+    "sampler": ("exact", "grid"),
+}
 _RULES_SIMULATED = 5
 """Models that a round simulates for the rules: four made, and the one that is handed on."""
 
@@ -50,7 +56,16 @@ class Settings:
         maximum-likelihood estimate, unless its score says that it misses something. ``forward``:
         by the rule that has been better so far, see `zfcal.calibrate.rules`.
     n_confirmed
-        So many of the best are simulated anew, and the best of these is champion.
+        So many of the best are simulated anew, and the best of these is champion. With 0 the
+        search's own score chooses, and is the one that is reported.
+    diversity
+        Whether diversities are distances within parents and offspring (``merged``), or to the
+        individuals of the current population.
+    renews
+        Whether a part of the last population is replaced by random genomes where the world has
+        changed.
+    sampler
+        How simulations draw headings: ``exact``, or ``grid``, the paper's numeric way.
     long_runs, long_s
         Simulations of a confirmation and their length in seconds.
     n_windows, window_s
@@ -73,6 +88,9 @@ class Settings:
     n_windows: int = 200
     window_s: float = WINDOW_S
     features: tuple[str, ...] = SCORED
+    diversity: Literal["merged", "population"] = "merged"
+    renews: bool = True
+    sampler: Sampler = "exact"
 
     def __post_init__(self) -> None:
         if self.population < GROUP or self.population % GROUP:
@@ -82,7 +100,9 @@ class Settings:
             )
         if self.generations is not None and self.generations < 0:
             raise InputError(f"generations must not be negative, got {self.generations}.")
-        for name in ("runs", "steps", "n_confirmed", "long_runs", "n_windows"):
+        if self.n_confirmed < 0:
+            raise InputError(f"n_confirmed must not be negative, got {self.n_confirmed}.")
+        for name in ("runs", "steps", "long_runs", "n_windows"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1, got {getattr(self, name)}.")
         for name in ("long_s", "window_s"):
@@ -93,8 +113,10 @@ class Settings:
         if not self.features:
             raise InputError("features must name at least one statistic, got none.")
         object.__setattr__(self, "features", ordered(self.features))
-        if self.optimiser not in {"zfcal", "deap"}:
-            raise InputError(f"optimiser must be 'zfcal' or 'deap', got {self.optimiser!r}.")
+        for name, words in _WORDS.items():
+            if getattr(self, name) not in words:
+                expected = " or ".join(repr(word) for word in words)
+                raise InputError(f"{name} must be {expected}, got {getattr(self, name)!r}.")
         if self.champion == "forward" and not self.is_scored:
             raise InputError(
                 f"Rules are judged by S, not by {','.join(self.features)}.",
@@ -118,9 +140,8 @@ class Settings:
             del options["features"]
         else:
             options["features"] = list(self.features)
-        if self.champion == "score":
-            del options["champion"]
-        return options
+        usual = {"champion": "score", "diversity": "merged", "renews": True, "sampler": "exact"}
+        return {key: value for key, value in options.items() if usual.get(key, ...) != value}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -240,6 +240,7 @@ def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
         n_fish=trial.n_fish,
         n_robots=trial.n_robots,
         n_workers=options.workers,
+        sampler=options.settings.sampler,
     )
     return group if options.cluster is None else ClusterGroup(group=group, cluster=options.cluster)
 
