@@ -39,6 +39,7 @@ COMMANDS = {
     "diagnose": "diagnose",
     "extend": "extend",
     "report": "report",
+    "reproduce": "reproduce",
     "inspect": "inspect",
     "check": "check",
 }

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 EXIT_DAMAGED = 3
 EXIT_INTERRUPTED = 130
-_SEVERITY = (0, EXIT_DAMAGED, 75, 1)
+EXIT_DISAGREES = 4
+_SEVERITY = (0, EXIT_DISAGREES, EXIT_DAMAGED, 75, 1)
 """Exit codes from the best to the worst: of several trials the worst one counts."""
 
 

@@ -35,6 +35,8 @@ from zfcal.errors import InputError
 EXTENT_M = 0.89
 """The extent that the scripts take for the arena of two rooms, in metres."""
 
+_TWO_ROOMS = "two-rooms"
+
 _DISTANCE_SHARE = 0.25
 """D is binned from 0 to this share of the extent."""
 
@@ -62,6 +64,14 @@ class LegacyStatistics:
     n_distance: Ints
     occupation: Ints
     transition: Ints
+
+
+def extent_of(arena: Arena) -> float:
+    """Return the extent that the scripts take for an arena, in metres.
+
+    Of the two rooms without the rim of the tank; the arena's own elsewhere.
+    """
+    return EXTENT_M if arena.name == _TWO_ROOMS else arena.extent_m
 
 
 def measure_legacy(

@@ -83,7 +83,7 @@ def count_recorded(
             record = record_crowd_run(seed, people, burn_in, runs.n_steps, packed, tank)
         else:
             record = record_run(seed, people, burn_in, runs.n_steps, packed, tank, runs.grid)
-        located = locate(_as_samples(record[:, : runs.n_counted, :2], packed.dt_s), arena)
+        located = locate(as_samples(record[:, : runs.n_counted, :2], packed.dt_s), arena)
         inside = located.take(located.zone > 0)
         everybody = np.ones(len(inside), dtype=np.bool_)
         points = Points(located=inside, role=everybody, within=True)
@@ -96,7 +96,8 @@ def count_recorded(
     return {name: table.reshape(lead + table.shape[1:]) for name, table in tables.items()}
 
 
-def _as_samples(xy_m: Floats, dt_s: float) -> Samples:
+def as_samples(xy_m: Floats, dt_s: float) -> Samples:
+    """Return simulated positions, shape (step, agent, 2), as samples of fish."""
     n_steps, n_agents = xy_m.shape[:2]
     return Samples(
         dt_s=dt_s,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from zfcal.behaviour.ceilings import Ceiling, summarise
-from zfcal.behaviour.legacy import EXTENT_M, compare_legacy, measure_legacy
+from zfcal.behaviour.legacy import compare_legacy, extent_of, measure_legacy
 from zfcal.behaviour.located import Located
 from zfcal.behaviour.pooling import Pool
 from zfcal.behaviour.rows import SCORES_COLUMNS, Table, join_tables, scores_to_rows
@@ -16,8 +16,6 @@ from zfcal.stages.analyse.control import ControlGroup
 from zfcal.tracks import FISH
 
 SCORINGS = ("paper", "legacy")
-
-_TWO_ROOMS = "two-rooms"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,8 +100,7 @@ def _robot(pool: Pool) -> tuple[Scores, Ceiling | None]:
 
 def _legacy(window: Window) -> Scores:
     arena = window.points.arena
-    # The scripts' extent is that of the two rooms without the rim of the tank.
-    extent_m = EXTENT_M if arena.name == _TWO_ROOMS else arena.extent_m
+    extent_m = extent_of(arena)
     social = measure_legacy(window.points, arena, extent_m=extent_m)
     if window.control is not None:
         return compare_legacy(social, window.control.legacy(extent_m))

@@ -124,6 +124,15 @@ class CalibrateOptions:
         return Deadline(ends_s=time.monotonic() + self.budget_s, clock=time.monotonic)
 
 
+AS_PUBLISHED = CalibrateOptions(
+    settings=Settings(
+        optimiser="deap", champion="score", n_confirmed=0, diversity="population", renews=False
+    ),
+    seed_likelihood=False,
+)
+"""The paper's own way (docs/as-published.md), save for what no option brings back."""
+
+
 class Checkpoint:
     """The file that keeps a search: whole at first, then a block for each generation.
 

@@ -1,0 +1,1 @@
+"""From archived trials to a verdict on published scores."""
