@@ -39,6 +39,7 @@ COMMANDS = {
     "diagnose": "diagnose",
     "extend": "extend",
     "report": "report",
+    "export": "export",
     "inspect": "inspect",
     "check": "check",
 }
