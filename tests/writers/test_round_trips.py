@@ -84,6 +84,25 @@ def test_the_csv_of_deeplabcut_holds_what_its_hdf5_does(tracks, image, tmp_path)
     same(one, other, [field.name for field in fields(Tracks)])
 
 
+def test_the_arrays_of_trex_by_hand(tracks, image, tmp_path):
+    """From an individual's first frame to its last, in cm; missing and infinite where it is lost."""
+    files = export_files("trex", dense(tracks, FPS), image.axes("cm"), image)
+    names = ["tracks_fish2.npz", "tracks_fish5.npz", "tracks_fish7.npz", "tracks_robot11.npz"]
+    assert list(files) == names
+    for name in names[1:3]:
+        files[name](tmp_path / name)
+    five, seven = (np.load(tmp_path / name) for name in names[1:3])
+    lost = [*range(10, 15), 20]
+    assert five["frame"].tolist() == list(range(2, 40))
+    assert five["frame"][five["missing"] == 1].tolist() == lost
+    assert five["frame"][np.isinf(five["X#wcentroid"])].tolist() == lost
+    assert seven["frame"][0] == 9
+    row = np.flatnonzero((tracks.agent == 7) & (tracks.frame == 9))[0]
+    assert seven["Y#wcentroid"][0] == pytest.approx(102 - 100 * tracks.y_m[row])
+    assert (seven["id"].item(), seven["frame_rate"].item()) == (7, FPS)
+    assert seven["cm_per_pixel"].item() == pytest.approx(0.08)
+
+
 @pytest.mark.parametrize("name", ["trex", "movement"])
 def test_uneven_times_come_back_where_there_is_a_place_for_them(name, tracks, round_trip):
     """A camera's own times, up to 5 ms late."""

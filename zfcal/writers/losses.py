@@ -51,7 +51,7 @@ def _lost_confidence(confidence: Floats, *, has_certainty: bool) -> Iterator[str
     elif n_below and not has_certainty:
         yield (
             f"confidence is lost: {n_below} of {len(confidence)} positions are less than certain, "
-            f"{n_guesses} of them guesses; all are certain when they are read back."
+            f"{n_guesses} of them guesses; whoever opens the file takes all for certain."
         )
 
 
@@ -59,3 +59,8 @@ def lost_noise(noise_m: float | None) -> Iterator[str]:
     """Yield that the position noise is lost, where it is known; no format has it."""
     if noise_m is not None:
         yield f"the position noise is lost, {noise_m / M_PER_MM:.4g} mm: --noise-mm gives it back."
+
+
+def noise_option(noise_m: float | None) -> tuple[str, ...]:
+    """Return the option of the import that gives the position noise back."""
+    return () if noise_m is None else ("--noise-mm", f"{noise_m / M_PER_MM:.15g}")

@@ -1,13 +1,18 @@
 """A trial in the forms of other programs: made once, made again, and what is said."""
 
+import io
 import json
 
 import numpy as np
 import pandas as pd
 import pytest
+from mcap.writer import Writer
 
+from zfcal.artifacts import drive_files
 from zfcal.artifacts.checking import check_trial
+from zfcal.artifacts.inspecting import describe
 from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.pose_messages import register
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.errors import InputError, StorageError
 from zfcal.readers import ImportOptions, import_foreign
@@ -133,6 +138,46 @@ def test_tables_have_all_that_the_trial_has(trial, heard):
     assert read_lineage(folder / "parquet" / "stats.parquet").inputs.keys() >= {
         "stats/000120.parquet"
     }
+
+
+def test_a_table_for_others_is_no_damaged_one(trial):
+    """`zfcal inspect` says what it is, and finds nothing wrong with it."""
+    export(trial, asked("parquet"), say_nothing)
+    found = describe(trial / "export" / "parquet" / "parameters.parquet")
+    assert (found["schema"], found["problem"]) == ("zfcal.export/1", None)
+    assert found["lineage"]["command"] == "export"
+
+
+def test_a_layout_shows_what_lies_in_the_trial(trial, heard):
+    """Poses, and the images of one camera; a drive is added when there is one."""
+    for folder in ("poses", "frames/overhead"):
+        (trial / folder).mkdir(parents=True)
+        (trial / folder / "000000.mcap").touch()
+    export(trial, asked(layout=True), heard.append)
+    path = trial / "export" / "layout" / "foxglove-layout.json"
+    panels = json.loads(path.read_text())["configById"]
+    assert sorted(panels) == ["3D!tank", "Image!overhead", "RawMessages!agents"]
+    assert panels["Image!overhead"]["imageMode"]["imageTopic"] == "/overhead/image"
+    assert panels["RawMessages!agents"]["topicPath"] in pose_topics()
+    assert set(panels["3D!tank"]["topics"]) <= set(pose_topics())
+    (trial / "drive").mkdir()
+    (trial / "drive" / "000000.mcap").touch()
+    heard.clear()
+    export(trial, asked(layout=True), heard.append)
+    assert names_of(heard, Made) == ["foxglove-layout.json", "export-layout.json"]
+    panels = json.loads(path.read_text())["configById"]
+    topics = {path["value"].partition(".")[0] for path in panels["Plot!wheels"]["paths"]}
+    assert topics <= set(drive_topics())
+
+
+def pose_topics():
+    """Return the topics that files of poses have."""
+    return register(Writer(io.BytesIO()))
+
+
+def drive_topics():
+    """Return the topics of the messages in files of a drive."""
+    return drive_files._TOPICS.values()
 
 
 def test_the_csv_of_tracks_is_read_back_to_the_bit(trial):

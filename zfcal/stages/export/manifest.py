@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,12 +13,13 @@ from typing import TypeAlias
 from zfcal.artifacts.atomic import discard, storage_error, write_text_whole, write_whole
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.reading.contents import sha256_of
+from zfcal.artifacts.tables import EXPORT
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.events import LeftOut, Note, Tell
 from zfcal.stages.stage import Draft, Item, Output, Run
 
-SCHEMA = "zfcal.export/1"
+SCHEMA = EXPORT
 
 WriteWhole: TypeAlias = Callable[[Path, Lineage], None]
 """Writes a file to a path whose ending says nothing about the format."""
@@ -187,5 +189,4 @@ def _tell(place: Place, tell: Tell) -> None:
         tell(Note(text=f"{place.name}: {line}"))
     if found.read_back:
         command = ["zfcal", "import", str(place.where / place.reads), "TRIAL", *found.read_back]
-        # A program that looks for it finds it in the sidecar.
-        tell(Note(text=f"{place.name}: read back with: {' '.join(command)}"))
+        tell(Note(text=f"{place.name}: read back with: {shlex.join(command)}"))

@@ -16,7 +16,7 @@ from zfcal.stages.export.options import ExportOptions
 from zfcal.stages.segments import readable
 from zfcal.stages.stage import Item, Run
 from zfcal.stages.track_window import noise_of
-from zfcal.writers.losses import lost_noise
+from zfcal.writers.losses import lost_noise, noise_option
 from zfcal.writers.tables import write_csv, write_parquet
 
 _TRACKS = "tracks"
@@ -58,10 +58,11 @@ def _content(root: Path, name: str, wanted: list[str]) -> Content:
     found = {table: _read(tables, table, left_out) for table in wanted}
     frames = {table: frame for table, frame in found.items() if frame is not None}
     noise_m = _noise(tables) if _TRACKS in frames else None
+    noise = noise_option(noise_m)
     return Content(
         files={f"{table}.{name}": _writer(name, frame) for table, frame in frames.items()},
         lost=tuple(lost_noise(noise_m)),
-        read_back=("--format", "csv") if name == "csv" and _TRACKS in frames else (),
+        read_back=("--format", "csv", *noise) if name == "csv" and _TRACKS in frames else (),
         left_out=tuple(left_out),
     )
 

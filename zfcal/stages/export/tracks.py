@@ -14,9 +14,8 @@ from zfcal.stages.segments import readable, segment_files
 from zfcal.stages.stage import Item, Run
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import OpenTrial, open_trial
-from zfcal.units import M_PER_MM
 from zfcal.writers import FORMATS, Axes, Image, dense, export_files, image_of_import, lost
-from zfcal.writers.losses import lost_noise
+from zfcal.writers.losses import lost_noise, noise_option
 from zfcal.writers.source import Write
 
 
@@ -66,7 +65,7 @@ def _content(opened: OpenTrial, name: str, axes: Axes, image: Image) -> Content:
     stretch = read_stretch(opened, None, hear)
     found = dense(stretch.tracks, opened.trial.fps)
     files = export_files(name, found, axes, image)
-    noise = () if stretch.noise_m is None else ("--noise-mm", f"{stretch.noise_m / M_PER_MM:.15g}")
+    noise = noise_option(stretch.noise_m)
     return Content(
         files={file: partial(_alone, write) for file, write in files.items()},
         lost=(*lost(found, FORMATS[name].holds), *lost_noise(stretch.noise_m)),
