@@ -85,7 +85,7 @@ def test_the_csv_of_deeplabcut_holds_what_its_hdf5_does(tracks, image, tmp_path)
 
 
 def test_the_arrays_of_trex_by_hand(tracks, image, tmp_path):
-    """From an individual's first frame to its last, in cm; missing and infinite where it is lost."""
+    """From an individual's first frame to its last, in cm; missing and infinite where lost."""
     files = export_files("trex", dense(tracks, FPS), image.axes("cm"), image)
     names = ["tracks_fish2.npz", "tracks_fish5.npz", "tracks_fish7.npz", "tracks_robot11.npz"]
     assert list(files) == names
