@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-slow test-plain lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
+.PHONY: help install demo check test test-slow test-plain test-programs lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -58,6 +58,18 @@ format: install  ## Format the code
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
 	@touch $@
 
+# Programs that zfcal exports for, in an environment of their own: they bring much, and other versions.
+.venv-programs/.installed: requirements-programs.lock
+	$(PYTHON) -m venv --clear .venv-programs
+	.venv-programs/bin/python -m pip install --quiet --require-hashes --requirement requirements-programs.lock
+	@touch $@
+
+.PHONY: .venv-programs
+.venv-programs: .venv-programs/.installed
+
+test-programs: install .venv-programs  ## Let the programs open what zfcal exports for them
+	ZFCAL_PROGRAMS=1 $(BIN)/pytest tests/programs
+
 # BENCH_OPTIONS=--write renews benchmarks/results and the documentation.
 bench: .venv/.benched  ## Measure what the documentation states; report what became worse
 	@for script in $(filter-out %/bench_diagnosis.py,$(wildcard benchmarks/*/bench_*.py)); do echo "== $$script"; $(BIN)/python "$$script" $(BENCH_OPTIONS) || exit 1; done
@@ -81,16 +93,18 @@ COMPILE = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strateg
 	--generate-hashes --no-emit-index-url --no-annotate --quiet \
 	--custom-compile-command "make lock" $(LOCK_OPTIONS)
 
-# What zfcal is tested with does not depend on what it is compared with: a lock for each.
-lock: install  ## Write both locks anew; pins that still fit stay
+# What zfcal is tested with depends neither on what it is compared with, nor on the programs that it
+# exports for: a lock for each.
+lock: install  ## Write the locks anew; pins that still fit stay
 	$(COMPILE) pyproject.toml --all-extras --output-file requirements.lock
 	$(COMPILE) --group bench --constraint requirements.lock --output-file requirements-bench.lock
+	$(COMPILE) --group programs --output-file requirements-programs.lock
 
-lock-upgrade:  ## Write both locks anew with the newest versions
+lock-upgrade:  ## Write the locks anew with the newest versions
 	$(MAKE) lock LOCK_OPTIONS=--upgrade
 
 clean:  ## Remove what can be made again
-	rm -rf .venv build dist demo-trial trials-real real-data .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	rm -rf .venv .venv-programs build dist demo-trial trials-real real-data .mypy_cache .ruff_cache .pytest_cache .hypothesis \
 		.import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -rf *.egg-info

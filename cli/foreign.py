@@ -25,7 +25,7 @@ FORMATS = (
 _M_PER_MM = 0.001
 
 
-def _pair(text: str) -> tuple[float, float]:
+def pair(text: str) -> tuple[float, float]:
     """Return the two numbers of a text such as ``0,1024``."""
     try:
         x, y = (float(part) for part in text.split(","))
@@ -56,7 +56,7 @@ foreign_options = adds(
     click.option("--fps", type=POSITIVE, help="Frame rate; must be that of trial.toml."),
     click.option("--mm-per-px", type=POSITIVE, help="Scale of a file in pixels."),
     click.option(
-        "--origin", type=_pair, metavar="X,Y", help="Point of the file that becomes (0, 0)."
+        "--origin", type=pair, metavar="X,Y", help="Point of the file that becomes (0, 0)."
     ),
     click.option("--flip-y", is_flag=True, help="y counts downwards in the file: turn it up."),
     click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate."),

@@ -40,6 +40,7 @@ COMMANDS = {
     "extend": "extend",
     "report": "report",
     "reproduce": "reproduce",
+    "export": "export",
     "inspect": "inspect",
     "check": "check",
 }

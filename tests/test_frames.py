@@ -164,3 +164,25 @@ def test_examples_in_docstrings_give_what_they_show(monkeypatch):
     monkeypatch.chdir(ROOT)
     found = doctest.testmod(frames)
     assert (found.failed, found.attempted) == (0, 4)
+
+
+def test_a_damaged_file_is_left_out_where_somebody_hears_of_it(trial, tmp_path):
+    """The others of its table are there; without a hearer the table is refused."""
+    root = tmp_path / "copy"
+    shutil.copytree(trial.root, root)
+    path = root / "tracks" / "000060.parquet"
+    n_rows = len(read_tracks(path).frame)
+    path.write_bytes(b"PAR1")
+    heard = []
+    tables = frames.TrialTables(root, on_damage=heard.append)
+    assert len(tables.tracks()) == len(trial.tracks()) - n_rows
+    assert [str(path) in str(error) for error in heard] == [True]
+    with pytest.raises(zfcal.ZfcalError, match="000060"):
+        zfcal.open(root).tracks()
+
+
+@pytest.mark.parametrize("table", frames.TABLES)
+def test_every_table_knows_its_files(trial, table):
+    """All of them are there, in the trial."""
+    assert all(path.is_file() for path in trial.files(table))
+    assert bool(trial.files(table)) == (table != "findings")

@@ -226,6 +226,16 @@ def test_benchmarks_are_locked_apart(repository, project, pins, bench_pins):
         assert name not in pins
 
 
+def test_programs_are_locked_apart(repository, project):
+    """With hashes and without addresses; each that is asked for is pinned to a fitting version."""
+    path = repository / "requirements-programs.lock"
+    assert not re.search(r"://|--index|--find-links|@ ", path.read_text(encoding="utf-8"))
+    found = locked(path)
+    assert [name for name, (_, _, hashes) in found.items() if not hashes] == []
+    for requirement in map(Requirement, project["dependency-groups"]["programs"]):
+        assert requirement.specifier.contains(found[canonicalize_name(requirement.name)][0])
+
+
 def test_what_is_installed_here_is_what_the_lock_says(pins):
     """Tests run against the pinned versions, not against what happens to be there."""
     for name, (pinned, marker, _) in pins.items():

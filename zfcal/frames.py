@@ -6,9 +6,10 @@ one table. Nothing is computed or written here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any, final
+from typing import Any, TypeAlias, TypeVar, final
 
 import pandas as pd
 import pyarrow as pa
@@ -19,9 +20,17 @@ from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.artifacts.tables import RULES, SCORES, STATS, TRACKS, read_table
 from zfcal.artifacts.validation import check, read_json
-from zfcal.errors import InputError
+from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.parameters import Parameters
-from zfcal.trial import Trial
+from zfcal.trial import Trial, second_of
+
+T = TypeVar("T")
+
+Damage: TypeAlias = Callable[[DamagedError | SchemaError], None]
+"""Hears of each file that is left out."""
+
+TABLES = ("tracks", "stats", "scores", "rules", "parameters", "findings")
+"""The tables of a trial: the methods of `TrialTables` that return one."""
 
 _PARAMETERS = (
     "window_end_s",
@@ -54,6 +63,8 @@ class TrialTables:
     ----------
     trial
         Its directory, or anything in it.
+    on_damage
+        Hears of each damaged file, which is then left out; None to refuse its table.
 
     Raises
     ------
@@ -69,8 +80,9 @@ class TrialTables:
     ['fish', 'robot']
     """
 
-    def __init__(self, trial: str | Path) -> None:
+    def __init__(self, trial: str | Path, *, on_damage: Damage | None = None) -> None:
         self._trial = read_trial(find_trial(Path(trial)))
+        self._on_damage = on_damage
 
     @property
     def trial(self) -> Trial:
@@ -81,6 +93,31 @@ class TrialTables:
     def root(self) -> Path:
         """Its directory."""
         return self._trial.root
+
+    def files(self, table: str) -> list[Path]:
+        """Return the files that a table is made of, in the order of time.
+
+        Parameters
+        ----------
+        table
+            One of `TABLES`.
+        """
+        match table:
+            case "tracks":
+                return [segment_path(self.root, start) for start in segment_starts(self.root)]
+            case "scores":
+                return [
+                    *self._numbered(table, ".parquet"),
+                    *self._numbered(table, "-model.parquet"),
+                ]
+            case "rules":
+                return self._numbered("scores", "-rules.parquet")[-1:]
+            case "parameters":
+                return self._numbered("models", ".toml")
+            case "findings":
+                found = self.root / "diagnosis" / "findings.json"
+                return [found] if found.is_file() else []
+        return self._numbered(table, ".parquet")
 
     def tracks(self) -> pd.DataFrame:
         """Return the positions of everybody in every frame, in the order of time.
@@ -99,9 +136,8 @@ class TrialTables:
         DamagedError
             A segment is damaged.
         """
-        paths = [segment_path(self.root, start) for start in segment_starts(self.root)]
         hint = f"First: zfcal track {self.root}, or zfcal import SRC {self.root}"
-        return _joined(paths, TRACKS, self.root / "tracks", hint)
+        return self._joined("tracks", TRACKS, hint)
 
     def stats(self) -> pd.DataFrame:
         """Return the counts of all windows: one row per window, case, zone, statistic and bin.
@@ -114,7 +150,7 @@ class TrialTables:
             A file is damaged.
         """
         hint = f"First: zfcal analyse {self.root}"
-        return _joined(self._numbered("stats", ".parquet"), STATS, self.root / "stats", hint)
+        return self._joined("stats", STATS, hint)
 
     def scores(self) -> pd.DataFrame:
         """Return all scores: one row per window, comparison, feature and zone.
@@ -134,9 +170,7 @@ class TrialTables:
         DamagedError
             A file is damaged.
         """
-        paths = [*self._numbered("scores", ".parquet"), *self._numbered("scores", "-model.parquet")]
-        hint = f"First: zfcal analyse {self.root}"
-        return _joined(paths, SCORES, self.root / "scores", hint)
+        return self._joined("scores", SCORES, f"First: zfcal analyse {self.root}")
 
     def rules(self) -> pd.DataFrame:
         """Return the forward scores of the rules by which models are published.
@@ -154,9 +188,8 @@ class TrialTables:
         DamagedError
             The record is damaged.
         """
-        paths = self._numbered("scores", "-rules.parquet")[-1:]
         hint = f"First: zfcal calibrate {self.root} --publish forward"
-        return _joined(paths, RULES, self.root / "scores", hint)
+        return self._joined("rules", RULES, hint)
 
     def parameters(self) -> pd.DataFrame:
         """Return the parameters of all numbered models, those of effects as well.
@@ -177,8 +210,11 @@ class TrialTables:
         DamagedError
             A model is damaged.
         """
-        places = numbered_of(self.root / "models", ".toml")
-        rows = [row for end, path in sorted(places.items()) for row in _parameter_rows(end, path)]
+        rows = [
+            row
+            for path in self.files("parameters")
+            for row in self._unless_damaged(path, _parameter_rows) or ()
+        ]
         if not rows:
             raise _nothing(self.root / "models", f"First: zfcal calibrate {self.root}")
         return pd.DataFrame(rows, columns=list(_PARAMETERS)).astype(
@@ -220,6 +256,26 @@ class TrialTables:
     def _numbered(self, folder: str, ending: str) -> list[Path]:
         return [path for _, path in sorted(numbered_of(self.root / folder, ending).items())]
 
+    def _joined(self, name: str, schema: str, hint: str) -> pd.DataFrame:
+        read = [
+            self._unless_damaged(path, partial(read_table, schema=schema))
+            for path in self.files(name)
+        ]
+        tables = [table for table in read if table is not None]
+        if not tables:
+            folder = "scores" if name == "rules" else name
+            raise _nothing(self.root / folder, hint)
+        return _as_frame(tables)
+
+    def _unless_damaged(self, path: Path, read: Callable[[Path], T]) -> T | None:
+        try:
+            return read(path)
+        except (DamagedError, SchemaError) as error:
+            if self._on_damage is None:
+                raise
+            self._on_damage(error)
+            return None
+
     def __repr__(self) -> str:
         """Return how it was made."""
         return f"zfcal.open({str(self.root)!r})"
@@ -229,10 +285,8 @@ def _nothing(place: Path, hint: str) -> InputError:
     return InputError(f"{place}: there is nothing to read.", hint=hint)
 
 
-def _joined(paths: list[Path], schema: str, place: Path, hint: str) -> pd.DataFrame:
-    if not paths:
-        raise _nothing(place, hint)
-    table = pa.concat_tables([read_table(path, schema) for path in paths]).unify_dictionaries()
+def _as_frame(tables: list[pa.Table]) -> pd.DataFrame:
+    table = pa.concat_tables(tables).unify_dictionaries()
     frame: pd.DataFrame = table.to_pandas()
     for name, column in zip(table.column_names, table.columns, strict=True):
         if pa.types.is_integer(column.type) and column.null_count:
@@ -241,15 +295,18 @@ def _joined(paths: list[Path], schema: str, place: Path, hint: str) -> pd.DataFr
     return frame
 
 
-def _parameter_rows(end_s: int, path: Path) -> Iterator[tuple[Any, ...]]:
+def _parameter_rows(path: Path) -> list[tuple[Any, ...]]:
     result = read_result(path)
+    end_s = second_of(path, ".toml")
     intervals = result.get("intervals") or {}
     published = result.get("published") or {}
     said = intervals.get("parameters", {})
+    rows = []
     for name, value in _values(read_model(path)):
         row = said.get(name, {})
         known = (row.get("low"), row.get("high"), row.get("identified"))
-        yield end_s, name, value, *known, intervals.get("by"), published.get("rule")
+        rows.append((end_s, name, value, *known, intervals.get("by"), published.get("rule")))
+    return rows
 
 
 def _values(model: Parameters) -> Iterator[tuple[str, float]]:

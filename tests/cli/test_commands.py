@@ -8,8 +8,12 @@ import pytest
 
 from zfcal import readers
 from zfcal.artifacts.lock import lock
+from zfcal.writers import FORMATS as EXPORTED
+from zfcal.writers import TABLES
+from zfcal_cli.export import FORMATS as EXPORTS
 from zfcal_cli.foreign import FORMATS, import_options
 
+EXPORT_FILES = ("trajectories.npy", "export-idtracker.json")
 ROUND = ("--generations", "1", "--population", "4", "--steps", "20", "--no-seed-likelihood")
 
 
@@ -44,6 +48,50 @@ def test_import_takes_options_in_the_units_of_people(zfcal):
 def test_the_formats_are_those_of_the_library():
     """Written out in the command, which must not load the library for its help."""
     assert set(FORMATS) == set(readers.FORMATS)
+
+
+def test_the_formats_of_the_export_are_those_of_the_library():
+    """Written out in the command as well; all that tracks are exported in is imported."""
+    assert (*TABLES, *EXPORTED) == EXPORTS
+    assert set(EXPORTED) <= set(readers.FORMATS)
+
+
+def test_an_export_is_read_back_by_the_command_that_it_tells(zfcal, trial):
+    """The line on standard error, with a trial's name, imports the same tracks again."""
+    done = zfcal("export", "trial", "--to", "idtracker")
+    assert done.code == 0
+    assert done.lines == [f"trial/export/idtracker/{name}" for name in EXPORT_FILES]
+    (line,) = [line for line in done.err.splitlines() if "read back with" in line]
+    words = line.partition("zfcal import ")[2].replace("TRIAL", "again").split()
+    zfcal("init", "again", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
+    assert zfcal("import", *words).code == 0
+    rows = []
+    for name in ("trial", "again"):
+        (seen,) = json.loads(zfcal("inspect", f"{name}/tracks/000060.parquet", "--json").out)[
+            "results"
+        ]
+        rows.append(seen["contents"]["head"])
+    for one, two in zip(*rows, strict=True):
+        assert (one["agent"], one["kind"]) == (two["agent"], two["kind"])
+        assert (one["x_m"], one["y_m"]) == pytest.approx((two["x_m"], two["y_m"]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("trial",), "Nothing is asked for"),
+        (("trial", "--to", "csv", "--mm-per-px", "1"), "have no effect"),
+        (("trial", "--layout", "--origin", "1,2"), "have no effect"),
+        (("trial", "--to", "ctrax"), "'ctrax' is not one of"),
+        (("trial", "trial-2", "--to", "sleap", "-o", "out"), "there are several"),
+    ],
+)
+def test_an_export_that_cannot_take_effect_is_wrong_usage(zfcal, trial, words, says):
+    """Told before anything is read."""
+    zfcal("init", "trial-2", "--side-m", "1", "--fish", "3", "--fps", "5")
+    done = zfcal("export", *words)
+    assert done.code == 2
+    assert says in done.err
 
 
 @pytest.mark.parametrize(

@@ -310,3 +310,23 @@ def test_confidence_over_other_axes_is_refused(tmp_path, refused):
     assert "expected confidence over {'time': 3, 'keypoint': 1, 'individual': 2}, got" in refused(
         tmp_path / "b.nc", "movement", m_per_px=PX
     )
+
+
+def test_agents_that_are_called_by_kind_and_number_get_both(tmp_path, parts, read):
+    """``robot_7`` is robot 7, if all are called so; else they are numbered as ever."""
+    path = tmp_path / "named.h5"
+    _sleap(path, parts.transpose(1, 3, 2, 0), names=(b"fish_3", b"robot_7"))
+    found = read(path, "sleap", m_per_px=PX, keypoint="head").tracks
+    assert set(zip(found.agent.tolist(), found.kind.tolist(), strict=True)) == {(3, 0), (7, 1)}
+    _sleap(path, parts.transpose(1, 3, 2, 0), names=(b"fish_3", b"shark_7"))
+    found = read(path, "sleap", m_per_px=PX, keypoint="head").tracks
+    assert set(zip(found.agent.tolist(), found.kind.tolist(), strict=True)) == {(0, 0), (1, 0)}
+
+
+def test_headings_of_movement_over_other_axes_are_refused(tmp_path, refused):
+    """They go with the positions, one for each individual and time."""
+    h5py = pytest.importorskip("h5py")
+    path = _movement(tmp_path / "tank.nc")
+    with h5py.File(path, "r+") as file:
+        file["heading_rad"] = np.zeros(3)
+    assert "expected heading_rad" in refused(path, "movement", m_per_px=PX)

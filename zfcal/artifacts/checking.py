@@ -20,7 +20,7 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
-from zfcal.artifacts.lineage import package_version, read_lineage
+from zfcal.artifacts.lineage import Lineage, package_version, read_lineage
 from zfcal.artifacts.machine import check_computer
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
@@ -202,7 +202,7 @@ def _unknown(place: _Place, name: str) -> Iterator[Finding]:
     if place.trial and place.trial.cameras:
         named |= {path for camera in place.trial.cameras.values() for path in camera.values()}
     is_figure = folder == "cameras" and name.endswith(".png")
-    if name in named or is_figure or folder in {"diagnosis", "report"}:
+    if name in named or is_figure or folder in {"diagnosis", "report", "export"}:
         return
     says = "is no artifact of a trial, and no command reads it"
     if re.fullmatch(r"\d{1,5}\D.*", name.rpartition("/")[2]):
@@ -221,6 +221,14 @@ def _clock(place: _Place, path: Path, name: str) -> Iterator[Finding]:
         )
 
 
+def _form(lineage: Lineage) -> str:
+    """Return the option that says which form is exported; empty for other commands."""
+    name = lineage.options.get("format")
+    if lineage.command != "export":
+        return ""
+    return " --layout" if name == "layout" else f" --to {name}"
+
+
 def _lineage(place: _Place, path: Path, name: str) -> Iterator[Finding]:
     """Compare the hashes of the inputs that an artifact states with what lies there."""
     if path.suffix == ".mcap" or path.name == CONFIG_NAME:
@@ -232,7 +240,7 @@ def _lineage(place: _Place, path: Path, name: str) -> Iterator[Finding]:
         level = NOTE if path.suffix == ".toml" else ERROR
         yield Finding(level=level, where=name, says=str(error).removeprefix(f"{path}: "))
         return
-    again = f"Make it again with: zfcal {lineage.command} {place.root}"
+    again = f"Make it again with: zfcal {lineage.command} {place.root}{_form(lineage)}"
     for source, sha256 in lineage.inputs.items():
         found = place.hash_of(source)
         if found is None and "/" not in source:
@@ -329,6 +337,7 @@ _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
     r"cameras/[^/]+\.toml": _check_camera,
     rf"models/{NUMBER}\.skipped\.json": _json_checker("skipped"),
     r"diagnosis/([^/]+/)?findings\.json": _json_checker("findings"),
+    r"export/[a-z]+/export-[a-z]+\.json": _json_checker("export"),
 }
 
 

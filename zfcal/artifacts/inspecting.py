@@ -19,7 +19,7 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import read_extra, read_parquet, schema_of
+from zfcal.artifacts.tables import EXPORT, read_extra, read_parquet, schema_of
 from zfcal.artifacts.validation import read_json, read_toml
 from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.trial import CONFIG_NAME
@@ -120,7 +120,9 @@ def _table(path: Path) -> tuple[str | None, str | None, Description]:
     table = read_parquet(path, "Copy it again from where it was made, or make it anew.")
     schema = schema_of(table)
     known = schema in TABLE_SCHEMAS
-    problem = problem_of(table, form_of(schema)) if known else f"schema is {schema}"
+    # A table for other programs has the columns that they want.
+    other = None if schema == EXPORT else f"schema is {schema}"
+    problem = problem_of(table, form_of(schema)) if known else other
     says = {column.name: column.says for column in form_of(schema).columns} if known else {}
     columns = [
         {
@@ -139,7 +141,7 @@ def _table(path: Path) -> tuple[str | None, str | None, Description]:
         "head": [_finite(row) for row in table.slice(0, _HEAD_ROWS).to_pylist()],
         "extra": read_extra(path) or None,
     }
-    return (schema if known else None), problem, contents
+    return (schema if known or other is None else None), problem, contents
 
 
 def _span(table: pa.Table) -> Description:

@@ -38,6 +38,8 @@ STATS = "zfcal.stats/1"
 SCORES = "zfcal.scores/1"
 RULES = "zfcal.rules/1"
 POPULATION = "zfcal.population/1"
+EXPORT = "zfcal.export/1"
+"""Of what is written for other programs: files of any form, by their sidecar."""
 
 _EXTRA_KEY = b"zfcal.extra"
 _MAGIC = b"PAR1"

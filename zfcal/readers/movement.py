@@ -5,7 +5,8 @@ movement (documentation, "The movement datasets"): a variable ``position`` over
 on ``keypoint`` and ``individual`` - and ``confidence``; boxes have no keypoints.
 Attributes ``fps`` and ``time_unit`` (seconds or frames). Positions are in pixels,
 unless the variable has the attribute ``space_unit``, which
-``movement.transforms.scale`` sets (or ``units``). Missing is NaN.
+``movement.transforms.scale`` sets (or ``units``). Missing is NaN. `zfcal export` adds a variable
+``heading_rad`` over time and individual, and the attribute ``y_axis`` (up or down) of positions.
 
 A netCDF-4 file is an HDF5 file and is read as one: its variables are data sets,
 its dimensions their scales.
@@ -71,6 +72,8 @@ def read_movement(path: Path, options: ImportOptions) -> Imported:
         agents=_names(variables, "individual"),
         keypoints=_names(variables, "keypoint") or ("centre",),
         unit=_unit(path, variables["position"]),
+        heading_rad=_headings(path, variables),
+        y_down=variables["position"].attributes.get("y_axis") != "up",
         notes=notes,
     )
     return assemble(path, choose(path, poses, options).rows(), options)
@@ -80,7 +83,15 @@ def _read(path: Path) -> tuple[dict[str, _Variable], dict[str, str]]:
     """Return the variables that are there of those needed, and the file's attributes."""
     with open_hdf5(path) as file:
         found = {}
-        for name in ("position", "confidence", "time", "space", *_LEGACY, *_LEGACY.values()):
+        for name in (
+            "position",
+            "confidence",
+            "heading_rad",
+            "time",
+            "space",
+            *_LEGACY,
+            *_LEGACY.values(),
+        ):
             if name in file:
                 new = _LEGACY.get(name, name)
                 found[new] = _variable(path, file, name)
@@ -102,7 +113,7 @@ def _variable(path: Path, file: Any, name: str) -> _Variable:
 
 def _texts(attributes: Any) -> dict[str, str]:
     """Return the attributes that are needed, as text."""
-    wanted = ("fps", "time_unit", "space_unit", "units", "scale_factor", "add_offset")
+    wanted = ("fps", "time_unit", "space_unit", "units", "y_axis", "scale_factor", "add_offset")
     return {name: texts(np.asarray(attributes[name]))[0] for name in wanted if name in attributes}
 
 
@@ -123,6 +134,21 @@ def _check(path: Path, variables: Mapping[str, _Variable]) -> None:
         raise InputError(f"{path}: expected positions for {n_times} times, got {shape}.")
     for name in {"position", "confidence"} & set(variables):
         _check_plain(path, name, variables[name], shape)
+
+
+def _headings(path: Path, variables: Mapping[str, _Variable]) -> Floats | None:
+    if "heading_rad" not in variables:
+        return None
+    heading = variables["heading_rad"]
+    sizes = dict(zip(variables["position"].dims, variables["position"].values.shape, strict=True))
+    expected = {dim: sizes[dim] for dim in ("time", "individual")}
+    got = dict(zip(heading.dims, heading.values.shape, strict=True))
+    if got != expected or heading.values.dtype.kind != "f":
+        raise InputError(
+            f"{path}: expected heading_rad, numbers over {expected}, got {heading.values.dtype} "
+            f"over {got}."
+        )
+    return np.asarray(heading.values.transpose([heading.dims.index(d) for d in expected]), float)
 
 
 def _check_plain(path: Path, name: str, variable: _Variable, shape: Mapping[str, int]) -> None:

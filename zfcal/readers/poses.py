@@ -34,6 +34,10 @@ class Poses:
         Their names.
     unit
         ``px`` or a unit of length.
+    heading_rad : ndarray of float64, shape (frame, agent), optional
+        From x towards y, in the file's axes; NaN where unknown.
+    y_down
+        Whether y is known to count downwards.
     notes
         A sentence each.
     """
@@ -45,6 +49,8 @@ class Poses:
     agents: tuple[str, ...]
     keypoints: tuple[str, ...]
     unit: str = "px"
+    heading_rad: Floats | None = None
+    y_down: bool = True
     notes: tuple[str, ...] = ()
 
 
@@ -60,10 +66,11 @@ def choose(path: Path, poses: Poses, options: ImportOptions) -> Grid:
     options
         ``keypoint`` is needed when there are several parts; the mean of all is
         known only where each of them is, and as sure as the least sure one.
-        ``body_axis`` gives the heading, from its first part to its second.
+        ``body_axis`` gives the heading, from its first part to its second, in place of what
+        the file may have.
     """
     xy, confidence = _position(path, poses, options.keypoint)
-    heading_rad = None
+    heading_rad = poses.heading_rad
     if options.body_axis is not None:
         back, front = (_part(path, poses, name) for name in options.body_axis)
         along = poses.position[:, :, front] - poses.position[:, :, back]
@@ -76,6 +83,7 @@ def choose(path: Path, poses: Poses, options: ImportOptions) -> Grid:
         heading_rad=heading_rad,
         confidence=None if confidence is None else np.clip(confidence, 0, 1),
         names=poses.agents,
+        y_down=poses.y_down,
         notes=poses.notes,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -9,6 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
+from zfcal.tracks import KINDS
+
+_NAMED = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>\d+)")
+"""What `zfcal export` calls agents: the kind, and the track id."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,12 +91,13 @@ class Grid:
     def rows(self) -> Rows:
         """Return the same, one row per agent and frame.
 
-        Agents keep their names where these are whole numbers; else they are
-        numbered from 0, in the order of the columns.
+        Agents keep their names where these are whole numbers. Those that are all called
+        ``fish_3`` or ``robot_4``, as `zfcal export` has it, get that number and kind; else they
+        are numbered from 0, in the order of the columns.
         """
         n_frames, n_agents = self.xy.shape[:2]
-        numbered = len(set(self.names)) == n_agents and all(map(str.isdecimal, self.names))
-        agents = np.array(list(map(int, self.names)) if numbered else range(n_agents))
+        numbers, kinds = self._known()
+        agents = np.array(numbers if len(set(numbers)) == n_agents else range(n_agents))
         return Rows(
             time_s=np.repeat(self.time_s, n_agents),
             frame=np.repeat(self.frame, n_agents),
@@ -101,7 +107,17 @@ class Grid:
             unit=self.unit,
             heading_rad=None if self.heading_rad is None else self.heading_rad.ravel(),
             confidence=None if self.confidence is None else self.confidence.ravel(),
+            kind=np.tile(kinds, n_frames) if len(kinds) == n_agents else None,
             names=dict(zip(agents.tolist(), self.names, strict=False)),
             y_down=self.y_down,
             notes=self.notes,
         )
+
+    def _known(self) -> tuple[list[int], NDArray[np.int8]]:
+        """Return the numbers and the kinds that the names tell; empty where one tells none."""
+        named = [match for name in self.names if (match := _NAMED.fullmatch(name))]
+        if len(named) == len(self.names):
+            kinds = [KINDS.index(match["kind"]) for match in named]
+            return [int(match["number"]) for match in named], np.array(kinds, dtype=np.int8)
+        is_numbered = all(map(str.isdecimal, self.names))
+        return [int(name) for name in self.names] if is_numbered else [], np.empty(0, np.int8)

@@ -7,8 +7,9 @@ centimetres with y downwards; csv names carry the unit, ``X#wcentroid (cm)``. Wh
 not known is infinite. A frame with ``missing`` = 1 can hold an interpolated
 position: it is taken as missing. Centimetres are right only if ``cm_per_pixel`` was
 set: TRex takes an arena 30 cm wide otherwise. The ``.npz`` files of newer versions
-(``tracking/Export.cpp``) hold ``cm_per_pixel``, ``frame_rate`` and ``id``. ``ANGLE``
-is not read: its sense of rotation is not documented.
+(``tracking/Export.cpp``) hold ``cm_per_pixel``, ``frame_rate`` and ``id``. The file of an
+individual that is called ``robot`` in place of ``id`` or ``fish`` (`zfcal export`) is a
+robot's. ``ANGLE`` is not read: its sense of rotation is not documented.
 """
 
 from __future__ import annotations
@@ -28,12 +29,13 @@ from zfcal.readers.extras import whole
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.raw import Rows
 from zfcal.readers.text import Layout, header_of, numbers, read_table
+from zfcal.tracks import FISH, KINDS, ROBOT
 
 _CENTROID = "wcentroid"
 _SOURCES = {_CENTROID: "#wcentroid", "centroid": "#centroid", "pcentroid": "#pcentroid", "head": ""}
 """What a position is of, and how TRex marks it in a name."""
 
-_NUMBERED = re.compile(r"(?P<video>.+)_[A-Za-z]+(?P<number>\d+)\.(?:npz|csv|csv\.gz)")
+_NUMBERED = re.compile(r"(?P<video>.+)_(?P<what>[A-Za-z]+)(?P<number>\d+)\.(?:npz|csv|csv\.gz)")
 _NOT_TRACKS = re.compile(r"_(posture|statistics|memory|visual_field|heatmap|tracklet|recognition)_")
 _UNIT = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^)]*)\)")
 
@@ -44,6 +46,7 @@ class _Individual:
 
     path: Path
     number: int
+    kind: int
     columns: Mapping[str, Floats]
     unit: str
 
@@ -98,7 +101,9 @@ def _read(path: Path, mark: str, place: int) -> _Individual:
     number = int(numbered["number"]) if numbered else place
     if "id" in columns and columns["id"].size == 1:
         number = int(columns["id"].item())
-    return _Individual(path=path, number=number, columns=columns, unit=unit)
+    is_robot = numbered is not None and numbered["what"] == KINDS[ROBOT]
+    kind = ROBOT if is_robot else FISH
+    return _Individual(path=path, number=number, kind=kind, columns=columns, unit=unit)
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Floats], str]:
@@ -160,6 +165,7 @@ def _rows(individual: _Individual, mark: str, options: ImportOptions) -> Rows:
         x=x / scale,
         y=y / scale,
         unit=unit,
+        kind=np.full(len(frame), individual.kind, dtype=np.int8),
         notes=(*notes, _scale_note(columns)),
     )
 
@@ -233,5 +239,6 @@ def _joined(parts: list[Rows]) -> Rows:
         x=np.concatenate([part.x for part in parts]),
         y=np.concatenate([part.y for part in parts]),
         unit=parts[0].unit,
+        kind=np.concatenate([part.kind for part in parts if part.kind is not None]),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
     )

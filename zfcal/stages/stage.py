@@ -116,12 +116,15 @@ class Output:
         Options in it that do not bear on the result of this run.
     otherwise
         Why it is to be made although its lineage is the same; None for no reason.
+    sidecar
+        The output that has its lineage, for a file of a form that has no place for one.
     """
 
     path: Path
     lineage: Lineage
     ignore: tuple[str, ...] = ()
     otherwise: str | None = None
+    sidecar: Path | None = None
 
     def with_options(self, **options: JSON) -> Output:
         """Return it with options in its lineage that came to be known on the way."""
@@ -374,7 +377,10 @@ class _Making:
     def _reason(self, outputs: Sequence[Output]) -> str | None:
         """Return why files are to be made; None if all of them are up to date."""
         for output in outputs:
-            reason = stale_reason([output.path], output.lineage, ignore_options=output.ignore)
+            if output.sidecar is not None:
+                reason = None if output.path.is_file() else "missing"
+            else:
+                reason = stale_reason([output.path], output.lineage, ignore_options=output.ignore)
             if reason is not None:
                 return reason
         if self._run.task.force:

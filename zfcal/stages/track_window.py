@@ -6,6 +6,7 @@ its samples are those that its statistics were made of.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,7 +92,7 @@ def read_stretch(opened: OpenTrial, window_s: tuple[int, int] | None, tell: Tell
         samples=joined((samples for _, _, samples in read), first=first, stop=stop),
         files=tuple(files),
         n_left_out=len(files) - len(read),
-        noise_m=_noise([path for path, _, _ in read]),
+        noise_m=noise_of([path for path, _, _ in read]),
     )
 
 
@@ -146,8 +147,8 @@ def _span(
     return sample_range(first_s, max(end_s, first_s), dt_s=opened.trial.dt_s)
 
 
-def _noise(files: list[Path]) -> float | None:
-    """Return the middle of what the segments state; tools may state it for each."""
+def noise_of(files: Iterable[Path]) -> float | None:
+    """Return the position noise, in metres: the middle of what segments state; None for no word."""
     said = [read_extra(path).get(NOISE_KEY) for path in files]
     known = [float(value) for value in said if isinstance(value, int | float)]
     return float(np.median(known)) if known else None

@@ -1,0 +1,1 @@
+"""`zfcal export`: a trial in the forms of other programs."""
