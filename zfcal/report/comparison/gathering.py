@@ -217,18 +217,17 @@ def _same_tracks(trials: Sequence[TrialValues]) -> list[str]:
 
 
 def _why(view: TrialView) -> dict[Group, str]:
-    name = view.name
     why: dict[Group, str] = {}
     if not view.tracked_s:
         why["fish"] = "there are no tracks"
-    why["model"] = f"no model has been scored with a ceiling (zfcal calibrate {name})"
+    why["model"] = "no model has been scored with a ceiling (zfcal calibrate does)"
     found = view.integration
     if found.robot:
         why["robot"] = _NO_ROBOT_CEILING
     elif view.trial.n_robots == 0:
         why["robot"] = "there is no robot in this trial"
     else:
-        why["robot"] = f"the robot has not been compared with the fish (zfcal analyse {name})"
+        why["robot"] = "the robot has not been compared with the fish (zfcal analyse does)"
     return why
 
 

@@ -122,15 +122,31 @@ def _draw(axes: Axes, *, rows: Sequence[_Row]) -> None:
         axes.plot(np.clip([row.low, row.high], *ends), [at, at], color=theme.INK, lw=1.6, zorder=2)
         for values, offset, colour in ((row.a, _UP, theme.FISH), (row.b, -_UP, theme.MODEL)):
             _draw_dots(axes, values, at + offset, colour, ends)
-        inside = theme.INK if row.is_found else theme.GROUND
-        place = float(np.clip(row.g, *ends))
-        axes.plot([place], [at], color=theme.INK, marker="D", mfc=inside, ms=6, zorder=4)
+        _draw_effect(axes, row, at, ends)
         if row.p_family is not None:
-            text = f"p {p_text(row.p_family)}"
-            axes.text(1.01, at, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8)
+            _beside(axes, at, p_text(row.p_family))
+    if any(row.p_family is not None for row in rows):
+        _beside(axes, len(rows) - 0.35, "p of all")
     axes.set_yticks(range(len(rows)), [row.label for row in rows])
     axes.set(ylim=(-0.6, len(rows) - 0.4), xlim=ends, xlabel="g (mean of B is 0)")
     axes.grid(visible=False, axis="y")
+
+
+def _draw_effect(axes: Axes, row: _Row, at: int, ends: tuple[float, float]) -> None:
+    """Draw g where it lies; beyond the axis it stands as a number."""
+    if ends[0] <= row.g <= ends[1]:
+        inside = theme.INK if row.is_found else theme.GROUND
+        axes.plot([row.g], [at], color=theme.INK, marker="D", mfc=inside, ms=6, zorder=4)
+        return
+    is_right = row.g > 0
+    place, side = (ends[1] - 0.4, "right") if is_right else (ends[0] + 0.4, "left")
+    weight = "bold" if row.is_found else "normal"
+    text = f"g = {row.g:.0f}"
+    axes.text(place, at, text, ha=side, va="center", fontsize=8, fontweight=weight)
+
+
+def _beside(axes: Axes, at: float, text: str) -> None:
+    axes.text(1.02, at, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8)
 
 
 def _draw_dots(

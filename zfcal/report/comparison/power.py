@@ -2,8 +2,9 @@
 
 Effects are in standard deviations between trials. Trials are taken as normal with one spread
 on both sides, for which the power of a t test is that of the noncentral t distribution
-(Cohen 1988, Statistical Power Analysis, chapter 2). A test by relabelling has less with few
-trials: its p comes in steps.
+(Cohen 1988, Statistical Power Analysis, chapter 2). A test by relabelling finds about what a
+t test at its attainable level finds; with four trials on each side somewhat less
+(docs/compare.md has what was measured).
 """
 
 from __future__ import annotations
@@ -44,6 +45,25 @@ def smallest_p(n_a: int, n_b: int) -> float:
     if not (n_a >= 1 and n_b >= 1):
         raise InputError(f"Relabelling needs a trial on each side, got {n_a} and {n_b}.")
     return (2 if n_a == n_b else 1) / math.comb(n_a + n_b, n_a)
+
+
+def attainable_level(n_a: int, n_b: int, *, alpha: float = ALPHA) -> float:
+    """Return the level at which relabelling tests, since its p comes in steps.
+
+    Parameters
+    ----------
+    n_a, n_b
+        Trials on each side, at least one.
+    alpha
+        Level that is asked for.
+
+    Returns
+    -------
+    float
+        The largest p up to ``alpha`` that there is; 0 where none is so small.
+    """
+    step = smallest_p(n_a, n_b)
+    return math.floor(alpha / step + 1e-9) * step
 
 
 def detectable_effect(n_a: int, n_b: int, *, alpha: float = ALPHA, power: float = POWER) -> float:

@@ -35,19 +35,24 @@ def lines_of(document: Mapping[str, Any]) -> list[str]:
 
 def statements(document: Mapping[str, Any]) -> list[str]:
     """Return in sentences what was tested, what came of it, and what could have been found."""
-    test = document["test"]
     said = [_verdict(document), _how(document), *_power(document)]
-    if test["tested"] and any(row["untested"] for row in document["statistics"]):
-        rows = [row for row in document["statistics"] if row["untested"]]
-        said += [f"Not tested: {row['name']} ({row['untested']})." for row in rows]
-    return said
+    if not document["test"]["tested"]:
+        return said
+    reasons: dict[str, list[str]] = {}
+    for row in document["statistics"]:
+        if row["untested"]:
+            reasons.setdefault(row["untested"], []).append(row["name"])
+    return said + [f"Not tested: {', '.join(names)}: {why}." for why, names in reasons.items()]
 
 
 def missing_lines(document: Mapping[str, Any]) -> list[str]:
-    """Return which trial is left out of which rows, a sentence each."""
+    """Return which trials are left out of which rows, those of one reason in a sentence."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for each in document["missing"]:
+        reasons.setdefault((", ".join(each["statistics"]), each["why"]), []).append(each["trial"])
     return [
-        f"{each['trial']} is left out of {', '.join(each['statistics'])}: {each['why']}."
-        for each in document["missing"]
+        f"Left out of {names}: {', '.join(trials)}: {why}."
+        for (names, why), trials in reasons.items()
     ]
 
 
@@ -63,8 +68,9 @@ def _verdict(document: Mapping[str, Any]) -> str:
     if not test["tested"]:
         n_a, n_b = _sizes(document)
         return (
-            f"Nothing is tested: {_trials(n_a)} and {_trials(n_b)}, and a test needs "
-            f"{test['least_trials']} on each side. The table describes these trials."
+            f"Nothing is tested: there are {n_a} and {_trials(n_b)}, and a test needs "
+            f"{test['least_trials']} on each side that have a statistic. The table describes "
+            "these trials."
         )
     found = [
         row
@@ -73,11 +79,11 @@ def _verdict(document: Mapping[str, Any]) -> str:
     ]
     if not found:
         return (
-            f"No difference in {_of(test['tested'])} that trials alike would not show as often as "
-            "once in twenty. That is no proof that the sets are alike: see the intervals."
+            f"No difference is found in {_of(test['tested'])} together. That is no proof that the "
+            "sets are alike: the intervals say how far apart they may be."
         )
     names = ", ".join(f"{row['name']} (p {p_text(row['p_family'])})" for row in found)
-    return f"A and B differ, with all {_of(test['tested'])} in view, in {names}."
+    return f"A and B differ, over {_of(test['tested'])} together, in {names}."
 
 
 def _how(document: Mapping[str, Any]) -> str:
@@ -88,6 +94,8 @@ def _how(document: Mapping[str, Any]) -> str:
         return (
             f"With {n_a} and {n_b} trials no p by relabelling could be below {least}, however "
             "large a difference is."
+            if min(n_a, n_b) < test["least_trials"]
+            else "There are trials enough, but in no row of the table."
         )
     ways = "all there are" if test["exact"] else f"by chance, seed {test['seed']}"
     return (
@@ -99,19 +107,24 @@ def _how(document: Mapping[str, Any]) -> str:
 def _power(document: Mapping[str, Any]) -> Iterator[str]:
     test = document["test"]
     n_a, n_b = _sizes(document)
-    often = f"{100 * test['power']:.0f} %"
-    if not test["tested"]:
+    often = f"{100 * test['power']:.0f} % of experiments"
+    if test["tested"]:
         yield (
-            f"With {test['least_trials']} trials on each side a difference of g = "
-            f"{test['detectable_g_with_least']:.1f} in a single statistic would be found in "
-            f"{often} of experiments; smaller ones need more trials."
-        )
-    elif test["detectable_g"] is not None:
-        yield (
-            f"With {n_a} and {n_b} trials at least g = {test['detectable_g']:.1f} is found in "
-            f"{often} of experiments in a single statistic, and about g = "
+            f"With {n_a} and {n_b} trials a difference of about g = {test['detectable_g']:.1f} "
+            f"in a single statistic is found in {often}, and about g = "
             f"{test['detectable_g_among_all']:.1f} among {_of(test['tested'])}."
         )
+        return
+    if test["detectable_g_by_t"] is not None:
+        yield (
+            f"A t test, which trusts that trials are normal, would find g = "
+            f"{test['detectable_g_by_t']:.1f} with these in {often}."
+        )
+    least = test["least_trials"]
+    yield (
+        f"With {least} trials on each side about g = {test['detectable_g_with_least']:.1f} in a "
+        f"single statistic is found in {often}; smaller differences need more trials."
+    )
 
 
 def _cells(row: Mapping[str, Any]) -> Sequence[str]:
@@ -124,8 +137,8 @@ def _cells(row: Mapping[str, Any]) -> Sequence[str]:
         _mean_sd(b),
         _number(row["difference"]),
         _interval(row["interval"], _number),
-        _signed(row["g"]),
-        _interval(row["g_interval"], _signed),
+        _effect(row["g"]),
+        _interval(row["g_interval"], _effect),
         p_text(row["p"]),
         p_text(row["p_family"]),
     )
@@ -156,8 +169,8 @@ def _number(value: float | None) -> str:
     return _NONE if value is None else f"{value:.3g}"
 
 
-def _signed(value: float | None) -> str:
-    return _NONE if value is None else f"{value:.1f}"
+def _effect(value: float | None) -> str:
+    return _NONE if value is None else f"{round(value, 1) + 0.0:.1f}"
 
 
 def _sizes(document: Mapping[str, Any]) -> tuple[int, int]:
