@@ -20,13 +20,19 @@ class _TwoSets(click.Command):
         """Write --against before each word of its set, as click wants it."""
         written: list[str] = []
         within = False
-        for at, word in enumerate(args):
-            if word == _AGAINST and at + 1 < len(args) and not args[at + 1].startswith("-"):
+        for word, following in zip(args, [*args[1:], "-o"], strict=True):
+            if word == _AGAINST:
+                if _is_option(following):
+                    raise click.UsageError(f"{_AGAINST} needs the trials of set B.", ctx)
                 within = True
                 continue
-            within = within and not word.startswith("-")
+            within = within and not _is_option(word)
             written += [_AGAINST, word] if within else [word]
         return super().parse_args(ctx, written)
+
+
+def _is_option(word: str) -> bool:
+    return word.startswith("-") and word != "-"
 
 
 @click.command("compare", cls=_TwoSets)
