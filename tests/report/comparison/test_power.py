@@ -65,3 +65,27 @@ def test_what_cannot_be_asked_is_refused(ask, says):
     """No trial on a side, no spread, certainty."""
     with pytest.raises(InputError, match=says):
         ask()
+
+
+def test_the_table_of_the_documentation_is_what_is_computed(repository):
+    """Smallest p and effects of each number of trials; how often they are found is measured."""
+    text = (repository / "docs" / "compare.md").read_text(encoding="utf-8")
+    _, _, table = text.partition("| trials a side |")
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]]
+        for line in table.splitlines()[2:]
+        if line.startswith("| ")
+    ]
+
+    assert len(rows) == 8
+    for n, least, by_t, one, _, among, _ in rows:
+        size = int(n)
+        level = attainable_level(size, size)
+        assert float(least) == pytest.approx(smallest_p(size, size), rel=0.05)
+        assert float(by_t) == pytest.approx(detectable_effect(size, size), abs=0.051)
+        if level:
+            alone, together = (detectable_effect(size, size, alpha=level / m) for m in (1, 20))
+            assert float(one) == pytest.approx(alone, abs=0.051)
+            assert float(among) == pytest.approx(together, abs=0.051)
+        else:
+            assert (one, among) == ("none", "none")
