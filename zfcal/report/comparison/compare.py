@@ -18,7 +18,7 @@ from zfcal.report.comparison.gathering import check_apart, read_values
 from zfcal.report.comparison.picture import comparison_picture
 from zfcal.report.figures.panels import compose, png_of
 from zfcal.report.gather import Damage, input_files
-from zfcal.report.page import labels_of
+from zfcal.report.labels import labels_of
 
 Kind = Literal["png", "svg"]
 
