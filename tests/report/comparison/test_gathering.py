@@ -183,6 +183,8 @@ def test_what_the_sets_differ_in_besides_is_said(make_view):
     (within,) = warnings_of([one, two], [replace(one, label="c"), replace(two, label="d")])
     assert "A has 15 Hz and 30 Hz" in within
     assert warnings_of([one], [replace(one, label="c")]) == []
+    unscored = values_of(replace(view, courses={}, label="d"), {})
+    assert warnings_of([one], [unscored]) == []
 
 
 def test_other_tanks_and_other_numbers_of_fish_are_said(make_view, arenas):

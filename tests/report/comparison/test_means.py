@@ -98,6 +98,8 @@ def test_windows_do_not_lengthen_what_is_cut_in_them(two_rooms, wander):
     found = means_of(two_rooms, *parts)
 
     assert found["W_m"] == pytest.approx((first["W_m"] + second["W_m"]) / 2)
+    # No step leads from one window into the next, where these fish jump.
+    assert found["V_m_s"] == pytest.approx((first["V_m_s"] + second["V_m_s"]) / 2)
     low, high = sorted((first["residence_s"], second["residence_s"]))
     assert low <= found["residence_s"] <= high
 

@@ -181,7 +181,7 @@ def missing_of(trial: TrialValues, rows: Sequence[Quantity]) -> list[Missing]:
     found: dict[str, list[str]] = {}
     for row in rows:
         if row.name not in trial.values:
-            why = trial.why.get(row.group, "nothing was observed")
+            why = trial.why.get(row.group, "there is nothing of the kind in its tracks")
             found.setdefault(why, []).append(row.name)
     return [Missing(trial=trial.label, names=tuple(names), why=why) for why, names in found.items()]
 
@@ -194,10 +194,11 @@ def warnings_of(a: Sequence[TrialValues], b: Sequence[TrialValues]) -> list[str]
             sorted({trial.conditions[what] for trial in side if what in trial.conditions})
             for side in (a, b)
         )
-        if one != other or len(one) > 1:
+        # Where a side has no scores at all there is nothing to compare, which is said elsewhere.
+        if one and other and (one != other or len(one) > 1):
             said.append(
-                f"Trials differ in {what}: A has {' and '.join(one) or 'none'}, B "
-                f"{' and '.join(other) or 'none'}. What the sets differ in may come from that."
+                f"Trials differ in {what}: A has {' and '.join(one)}, B {' and '.join(other)}. "
+                "What the sets differ in may come from that."
             )
     return [*said, *_same_tracks([*a, *b])]
 
