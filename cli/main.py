@@ -38,6 +38,7 @@ COMMANDS = {
     "watch": "watch",
     "diagnose": "diagnose",
     "extend": "extend",
+    "compare": "compare",
     "report": "report",
     "reproduce": "reproduce",
     "export": "export",

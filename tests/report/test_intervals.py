@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from zfcal.report.intervals import interval_tables, intervals_csv, intervals_of, published_s
-from zfcal.report.page import labels_of
+from zfcal.report.labels import labels_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL
 
 

@@ -41,6 +41,7 @@ from zfcal.report.views import (
 from zfcal.trial import Trial
 
 Damage = Callable[[DamagedError], None]
+Watch = Callable[[Located], None]
 
 _POOLED_KEY = "robot_pooled_from_s"
 """Extra metadata of the scores: from when on the robot is judged."""
@@ -114,7 +115,9 @@ def _can_be_opened(path: Path) -> bool:
     return True
 
 
-def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
+def gather(
+    root: Path, on_damage: Damage, *, alone: bool = True, watch: Watch | None = None
+) -> TrialView:
     """Read all that the report shows of a trial.
 
     Parameters
@@ -126,6 +129,8 @@ def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
     alone
         Whether the report is of this trial alone; one of several shows nothing of
         what the models do, which is then not simulated.
+    watch
+        Is shown where everybody was, segment by segment, so that tracks are read once.
 
     Raises
     ------
@@ -140,7 +145,7 @@ def gather(root: Path, on_damage: Damage, *, alone: bool = True) -> TrialView:
         r for second, path in reader.files("models", ".toml") if (r := _round(reader, second, path))
     ]
     calibrated = next((r for r in reversed(rounds) if r.second > 0), None)
-    seen = see(_stretches(reader))
+    seen = see(_stretches(reader, watch))
     counted = _statistics(reader, None if calibrated is None else calibrated.second)
     return TrialView(
         root=root,
@@ -287,14 +292,17 @@ def _named(said: Any) -> tuple[Mark | None, tuple[str, ...]]:
     return Mark(value=value, low=low, high=high, ceiling=ceiling), tuple(said.get("of", ()))
 
 
-def _stretches(reader: _Reader) -> Iterator[Located]:
+def _stretches(reader: _Reader, watch: Watch | None) -> Iterator[Located]:
     """Yield where everybody was, for each segment that can be read."""
     trial = reader.trial
     for start_s in segment_starts(trial.root):
         path = segment_path(trial.root, start_s)
         read = reader.attempt(path, lambda p: read_segment(trial, int(p.stem)))
         if read is not None:
-            yield locate(read[1], reader.arena)
+            located = locate(read[1], reader.arena)
+            if watch is not None:
+                watch(located)
+            yield located
 
 
 def _pooled_from(reader: _Reader) -> int:

@@ -21,6 +21,7 @@ from zfcal.report.figures.panels import Picture, write_picture
 from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
+from zfcal.report.labels import labels_of
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
 from zfcal.report.views import TrialView
@@ -166,20 +167,6 @@ def _lineage(roots: Sequence[Path], place: _Place) -> Lineage:
         options={"trials": names},
         inputs=hash_inputs(place.base, files),
     )
-
-
-def labels_of(roots: Sequence[Path]) -> list[str]:
-    """Return what trials are called: the end of each path that tells all of them apart.
-
-    >>> labels_of([Path("a/trial"), Path("b/trial")])
-    ['a/trial', 'b/trial']
-    """
-    parts = [root.resolve().parts for root in roots]
-    for n in range(1, max(map(len, parts)) + 1):
-        labels = ["/".join(each[-n:]) for each in parts]
-        if len(set(labels)) == len(labels):
-            break
-    return labels
 
 
 def _check_one_arena(views: Sequence[TrialView]) -> None:
