@@ -17,7 +17,7 @@ from zfcal.artifacts.models import read_model, read_result
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import find_trial, read_trial
-from zfcal.artifacts.tables import RULES, SCORES, STATS, TRACKS, read_table
+from zfcal.artifacts.tables import FOLLOWING, RULES, SCORES, STATS, TRACKS, read_table
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters
@@ -115,6 +115,27 @@ class TrialTables:
         """
         hint = f"First: zfcal analyse {self.root}"
         return _joined(self._numbered("stats", ".parquet"), STATS, self.root / "stats", hint)
+
+    def following(self) -> pd.DataFrame:
+        """Return what the robot makes the fish do: one row per window, measure and lag.
+
+        Returns
+        -------
+        DataFrame
+            ``window_end_s``, ``measure`` (such as ``direction``), ``lag_s`` (missing for what is of
+            no lag), ``value``, ``low``, ``high`` and ``ceiling`` (fish in the robot's place),
+            ``floor`` (what chance gives) and ``n``.
+
+        Raises
+        ------
+        InputError
+            There are none: the trial has no robot, or was not analysed since.
+        DamagedError
+            A file is damaged.
+        """
+        hint = f"First: zfcal analyse {self.root}; a trial without a robot has none."
+        paths = self._numbered("stats", "-following.parquet")
+        return _joined(paths, FOLLOWING, self.root / "stats", hint)
 
     def scores(self) -> pd.DataFrame:
         """Return all scores: one row per window, comparison, feature and zone.

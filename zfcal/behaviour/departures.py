@@ -1,0 +1,238 @@
+"""Who leaves a room first, and whether the others follow.
+
+After Collignon et al. 2019 (Collective departures and leadership in zebrafish, PLoS ONE 14(5)
+e0216798), in which fish go to and fro between two rooms. Arrays alone: which room a point is in
+says the arena.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from zfcal.arrays import Floats, Indices, Ints
+from zfcal.behaviour.following import Measured, floor_of, measured
+
+FOLLOW_S = 10.0
+"""Whoever leaves for the same room within it has followed."""
+
+LED, FOLLOWED = "departures_led", "departures_followed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rooms:
+    """In which rooms some agents were.
+
+    Parameters
+    ----------
+    room : ndarray of int, shape (frame, agent)
+        The number of the room, from 1; 0 where an agent is between rooms, or lost.
+    who : ndarray of int, shape (frame, agent)
+        Under which id an agent is known; negative where it is lost.
+    """
+
+    room: Ints
+    who: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crossing:
+    """An agent's way from one room to another.
+
+    Parameters
+    ----------
+    agent
+        Its column.
+    left, arrived
+        The last frame in the one room and the first in the other.
+    start, end
+        The two rooms.
+    """
+
+    agent: int
+    left: int
+    arrived: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Departure:
+    """The first to leave a group that is together in a room.
+
+    Parameters
+    ----------
+    leaders
+        Columns of those who left first: several where they did at the same frame.
+    followed
+        Whether at least half of the others who were there have left for the same room in time.
+    """
+
+    leaders: tuple[int, ...]
+    followed: bool
+
+
+def crossings(room: Ints, who: Ints | None = None, *, seam: int = 0) -> list[Crossing]:
+    """Return all crossings, in the order in which rooms were left.
+
+    Parameters
+    ----------
+    room : ndarray of int, shape (frame, agent)
+        The number of the room, from 1; 0 where an agent is between rooms, or lost.
+    who : ndarray of int, shape (frame, agent)
+        Under which id an agent is known; None for one throughout. A way that ends under
+        another id than it began is none.
+    seam
+        A frame at which two pieces of time were put together; no way leads over it.
+    """
+    found = []
+    for agent in range(room.shape[1]):
+        frames = np.flatnonzero(room[:, agent])
+        visited = room[frames, agent]
+        for i in np.flatnonzero(visited[1:] != visited[:-1]):
+            left, arrived = int(frames[i]), int(frames[i + 1])
+            same = who is None or who[left, agent] == who[arrived, agent]
+            if same and not left < seam <= arrived:
+                rooms = int(visited[i]), int(visited[i + 1])
+                found.append(
+                    Crossing(agent=agent, left=left, arrived=arrived, start=rooms[0], end=rooms[1])
+                )
+    return sorted(found, key=lambda one: (one.left, one.agent))
+
+
+def last_room(room: Ints) -> Ints:
+    """Return the room in which each agent was last, shape (frame, agent); 0 for none so far."""
+    frame = np.where(room > 0, np.arange(len(room))[:, None], 0)
+    latest = np.maximum.accumulate(frame, axis=0)
+    return np.asarray(np.take_along_axis(room, latest, axis=0))
+
+
+def departures(ways: Sequence[Crossing], last: Ints, *, dt_s: float) -> list[Departure]:
+    """Return who left a group first, in the order of time.
+
+    Parameters
+    ----------
+    ways
+        The crossings, as `crossings` returns them.
+    last : ndarray of int, shape (frame, agent)
+        As `last_room` returns it.
+    dt_s
+        Time between two frames.
+
+    Returns
+    -------
+    list of Departure
+        One who leaves up to `FOLLOW_S` after another, for the same room, follows and starts none;
+        nor does one who leaves when less than half of the others are in the same room. Those
+        so near to the start or the end that others could have left before it, or after it, are
+        left out.
+    """
+    wait = int(FOLLOW_S / dt_s + 1e-6)
+    found: list[Departure] = []
+    begun: list[Crossing] = []
+    for way in ways:
+        if any(_follows(way, first, wait) for first in begun):
+            continue
+        begun.append(way)
+        there = np.flatnonzero(last[way.left] == way.start)
+        others = [int(agent) for agent in there if agent != way.agent]
+        n_known = int((last[way.left] > 0).sum()) - 1
+        in_time = wait <= way.left < len(last) - wait
+        if not others or 2 * len(others) < n_known or not in_time:
+            continue
+        after = [one for one in ways if one.agent in others and _follows(one, way, wait)]
+        ties = [one.agent for one in after if one.left == way.left]
+        n_followed = len({one.agent for one in after})
+        found.append(Departure(leaders=(way.agent, *ties), followed=2 * n_followed >= len(others)))
+    return found
+
+
+def _follows(way: Crossing, first: Crossing, wait: int) -> bool:
+    same = (way.start, way.end) == (first.start, first.end)
+    return same and 0 <= way.left - first.left <= wait
+
+
+def shares_of(found: Sequence[Departure], agents: Sequence[int]) -> tuple[float, float, int, int]:
+    """Return how often some agents lead.
+
+    Parameters
+    ----------
+    found
+        The departures of a group.
+    agents
+        Columns of those who count as one.
+
+    Returns
+    -------
+    led, followed : float
+        The share of the group's departures that they led (of one with several leaders a part),
+        and the share of their own attempts that were followed; NaN of nothing.
+    n_led, n_followed : int
+        Of how many.
+    """
+    chosen = set(agents)
+    group = [one for one in found if one.followed]
+    own = [one for one in found if chosen.intersection(one.leaders)]
+    led = sum(len(chosen.intersection(one.leaders)) / len(one.leaders) for one in group)
+    followed = sum(one.followed for one in own)
+    return (
+        led / len(group) if group else np.nan,
+        followed / len(own) if own else np.nan,
+        len(group),
+        len(own),
+    )
+
+
+def measure_departures(
+    robots: Rooms, fish: Rooms, *, dt_s: float, shifts: Ints, places: Indices
+) -> list[Measured]:
+    """Measure how often the robots lead out of a room, with ceiling and floor.
+
+    Parameters
+    ----------
+    robots, fish
+        Over the same frames. Several robots count as one.
+    dt_s
+        Time between two frames.
+    shifts
+        By how many frames the robots are shifted for the floor.
+    places
+        The fish that are put in the robot's place, among the fish alone.
+
+    Returns
+    -------
+    list of Measured
+        ``departures_led`` and ``departures_followed``; NaN where there is none, and where no
+        robot was seen.
+    """
+    if not (robots.who >= 0).any():
+        return [Measured(measure=name, value=np.nan) for name in (LED, FOLLOWED)]
+    n_robots = robots.room.shape[1]
+    columns = range(n_robots)
+    fish_ways = crossings(fish.room, fish.who)
+    later = [replace(way, agent=way.agent + n_robots) for way in fish_ways]
+    fish_last = last_room(fish.room)
+
+    def of_robots(shift: int) -> tuple[float, float, int, int]:
+        room = np.roll(robots.room, shift, axis=0)
+        ways = crossings(room, np.roll(robots.who, shift, axis=0), seam=shift)
+        together = sorted([*ways, *later], key=lambda one: (one.left, one.agent))
+        last = np.hstack([last_room(room), fish_last])
+        return shares_of(departures(together, last, dt_s=dt_s), columns)
+
+    led, followed, n_led, n_followed = of_robots(0)
+    among_fish = departures(fish_ways, fish_last, dt_s=dt_s)
+    in_place = [shares_of(among_fish, [int(place)])[:2] for place in places]
+    chance = [of_robots(int(shift))[:2] for shift in shifts]
+    return measured(
+        [(LED, np.nan, n_led), (FOLLOWED, np.nan, n_followed)],
+        np.array([led, followed]),
+        in_place=_table(in_place),
+        floor=floor_of(_table(chance)),
+    )
+
+
+def _table(rows: Sequence[tuple[float, float]]) -> Floats:
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
