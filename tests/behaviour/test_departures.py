@@ -7,6 +7,7 @@ from zfcal.behaviour.departures import (
     Crossing,
     Departure,
     Rooms,
+    at_other_time,
     crossings,
     departures,
     last_room,
@@ -57,11 +58,11 @@ def test_under_another_id_nobody_has_crossed():
     assert len(crossings(room, np.array([4, -1, 4])[:, None])) == 1
 
 
-def test_no_way_leads_over_a_seam():
-    """Where two pieces of time were put together nobody moved."""
-    room = np.array([1, 1, 2, 2])[:, None]
-    assert crossings(room, seam=2) == []
-    assert len(crossings(room, seam=1)) == 1
+def test_at_another_time_no_way_leads_from_the_end_to_the_start():
+    """Where two pieces of time are put together nobody moved."""
+    way = Crossing(agent=0, left=6, arrived=8, start=1, end=2)
+    assert at_other_time([way], 3, 10) == []
+    assert at_other_time([way], 5, 10) == [Crossing(agent=0, left=1, arrived=3, start=1, end=2)]
 
 
 def test_who_leaves_first_leads_those_who_come_after():

@@ -74,7 +74,7 @@ class Departure:
     followed: bool
 
 
-def crossings(room: Ints, who: Ints | None = None, *, seam: int = 0) -> list[Crossing]:
+def crossings(room: Ints, who: Ints | None = None) -> list[Crossing]:
     """Return all crossings, in the order in which rooms were left.
 
     Parameters
@@ -84,8 +84,6 @@ def crossings(room: Ints, who: Ints | None = None, *, seam: int = 0) -> list[Cro
     who : ndarray of int, shape (frame, agent)
         Under which id an agent is known; None for one throughout. A way that ends under
         another id than it began is none.
-    seam
-        A frame at which two pieces of time were put together; no way leads over it.
     """
     found = []
     for agent in range(room.shape[1]):
@@ -94,12 +92,24 @@ def crossings(room: Ints, who: Ints | None = None, *, seam: int = 0) -> list[Cro
         for i in np.flatnonzero(visited[1:] != visited[:-1]):
             left, arrived = int(frames[i]), int(frames[i + 1])
             same = who is None or who[left, agent] == who[arrived, agent]
-            if same and not left < seam <= arrived:
+            if same:
                 rooms = int(visited[i]), int(visited[i + 1])
                 found.append(
                     Crossing(agent=agent, left=left, arrived=arrived, start=rooms[0], end=rooms[1])
                 )
-    return sorted(found, key=lambda one: (one.left, one.agent))
+    return sorted(found, key=_in_order)
+
+
+def at_other_time(ways: Sequence[Crossing], shift: int, n_frames: int) -> list[Crossing]:
+    """Return crossings later by some frames; what leaves at the end comes in at the start.
+
+    A way that would lead from the end to the start is left out.
+    """
+    moved = [
+        replace(one, left=(one.left + shift) % n_frames, arrived=(one.arrived + shift) % n_frames)
+        for one in ways
+    ]
+    return [one for one in moved if one.left < one.arrived]
 
 
 def last_room(room: Ints) -> Ints:
@@ -147,6 +157,10 @@ def departures(ways: Sequence[Crossing], last: Ints, *, dt_s: float) -> list[Dep
         n_followed = len({one.agent for one in after})
         found.append(Departure(leaders=(way.agent, *ties), followed=2 * n_followed >= len(others)))
     return found
+
+
+def _in_order(way: Crossing) -> tuple[int, int]:
+    return way.left, way.agent
 
 
 def _follows(way: Crossing, first: Crossing, wait: int) -> bool:
@@ -209,18 +223,19 @@ def measure_departures(
     """
     if not (robots.who >= 0).any():
         return [Measured(measure=name, value=np.nan) for name in (LED, FOLLOWED)]
-    n_robots = robots.room.shape[1]
-    columns = range(n_robots)
-    fish_ways = crossings(fish.room, fish.who)
-    later = [replace(way, agent=way.agent + n_robots) for way in fish_ways]
-    fish_last = last_room(fish.room)
+    n_frames, n_robots = robots.room.shape
+    fish_ways, fish_last = crossings(fish.room, fish.who), last_room(fish.room)
+    behind = [replace(way, agent=way.agent + n_robots) for way in fish_ways]
+    own_ways, own_last = crossings(robots.room, robots.who), last_room(robots.room)
+    # Where a shifted robot was last may have been in the lap before.
+    laps = last_room(np.vstack([robots.room, robots.room]))
 
     def of_robots(shift: int) -> tuple[float, float, int, int]:
-        room = np.roll(robots.room, shift, axis=0)
-        ways = crossings(room, np.roll(robots.who, shift, axis=0), seam=shift)
-        together = sorted([*ways, *later], key=lambda one: (one.left, one.agent))
-        last = np.hstack([last_room(room), fish_last])
-        return shares_of(departures(together, last, dt_s=dt_s), columns)
+        ways = at_other_time(own_ways, shift, n_frames)
+        last = laps[n_frames - shift : 2 * n_frames - shift] if shift else own_last
+        together = sorted([*ways, *behind], key=_in_order)
+        found = departures(together, np.hstack([last, fish_last]), dt_s=dt_s)
+        return shares_of(found, range(n_robots))
 
     led, followed, n_led, n_followed = of_robots(0)
     among_fish = departures(fish_ways, fish_last, dt_s=dt_s)

@@ -253,7 +253,7 @@ def correlate(leaders: Paths, others: Paths, *, dt_s: float, apart: bool = False
     if apart:
         both = np.arange(near.shape[0])
         near[both, both] = False
-    total, n = _sums(_by_agent(leaders.direction), _by_agent(others.direction), near, lags)
+    total, n = _sums(leaders.direction, others.direction, near, lags)
     value = np.where(n > 0, total / np.where(n > 0, n, 1.0), np.nan)
     return Correlations(
         lag_s=np.asarray(lags * dt_s, dtype=np.float64), value=value, n=n.round().astype(np.int64)
@@ -417,47 +417,48 @@ def _row_of(found: Correlations) -> Floats:
     return np.column_stack([found.value, found.following, found.lead, found.delay_s])
 
 
-def _by_agent(values: Floats) -> Floats:
-    return np.ascontiguousarray(np.moveaxis(values, 0, 1))
-
-
 def _near(leaders_m: Floats, others_m: Floats) -> Bools:
     """Return who is within range of whom, shape (leader, other, frame); False where one is lost."""
-    x, y = (
-        _by_agent(leaders_m[..., i])[:, None] - _by_agent(others_m[..., i])[None] for i in (0, 1)
-    )
+    first, second = _by_agent(leaders_m), _by_agent(others_m)
+    x, y = (first[:, None, i] - second[:, i] for i in (0, 1))
     return np.asarray(x * x + y * y <= RANGE_M * RANGE_M)
 
 
-def _sums(first: Floats, second: Floats, near: Bools, lags: Ints) -> tuple[Floats, Floats]:
+def _sums(leaders: Floats, others: Floats, near: Bools, lags: Ints) -> tuple[Floats, Floats]:
     """Return sums of cosines, and their number, shape (leader, lag), over all others.
 
-    ``first`` and ``second`` are directions, shape (agent, frame, 2).
+    Directions have the shape (frame, agent, 2).
     """
-    n_frames, most = first.shape[1], len(lags) // 2
-    kind = first.dtype
-    known = [~np.isnan(each[..., 0]) for each in (first, second)]
-    u, v = (np.where(k[..., None], each, 0) for each, k in zip((first, second), known, strict=True))
-    known_u, known_v = (k.astype(kind) for k in known)
+    n_frames, most = len(leaders), len(lags) // 2
+    (u, has_u), (v, has_v) = _filled(leaders), _filled(others)
     # A pair counts while it was near at the earlier moment, when the one who is ahead moved.
-    ahead = (near & known[0][:, None]).astype(kind)
-    u_ahead = ahead[..., None] * u[:, None]
-    # Where an other is ahead, all others can be added up before they are set against a leader.
-    behind = near.astype(kind)
-    v_ahead, n_ahead = (
-        np.einsum("ijt,jtx->itx", behind, v),
-        np.einsum("ijt,jt->it", behind, known_v),
-    )
-    total, n = np.zeros((len(first), len(lags))), np.zeros((len(first), len(lags)))
+    ahead = near * has_u[:, None]
+    u_ahead = ahead[:, :, None] * u[:, None]
+    # Where others are ahead they can be added up before they are set against a leader.
+    v_ahead = np.einsum("ijt,jxt->ixt", near.astype(v.dtype), v)
+    n_ahead = np.einsum("ijt,jt->it", near.astype(v.dtype), has_v)
+    total, n = np.zeros((len(u), len(lags))), np.zeros((len(u), len(lags)))
     for lag in range(min(most + 1, n_frames)):
         then, later = slice(n_frames - lag), slice(lag, None)
         plus, minus = most + lag, most - lag
-        total[:, plus] = np.einsum("ijtx,jtx->i", u_ahead[:, :, then], v[:, later])
-        n[:, plus] = np.einsum("ijt,jt->i", ahead[:, :, then], known_v[:, later])
+        total[:, plus] = np.einsum("ijxt,jxt->i", u_ahead[..., then], v[..., later])
+        n[:, plus] = np.einsum("ijt,jt->i", ahead[..., then], has_v[..., later])
         if lag:
-            total[:, minus] = np.einsum("itx,itx->i", v_ahead[:, then], u[:, later])
-            n[:, minus] = np.einsum("it,it->i", n_ahead[:, then], known_u[:, later])
+            total[:, minus] = np.einsum("ixt,ixt->i", v_ahead[..., then], u[..., later])
+            n[:, minus] = np.einsum("it,it->i", n_ahead[..., then], has_u[..., later])
     return total, n
+
+
+def _by_agent(values: Floats) -> Floats:
+    """Return (frame, agent, xy) as (agent, xy, frame): what is added up lies side by side."""
+    return np.ascontiguousarray(np.moveaxis(values, 0, -1))
+
+
+def _filled(direction: Floats) -> tuple[Floats, Floats]:
+    """Return directions with 0 for an unknown one, (agent, xy, frame), and 1 where it is known."""
+    turned = _by_agent(direction)
+    known = turned[:, 0] == turned[:, 0]
+    return np.where(known[:, None], turned, turned.dtype.type(0)), known.astype(turned.dtype)
 
 
 def _mean(values: Floats) -> Floats:
