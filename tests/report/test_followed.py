@@ -112,9 +112,9 @@ def test_a_robot_that_was_never_near_is_said(make_view):
 
 def test_what_was_not_measured_is_a_gap(make_view):
     """With the command that makes it; without a robot there is nothing to make."""
-    assert followed_gap(make_view()).command == "zfcal analyse trial"
+    assert followed_gap(make_view(following=None)).command == "zfcal analyse trial"
     assert followed_gap(make_view(following=found_of([0.1]))) is None
-    assert followed_gap(make_view(statistics={})) is None
+    assert followed_gap(make_view(following=None, statistics={})) is None
 
 
 def test_the_picture_says_what_is_to_be_seen(covered_texts):
