@@ -42,7 +42,7 @@ def _follow(found: Followed, level: Level) -> str:
         chance = (
             f" Its track at other times of the fish gives up to {level.floor:.2f} by chance; "
             f"above that it is in {level.n_above} of {_windows(level.n_windows)}, where chance "
-            "alone would be in one of 20."
+            "alone is in one of 20."
         )
     return (
         f"From {found.start_s / 60:g} to {found.end_s / 60:g} min fish near the robot swim where "
@@ -73,6 +73,8 @@ def _departures(found: Followed) -> str:
     if not led.n:
         return "The group did not leave a room together."
     text = f"Of the group's departures from a room it led {_share(led)}{_in_place(led)}"
+    if not math.isnan(led.floor):
+        text += f"; at other times of the fish it would lead up to {led.floor:.2f} by chance"
     if own.n:
         text += f"; {_share(own)} of its own were followed{_in_place(own)}"
     return text + "."
