@@ -10,9 +10,9 @@ from zfcal.behaviour.following import (
     directions,
     lags_of,
     measure_following,
-    quantile_of,
     shifts_of,
 )
+from zfcal.behaviour.measured import quantile_of
 from zfcal.errors import InputError
 
 DT_S = 0.2
@@ -112,7 +112,7 @@ def test_who_leads_whom_is_one_question(rng):
     there, back = correlate(a, b, dt_s=DT_S), correlate(b, a, dt_s=DT_S)
     np.testing.assert_allclose(there.value, back.value[:, ::-1])
     np.testing.assert_array_equal(there.n, back.n[:, ::-1])
-    assert not correlate(a, a, dt_s=DT_S, apart=True).n.any()
+    assert not correlate(a, a, dt_s=DT_S, same=np.arange(1)).n.any()
 
 
 def test_independent_walkers_are_within_chance():
@@ -147,7 +147,7 @@ def test_turning_the_tank_changes_nothing(rng):
     for a, b in zip(plain, turned, strict=True):
         pair = [[getattr(x, key) for key in ("value", "low", "high", "ceiling", "floor")]
                 for x in (a, b)]  # fmt: skip
-        np.testing.assert_allclose(*pair, atol=1e-4)
+        np.testing.assert_allclose(*pair, atol=1e-9)
         assert a.n == b.n
 
 
@@ -184,7 +184,7 @@ def test_far_away_nobody_follows(rng):
 def test_the_lead_of_all_fish_is_none(rng):
     """What one leads by another is led by: with equal numbers of pairs the mean is zero."""
     found, _ = measure(in_a_tank(rng, 1), path(rng) + rng.normal(0, 0.01, (1, 3, 2)))
-    assert found["lead"].ceiling == pytest.approx(0.0, abs=1e-5)
+    assert found["lead"].ceiling == pytest.approx(0.0, abs=1e-12)
 
 
 def test_shifts_are_large_and_many():

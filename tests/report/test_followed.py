@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from zfcal.behaviour.following import Measured
 from zfcal.behaviour.influence import influence_to_rows
+from zfcal.behaviour.measured import Measured
 from zfcal.report.figures.followed import followed_picture
 from zfcal.report.followed import DELAY, DIRECTION, FOLLOWING, LEAD, LED, followed_from
 from zfcal.report.followed_words import followed_gap, followed_statement

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
 from zfcal.arrays import Floats, Indices, Ints
-from zfcal.behaviour.following import Measured, floor_of, measured
+from zfcal.behaviour.measured import Measured, floor_of, measured
 
 FOLLOW_S = 10.0
 """Whoever leaves for the same room within it has followed."""
@@ -141,31 +142,35 @@ def departures(ways: Sequence[Crossing], last: Ints, *, dt_s: float) -> list[Dep
     """
     wait = int(FOLLOW_S / dt_s + 1e-6)
     found: list[Departure] = []
-    begun: list[Crossing] = []
-    for way in ways:
-        if any(_follows(way, first, wait) for first in begun):
+    begun: dict[tuple[int, int], int] = {}
+    for number, way in enumerate(ways):
+        rooms = way.start, way.end
+        if rooms in begun and way.left - begun[rooms] <= wait:
             continue
-        begun.append(way)
-        there = np.flatnonzero(last[way.left] == way.start)
-        others = [int(agent) for agent in there if agent != way.agent]
-        n_known = int((last[way.left] > 0).sum()) - 1
+        begun[rooms] = way.left
+        last_of = last[way.left].tolist()
+        there = {a for a, room in enumerate(last_of) if room == way.start and a != way.agent}
+        n_others = sum(room > 0 for room in last_of) - 1
         in_time = wait <= way.left < len(last) - wait
-        if not others or 2 * len(others) < n_known or not in_time:
-            continue
-        after = [one for one in ways if one.agent in others and _follows(one, way, wait)]
-        ties = [one.agent for one in after if one.left == way.left]
-        n_followed = len({one.agent for one in after})
-        found.append(Departure(leaders=(way.agent, *ties), followed=2 * n_followed >= len(others)))
+        if there and 2 * len(there) >= n_others and in_time:
+            found.append(_departure(ways[number:], there, wait))
     return found
+
+
+def _departure(ways: Sequence[Crossing], there: set[int], wait: int) -> Departure:
+    """Return the departure that the first of some ways begins, with those who were there."""
+    first = ways[0]
+    leaders, after = [first.agent], set()
+    for way in takewhile(lambda one: one.left - first.left <= wait, ways):
+        if way.agent in there and (way.start, way.end) == (first.start, first.end):
+            after.add(way.agent)
+            if way.left == first.left:
+                leaders.append(way.agent)
+    return Departure(leaders=tuple(leaders), followed=2 * len(after) >= len(there))
 
 
 def _in_order(way: Crossing) -> tuple[int, int]:
     return way.left, way.agent
-
-
-def _follows(way: Crossing, first: Crossing, wait: int) -> bool:
-    same = (way.start, way.end) == (first.start, first.end)
-    return same and 0 <= way.left - first.left <= wait
 
 
 def shares_of(found: Sequence[Departure], agents: Sequence[int]) -> tuple[float, float, int, int]:

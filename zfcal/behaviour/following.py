@@ -10,12 +10,12 @@ room first in `departures`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from zfcal.arrays import Bools, Floats, Indices, Ints
+from zfcal.behaviour.measured import Measured, floor_of, measured
 from zfcal.errors import InputError
 
 RANGE_M = 0.15
@@ -32,9 +32,6 @@ N_SHIFTS = 19
 
 SHIFT_MIN_S = 10.0
 """Behaviour so long ago does not bear on what a fish does now."""
-
-CHANCE = 0.95
-"""Quantile of the shifted tracks that is the floor."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,10 +52,8 @@ class Correlations:
     value: Floats
     n: Ints
 
-    def of_leaders(self, chosen: Indices | None) -> Correlations:
-        """Return the chosen leaders; all for None."""
-        if chosen is None:
-            return self
+    def of_leaders(self, chosen: Indices | slice) -> Correlations:
+        """Return the chosen leaders."""
         return Correlations(lag_s=self.lag_s, value=self.value[chosen], n=self.n[chosen])
 
     @property
@@ -81,38 +76,6 @@ class Correlations:
         """The lag of the highest value, (leader,): Nagy's directional correlation delay."""
         at = np.where(np.isnan(self.value), -np.inf, self.value).argmax(axis=1)
         return np.where(np.isnan(self.peak), np.nan, self.lag_s[at])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """A measure of the robot, with its ceiling and its floor; NaN where one is not defined.
-
-    Parameters
-    ----------
-    measure
-        Its name.
-    lag_s
-        The lag that it is of; NaN for none.
-    value
-        Of the robot.
-    low, high
-        2.5 and 97.5 % quantiles over the fish, each in the robot's place.
-    ceiling
-        Their mean.
-    floor
-        95 % quantile of what the robot's track gives against another time of the fish.
-    n
-        On how many observations the value stands; None where it is not defined.
-    """
-
-    measure: str
-    value: float
-    lag_s: float = float("nan")
-    low: float = float("nan")
-    high: float = float("nan")
-    ceiling: float = float("nan")
-    floor: float = float("nan")
-    n: int | None = 0
 
 
 def directions(xy_m: Floats, unbroken: Bools | None = None) -> Floats:
@@ -168,20 +131,31 @@ class Paths:
             raise InputError(f"Positions have the shape (frame, agent, xy), got {xy_m.shape}.")
         return cls(xy_m=xy_m, direction=directions(xy_m, unbroken))
 
-    def in_single(self) -> Paths:
-        """Return them in single precision."""
-        return Paths(xy_m=_single(self.xy_m), direction=_single(self.direction))
-
     def at_other_times(self, shifts: Ints) -> Paths:
-        """Return them later by some numbers of frames, in single precision.
+        """Return them later by some numbers of frames.
 
         What leaves at the end comes in at the start. The agents of the first shift come first.
         """
         n_frames = len(self)
+        n_moved = len(shifts) * self.xy_m.shape[1]
         frame = (np.arange(n_frames)[:, None] - shifts) % max(n_frames, 1)
-        parts = (_single(part)[frame] for part in (self.xy_m, self.direction))
-        xy_m, direction = (part.reshape(n_frames, -1, 2) for part in parts)
+        parts = (part[frame] for part in (self.xy_m, self.direction))
+        xy_m, direction = (part.reshape(n_frames, n_moved, 2) for part in parts)
         return Paths(xy_m=xy_m, direction=direction)
+
+    def and_also(self, others: Paths) -> Paths:
+        """Return them with others behind them.
+
+        Raises
+        ------
+        InputError
+            The numbers of frames differ.
+        """
+        _check_frames(self, others)
+        return Paths(
+            xy_m=np.concatenate([self.xy_m, others.xy_m], axis=1),
+            direction=np.concatenate([self.direction, others.direction], axis=1),
+        )
 
     def __len__(self) -> int:
         """Return how many frames there are."""
@@ -196,9 +170,7 @@ def lags_of(dt_s: float) -> Ints:
     InputError
         The step is no positive time.
     """
-    if not 0 < dt_s < np.inf:
-        raise InputError(f"The step dt_s must be a positive time in seconds, got {dt_s!r}.")
-    most = int(LAG_MAX_S / dt_s + 1e-6)
+    most = int(LAG_MAX_S / _checked(dt_s) + 1e-6)
     return np.arange(-most, most + 1, dtype=np.int64)
 
 
@@ -210,14 +182,27 @@ def shifts_of(n_frames: int, dt_s: float) -> Ints:
     ndarray of int64, shape (shift,)
         Evenly spaced, each at least 10 s from no shift either way; fewer where there are not so
         many, none in a window that is too short.
+
+    Raises
+    ------
+    InputError
+        The step is no positive time.
     """
-    least = int(np.ceil(SHIFT_MIN_S / dt_s - 1e-6))
+    least = int(np.ceil(SHIFT_MIN_S / _checked(dt_s) - 1e-6))
     if n_frames <= 2 * least:
         return np.zeros(0, dtype=np.int64)
     return np.unique(np.linspace(least, n_frames - least, N_SHIFTS).round().astype(np.int64))
 
 
-def correlate(leaders: Paths, others: Paths, *, dt_s: float, apart: bool = False) -> Correlations:
+def _checked(dt_s: float) -> float:
+    if not 0 < dt_s < np.inf:
+        raise InputError(f"The step dt_s must be a positive time in seconds, got {dt_s!r}.")
+    return dt_s
+
+
+def correlate(
+    leaders: Paths, others: Paths, *, dt_s: float, same: Indices | None = None
+) -> Correlations:
     r"""Compare the directions of leaders with those of others around them, at each lag.
 
     Parameters
@@ -228,8 +213,9 @@ def correlate(leaders: Paths, others: Paths, *, dt_s: float, apart: bool = False
         Those who may follow, over the same frames. All are pooled.
     dt_s
         Time between two frames.
-    apart
-        Whether leader i is the same animal as other i, who does not follow himself.
+    same : ndarray of int, shape (other,)
+        The number of the leader that is the same animal as an other, who does not follow itself;
+        None where none is.
 
     Returns
     -------
@@ -245,30 +231,12 @@ def correlate(leaders: Paths, others: Paths, *, dt_s: float, apart: bool = False
     Nagy, Akos, Biro, Vicsek 2010, Nature 464:890.
     """
     lags = lags_of(dt_s)
-    if len(leaders) != len(others):
-        raise InputError(
-            f"Leaders have {len(leaders)} frames and the others {len(others)}, expected the same."
-        )
-    near = _near(leaders.xy_m, others.xy_m)
-    if apart:
-        both = np.arange(near.shape[0])
-        near[both, both] = False
-    total, n = _sums(leaders.direction, others.direction, near, lags)
+    _check_frames(leaders, others)
+    total, n = _sums(leaders, others, most=len(lags) // 2, same=same)
     value = np.where(n > 0, total / np.where(n > 0, n, 1.0), np.nan)
     return Correlations(
         lag_s=np.asarray(lags * dt_s, dtype=np.float64), value=value, n=n.round().astype(np.int64)
     )
-
-
-def by_chance(robots: Paths, fish: Paths, *, dt_s: float) -> Correlations:
-    """Return what `correlate` finds for robots at another time of the fish, a row per shift.
-
-    All robots count as one leader, as in `together`.
-    """
-    shifts = shifts_of(len(fish), dt_s)
-    found = correlate(robots.at_other_times(shifts), fish, dt_s=dt_s)
-    n_robots = robots.xy_m.shape[1]
-    return together(found, np.repeat(np.arange(len(shifts)), n_robots), len(shifts))
 
 
 def together(found: Correlations, group: Indices, n_groups: int) -> Correlations:
@@ -317,99 +285,39 @@ def measure_following(
     InputError
         The step is no positive time, or the frames differ in number.
     """
-    n_robots = robots.xy_m.shape[1]
-    each = correlate(robots, fish, dt_s=dt_s)
-    own = together(each, np.zeros(n_robots, dtype=np.intp), 1)
-    # Single precision: of ceiling and floor nobody reads the sixth digit.
-    single = fish.in_single()
-    alike = correlate(single, single, dt_s=dt_s, apart=True).of_leaders(places)
-    chance = by_chance(robots, single, dt_s=dt_s)
+    shifts = np.concatenate([[0], shifts_of(len(fish), dt_s)])
+    n_robots, n_fish = robots.xy_m.shape[1], fish.xy_m.shape[1]
+    n_moved = len(shifts) * n_robots
+    # All at once: the robot as it was, at other times, and the fish in its place.
+    found = correlate(
+        robots.at_other_times(shifts).and_also(fish),
+        fish,
+        dt_s=dt_s,
+        same=n_moved + np.arange(n_fish),
+    )
+    group = np.repeat(np.arange(len(shifts)), n_robots)
+    moved = together(found.of_leaders(slice(n_moved)), group, len(shifts))
+    own, chance = moved.of_leaders(slice(1)), moved.of_leaders(slice(1, None))
+    places = np.arange(n_fish) if places is None else places
+    alike = found.of_leaders(n_moved + places)
     names = [("direction", float(lag), int(n)) for lag, n in zip(own.lag_s, own.n[0], strict=True)]
     names += [(name, np.nan, int(own.n.sum())) for name in ("following", "lead", "delay")]
     value = _row_of(own)[0]
-    if not own.peak[0] > floor_of(chance.peak[:, None])[0]:
+    floor = floor_of(
+        np.column_stack([chance.value, chance.following, np.abs(chance.lead), chance.peak])
+    )
+    if not own.peak[0] > floor[-1]:
         value[-1] = np.nan
-    floor = floor_of(_row_of(chance))
-    floor[-2:] = floor_of(np.abs(chance.lead)[:, None])[0], np.nan
+    # Of a delay there is none: what stands there has decided whether there is a delay.
+    floor[-1] = np.nan
     return measured(names, value, in_place=_row_of(alike), floor=floor)
 
 
-def measured(
-    names: Sequence[tuple[str, float, int]], value: Floats, *, in_place: Floats, floor: Floats
-) -> list[Measured]:
-    """Return measures with what the fish in the robot's place give.
-
-    Parameters
-    ----------
-    names
-        For each measure its name, its lag and its number of observations.
-    value, floor : ndarray, shape (measure,)
-        Of the robot, and of chance.
-    in_place : ndarray, shape (fish, measure)
-        Of each fish in the robot's place.
-    """
-    low, high = (quantile_of(in_place, q) for q in (0.025, 0.975))
-    known = ~np.isnan(in_place)
-    n_known = known.sum(axis=0)
-    ceiling = np.where(known, in_place, 0.0).sum(axis=0) / np.where(n_known > 0, n_known, np.nan)
-    return [
-        Measured(
-            measure=measure,
-            value=float(value[i]),
-            lag_s=lag_s,
-            low=float(low[i]),
-            high=float(high[i]),
-            ceiling=float(ceiling[i]),
-            floor=float(floor[i]),
-            n=n,
+def _check_frames(leaders: Paths, others: Paths) -> None:
+    if len(leaders) != len(others):
+        raise InputError(
+            f"Leaders have {len(leaders)} frames and the others {len(others)}, expected the same."
         )
-        for i, (measure, lag_s, n) in enumerate(names)
-    ]
-
-
-def floor_of(values: Floats) -> Floats:
-    """Return what chance gives of measures: the 95 % quantile over the shifts.
-
-    Parameters
-    ----------
-    values : ndarray, shape (shift, measure)
-
-    Returns
-    -------
-    ndarray, shape (measure,)
-        One of the values, not one between two of them; NaN where no shift has any.
-    """
-    return quantile_of(values, CHANCE, between=False)
-
-
-def quantile_of(values: Floats, share: float, *, between: bool = True) -> Floats:
-    """Return a quantile of each column, NaN left out; NaN of a column without a value.
-
-    Parameters
-    ----------
-    values : ndarray, shape (row, column)
-    share
-        In [0, 1].
-    between
-        Whether it may lie between two values, rather than on the higher one of them.
-    """
-    if not len(values):
-        return np.full(values.shape[1], np.nan)
-    # NaN is sorted to the end.
-    ordered = np.sort(values, axis=0)
-    place = (np.count_nonzero(~np.isnan(values), axis=0) - 1) * share
-    low, high = (np.maximum(f(place), 0).astype(np.intp) for f in (np.floor, np.ceil))
-    columns = np.arange(values.shape[1])
-    if not between:
-        return np.asarray(ordered[high, columns], dtype=np.float64)
-    part = place - low
-    found: Floats = (1 - part) * ordered[low, columns] + part * ordered[high, columns]
-    return found
-
-
-def _single(values: Floats) -> Floats:
-    narrow: Floats = values.astype(np.float32)
-    return narrow
 
 
 def _row_of(found: Correlations) -> Floats:
@@ -417,36 +325,53 @@ def _row_of(found: Correlations) -> Floats:
     return np.column_stack([found.value, found.following, found.lead, found.delay_s])
 
 
-def _near(leaders_m: Floats, others_m: Floats) -> Bools:
-    """Return who is within range of whom, shape (leader, other, frame); False where one is lost."""
-    first, second = _by_agent(leaders_m), _by_agent(others_m)
-    x, y = (first[:, None, i] - second[:, i] for i in (0, 1))
-    return np.asarray(x * x + y * y <= RANGE_M * RANGE_M)
+def _sums(
+    leaders: Paths, others: Paths, *, most: int, same: Indices | None
+) -> tuple[Floats, Floats]:
+    """Return sums of cosines, and their number, over all others, shape (leader, lag).
 
-
-def _sums(leaders: Floats, others: Floats, near: Bools, lags: Ints) -> tuple[Floats, Floats]:
-    """Return sums of cosines, and their number, shape (leader, lag), over all others.
-
-    Directions have the shape (frame, agent, 2).
+    One other after the other: what is multiplied stays in the processor's cache.
     """
-    n_frames, most = len(leaders), len(lags) // 2
-    (u, has_u), (v, has_v) = _filled(leaders), _filled(others)
-    # A pair counts while it was near at the earlier moment, when the one who is ahead moved.
-    ahead = near * has_u[:, None]
-    u_ahead = ahead[:, :, None] * u[:, None]
-    # Where others are ahead they can be added up before they are set against a leader.
-    v_ahead = np.einsum("ijt,jxt->ixt", near.astype(v.dtype), v)
-    n_ahead = np.einsum("ijt,jt->it", near.astype(v.dtype), has_v)
-    total, n = np.zeros((len(u), len(lags))), np.zeros((len(u), len(lags)))
-    for lag in range(min(most + 1, n_frames)):
-        then, later = slice(n_frames - lag), slice(lag, None)
-        plus, minus = most + lag, most - lag
-        total[:, plus] = np.einsum("ijxt,jxt->i", u_ahead[..., then], v[..., later])
-        n[:, plus] = np.einsum("ijt,jt->i", ahead[..., then], has_v[..., later])
-        if lag:
-            total[:, minus] = np.einsum("ixt,ixt->i", v_ahead[..., then], u[..., later])
-            n[:, minus] = np.einsum("it,it->i", n_ahead[..., then], has_u[..., later])
+    n_frames = len(leaders)
+    (u, has_u), (v, has_v) = _filled(leaders.direction), _filled(others.direction)
+    lead_m, other_m = _by_agent(leaders.xy_m), _by_agent(others.xy_m)
+    later, has_later = _later(v, most), _later(has_v[:, None], most)
+    total, n = np.zeros((len(u), 2 * most + 1)), np.zeros((len(u), 2 * most + 1))
+    v_ahead, n_ahead = np.zeros_like(u), np.zeros_like(has_u)
+    for other, place_m in enumerate(other_m):
+        # A pair counts while it is near at the earlier moment, when the one who is ahead moves.
+        near = _within(lead_m, place_m)
+        if same is not None:
+            near[same[other]] = 0.0
+        ahead = near * has_u
+        total[:, most:] += (ahead[:, None] * u).reshape(len(u), 2 * n_frames) @ later[other].T
+        n[:, most:] += ahead @ has_later[other].T
+        # Where others are ahead they can be added up before they are set against a leader.
+        v_ahead += near[:, None] * v[other]
+        n_ahead += near * has_v[other]
+    for lag in range(1, min(most + 1, n_frames)):
+        total[:, most - lag] = np.einsum("ixt,ixt->i", v_ahead[..., :-lag], u[..., lag:])
+        n[:, most - lag] = np.einsum("it,it->i", n_ahead[..., :-lag], has_u[..., lag:])
     return total, n
+
+
+def _within(leaders_m: Floats, place_m: Floats) -> Floats:
+    """Return 1 where leaders are within range of an other, (leader, frame); 0 where one is lost."""
+    away_m = leaders_m - place_m
+    away_m *= away_m
+    return (away_m[:, 0] + away_m[:, 1] <= RANGE_M * RANGE_M).astype(np.float64)
+
+
+def _later(values: Floats, most: int) -> Floats:
+    """Return (agent, component, frame) at each lag from 0 on, 0 after the end.
+
+    The shape is (agent, lag, component times frame).
+    """
+    n_agents, n_components, n_frames = values.shape
+    made = np.zeros((n_agents, most + 1, n_components, n_frames))
+    for lag in range(min(most + 1, n_frames)):
+        made[:, lag, :, : n_frames - lag] = values[:, :, lag:]
+    return made.reshape(n_agents, most + 1, n_components * n_frames)
 
 
 def _by_agent(values: Floats) -> Floats:
@@ -458,7 +383,7 @@ def _filled(direction: Floats) -> tuple[Floats, Floats]:
     """Return directions with 0 for an unknown one, (agent, xy, frame), and 1 where it is known."""
     turned = _by_agent(direction)
     known = turned[:, 0] == turned[:, 0]
-    return np.where(known[:, None], turned, turned.dtype.type(0)), known.astype(turned.dtype)
+    return np.where(known[:, None], turned, 0.0), known.astype(np.float64)
 
 
 def _mean(values: Floats) -> Floats:

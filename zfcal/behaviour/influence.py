@@ -14,8 +14,9 @@ import numpy as np
 from zfcal.arrays import Floats, Indices, Ints
 from zfcal.behaviour.ceilings import fish_places, places_of_fish
 from zfcal.behaviour.departures import FOLLOWED, LED, Rooms, measure_departures
-from zfcal.behaviour.following import Measured, Paths, measure_following, shifts_of
+from zfcal.behaviour.following import Paths, measure_following, shifts_of
 from zfcal.behaviour.located import Located
+from zfcal.behaviour.measured import Measured
 from zfcal.behaviour.rows import Table
 from zfcal.tracks import FISH, ROBOT
 
