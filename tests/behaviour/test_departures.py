@@ -72,7 +72,8 @@ def test_who_leaves_first_leads_those_who_come_after():
 
 def test_one_of_three_others_is_not_the_group():
     """Nor is one who leaves after eleven seconds; he leaves as the first of those who are left."""
-    assert found_in(rooms(20, 30, None, None))[0] == Departure(leaders=(0,), followed=False)
+    assert found_in(rooms(20, 30, None, None)) == [Departure(leaders=(0,), followed=False)]
+    assert found_in(rooms(20, 30)) == [Departure(leaders=(0,), followed=True)]
     late = found_in(rooms(20, 31, None, None))
     assert late == [
         Departure(leaders=(0,), followed=False),

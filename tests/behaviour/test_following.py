@@ -87,6 +87,41 @@ def test_a_correlation_by_hand():
     assert np.isnan(found.value[0, at[3]])
 
 
+def test_who_rests_gives_no_pair():
+    """The leader rests for its second step, the fish for its first: each costs a pair a lag."""
+    leader = np.array([[0.0, 0.0], [0.01, 0.0], [0.01, 0.0], [0.02, 0.0]])[:, None]
+    fish = np.array([[0.0, 0.0], [0.0, 0.0], [0.01, 0.0], [0.02, 0.0]])[:, None]
+    found = correlate(Paths.of(leader), Paths.of(fish), dt_s=DT_S)
+    middle = len(found.lag_s) // 2
+    # Leader at 0 and 2, fish at 1 and 2.
+    assert list(found.n[0, middle - 2 : middle + 3]) == [0, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(("away_m", "n"), [(0.149, 3), (0.151, 0)])
+def test_a_group_reaches_15_cm(away_m, n):
+    """Three steps beside each other."""
+    path_m = np.stack([np.arange(4) * 0.01, np.zeros(4)], axis=-1)[:, None]
+    found = correlate(Paths.of(path_m), Paths.of(path_m + np.array([0.0, away_m])), dt_s=DT_S)
+    assert found.n[0, len(found.lag_s) // 2] == n
+
+
+def test_the_floor_is_what_shifted_tracks_give():
+    """The highest of 19, of the lead whichever sign it has: here the largest is negative."""
+    rng = np.random.default_rng(2)
+    robot, fish = Paths.of(in_a_tank(rng, 1)), Paths.of(in_a_tank(rng, 4))
+    moved = [
+        Paths(xy_m=np.roll(robot.xy_m, by, axis=0), direction=np.roll(robot.direction, by, axis=0))
+        for by in shifts_of(600, DT_S)
+    ]
+    found = [correlate(one, fish, dt_s=DT_S) for one in moved]
+    lead, following = (np.array([getattr(one, name)[0] for one in found])
+                       for name in ("lead", "following"))  # fmt: skip
+    by_name = {one.measure: one for one in measure_following(robot, fish, dt_s=DT_S)}
+    assert by_name["lead"].floor == pytest.approx(np.abs(lead).max())
+    assert by_name["following"].floor == pytest.approx(following.max())
+    assert np.abs(lead).max() > lead.max()
+
+
 def test_fish_that_copy_after_600_ms_follow(rng):
     """The peak is at +0.6 s, far above chance, and the robot leads."""
     robot = path(rng)
