@@ -79,7 +79,7 @@ def test_analyse_makes_statistics_and_scores(zfcal, trial):
     assert done.lines == [
         f"trial/{name}.parquet"
         for end in ("000120", "000180")
-        for name in (f"stats/{end}", f"scores/{end}", f"stats/{end}-following")
+        for name in (f"stats/{end}", f"stats/{end}-following", f"scores/{end}")
     ]
     document = json.loads(zfcal("analyse", "trial", "--json").out)
     assert [a["path"] for a in document["artifacts"]] == done.lines

@@ -261,15 +261,14 @@ def _window(shared: _Shared, end_s: int) -> Item:
             further=shared.options.further,
         )
         yield Draft(output=stats, write=partial(_write_stats, shared, window))
+        if has_robot:
+            yield Draft(output=following, write=partial(_write_following, window))
         yield Draft(
             output=replace(scores, lineage=shared.scores_lineage(sound)),
             write=partial(_write_scores, shared, window, pooled_from_s=next(iter(sound))),
         )
 
-        if has_robot:
-            yield Draft(output=following, write=partial(_write_following, window))
-
-    outputs = [stats, scores, *([following] if has_robot else [])]
+    outputs = [stats, *([following] if has_robot else []), scores]
     return Item(outputs=outputs, compute=compute, apart=True)
 
 
