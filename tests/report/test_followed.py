@@ -75,8 +75,8 @@ def test_windows_that_begin_early_are_left_out():
 @pytest.mark.parametrize(
     ("leads", "words"),
     [
-        ([0.2, 0.2, 0.21, 0.2, 0.2], "it turns first and fish after it"),
-        ([-0.2, -0.2, -0.21, -0.2, -0.2], "fish turn first and it follows"),
+        ([0.2, 0.2, 0.21, 0.2, 0.2], "where both turn alike it is the first"),
+        ([-0.2, -0.2, -0.21, -0.2, -0.2], "where both turn alike the fish are the first"),
         ([-0.2, 0.0, 0.1, 0.0, 0.1], "neither it nor the fish turn first"),
         ([0.2, 0.2], "too few windows"),
     ],

@@ -58,12 +58,16 @@ def _lead(found: Followed) -> str:
         return f"Its lead is {number}: there are too few windows to say who turns first."
     if lead.low <= 0 <= lead.high:
         return f"Its lead is {number}: neither it nor the fish turn first."
-    who = "it turns first and fish after it" if lead.value > 0 else "fish turn first and it follows"
-    when = "" if math.isnan(delay.value) else f" The delay is {delay.value:+.1f} s on average."
+    who = "it is the first" if lead.value > 0 else "the fish are the first"
+    when = (
+        ""
+        if math.isnan(delay.value)
+        else f" The delay is {delay.value:+.1f} s, in {_windows(delay.n_windows)} that have one."
+    )
     between = (
         f"; of single fish it lies between {lead.ceiling_low:+.2f} and {lead.ceiling_high:+.2f}"
     )
-    return f"Its lead is {number}: {who}{'' if math.isnan(lead.ceiling_low) else between}.{when}"
+    return f"Its lead is {number}: where both turn alike {who}{'' if math.isnan(lead.ceiling_low) else between}.{when}"
 
 
 def _departures(found: Followed) -> str:
