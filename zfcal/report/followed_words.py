@@ -64,10 +64,11 @@ def _lead(found: Followed) -> str:
         if math.isnan(delay.value)
         else f" The delay is {delay.value:+.1f} s, in {_windows(delay.n_windows)} that have one."
     )
-    between = (
-        f"; of single fish it lies between {lead.ceiling_low:+.2f} and {lead.ceiling_high:+.2f}"
-    )
-    return f"Its lead is {number}: where both turn alike {who}{'' if math.isnan(lead.ceiling_low) else between}.{when}"
+    between = ""
+    if not math.isnan(lead.ceiling_low):
+        between = f"{lead.ceiling_low:+.2f} and {lead.ceiling_high:+.2f}"
+        between = f"; of single fish it lies between {between}"
+    return f"Its lead is {number}: where both turn alike {who}{between}.{when}"
 
 
 def _departures(found: Followed) -> str:
