@@ -68,6 +68,16 @@ def test_scores_have_their_ceilings_and_comparisons(trial):
     assert whole["window_end_s"].is_unique
 
 
+def test_who_follows_the_robot_is_a_row_for_each_measure_and_lag(trial):
+    """Lags are of the directions alone; a count that is not defined is missing."""
+    found = trial.following()
+    assert found["window_end_s"].is_monotonic_increasing
+    lags = found[found["measure"] == "direction"]
+    assert lags.groupby("window_end_s")["lag_s"].count().eq(21).all()
+    assert found[found["measure"] == "lead"]["lag_s"].isna().all()
+    assert set(found["measure"]) >= {"following", "lead", "delay", "departures_led"}
+
+
 def test_counts_are_whole_numbers_where_a_bin_is_not_defined(trial):
     """Occupation has no bins: the bin of these is missing, not NaN as a number."""
     found = trial.stats()
@@ -135,7 +145,7 @@ def test_findings_that_are_none_are_named(trial, tmp_path, text):
         trial.findings(path)
 
 
-@pytest.mark.parametrize("what", ["stats", "scores", "rules", "findings"])
+@pytest.mark.parametrize("what", ["stats", "following", "scores", "rules", "findings"])
 def test_what_is_not_there_is_named_with_the_command_that_makes_it(what):
     """Of the sample, which has tracks and a starting model alone."""
     with pytest.raises(zfcal.ZfcalError, match="there is nothing to read") as caught:

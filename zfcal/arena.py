@@ -24,6 +24,9 @@ N_BINS = 10
 _AREA_TOLERANCE = 1e-6
 """Share of the tank below which an overlap or a remainder is rounding."""
 
+_ROOM_SHARE = 0.01
+"""A piece of the tank of a smaller share is a crack between zones."""
+
 _INSIDE_M = 1e-9
 """How far inside the wall a settled point is put."""
 
@@ -190,6 +193,32 @@ class Arena:
             ]
             ids[lost] = np.argmin(away_m, axis=0) + 1
         return ids
+
+    @cached_property
+    def rooms(self) -> tuple[shapely.Polygon, ...]:
+        """The rooms: the pieces into which the zones with a polygon cut what they leave.
+
+        So a tank of two rooms with a corridor has two, and one without such zones has one.
+        """
+        taken = [zone.polygon for zone in self.zones if zone.polygon is not None]
+        rest = shapely.difference(self.outline, shapely.union_all(taken))
+        pieces = [piece for piece in shapely.get_parts(rest) if piece.geom_type == "Polygon"]
+        least_m2 = _ROOM_SHARE * self.outline.area
+        return tuple(piece for piece in pieces if shapely.area(piece) > least_m2)
+
+    def room_of(self, xy_m: Floats) -> NDArray[np.int64]:
+        """Return the room of each position, from 1; 0 in none, and where the position is NaN.
+
+        Parameters
+        ----------
+        xy_m : ndarray, shape (..., 2)
+            Positions in metres.
+        """
+        room = np.zeros(xy_m.shape[:-1], dtype=np.int64)
+        for number, piece in enumerate(self.rooms, start=1):
+            shapely.prepare(piece)
+            room[shapely.intersects_xy(piece, xy_m[..., 0], xy_m[..., 1])] = number
+        return room
 
     def settle(self, xy_m: ArrayLike) -> tuple[Floats, int]:
         """Take points a little outside at the nearest inside point.

@@ -18,7 +18,7 @@ from zfcal.artifacts.models import read_model, read_result
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import find_trial, read_trial
-from zfcal.artifacts.tables import RULES, SCORES, STATS, TRACKS, read_table
+from zfcal.artifacts.tables import FOLLOWING, RULES, SCORES, STATS, TRACKS, read_table
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.parameters import Parameters
@@ -110,6 +110,8 @@ class TrialTables:
                     *self._numbered(table, ".parquet"),
                     *self._numbered(table, "-model.parquet"),
                 ]
+            case "following":
+                return self._numbered("stats", "-following.parquet")
             case "rules":
                 return self._numbered("scores", "-rules.parquet")[-1:]
             case "parameters":
@@ -151,6 +153,26 @@ class TrialTables:
         """
         hint = f"First: zfcal analyse {self.root}"
         return self._joined("stats", STATS, hint)
+
+    def following(self) -> pd.DataFrame:
+        """Return what the robot makes the fish do: one row per window, measure and lag.
+
+        Returns
+        -------
+        DataFrame
+            ``window_end_s``, ``measure`` (such as ``direction``), ``lag_s`` (missing for what is of
+            no lag), ``value``, ``low``, ``high`` and ``ceiling`` (fish in the robot's place),
+            ``floor`` (what chance gives) and ``n``.
+
+        Raises
+        ------
+        InputError
+            There are none: the trial has no robot, or was not analysed since.
+        DamagedError
+            A file is damaged.
+        """
+        hint = f"First: zfcal analyse {self.root}; a trial without a robot has none."
+        return self._joined("following", FOLLOWING, hint)
 
     def scores(self) -> pd.DataFrame:
         """Return all scores: one row per window, comparison, feature and zone.
@@ -263,7 +285,7 @@ class TrialTables:
         ]
         tables = [table for table in read if table is not None]
         if not tables:
-            folder = "scores" if name == "rules" else name
+            folder = {"rules": "scores", "following": "stats"}.get(name, name)
             raise _nothing(self.root / folder, hint)
         return _as_frame(tables)
 

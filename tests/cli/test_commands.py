@@ -125,9 +125,9 @@ def test_analyse_makes_statistics_and_scores(zfcal, trial):
     done = zfcal("analyse", "trial")
     assert done.code == 0
     assert done.lines == [
-        f"trial/{folder}/{end}.parquet"
+        f"trial/{name}.parquet"
         for end in ("000120", "000180")
-        for folder in ("stats", "scores")
+        for name in (f"stats/{end}", f"stats/{end}-following", f"scores/{end}")
     ]
     document = json.loads(zfcal("analyse", "trial", "--json").out)
     assert [a["path"] for a in document["artifacts"]] == done.lines
@@ -292,7 +292,7 @@ def test_of_several_trials_one_that_is_wrong_does_not_stop_the_others(zfcal, tri
     done = zfcal("analyse", "nowhere", "trial")
     assert done.code == 1
     assert "nowhere: is not in a trial" in done.err
-    assert len(done.lines) == 4
+    assert len(done.lines) == 6
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_analyse_and_check_name_what_is_no_segment(zfcal, trial, kind):
     assert done.code == 3
     what = "is too large (600.0 MB" if kind == "huge" else "cannot be read"
     assert f"tracks/000120.parquet: {what}" in done.err
-    assert done.lines == ["trial/stats/000120.parquet", "trial/scores/000120.parquet"]
+    assert done.lines == [f"trial/{name}" for name in ANALYSED]
     checked = zfcal("check", "trial")
     assert checked.code == 3
     # Its end is looked at first, and is none of a table's.
@@ -61,6 +61,13 @@ def test_statistics_are_not_written_through_a_link_that_leads_outside(zfcal, tri
     assert "leads outside the trial" in zfcal("check", "trial").out
 
 
+def _analysed(end):
+    return [f"stats/{end}.parquet", f"stats/{end}-following.parquet", f"scores/{end}.parquet"]
+
+
+ANALYSED = _analysed("000120")
+
+
 def _round(end):
     scores = {f"scores/{end}-model.parquet", f"scores/{end}-rules.parquet"}
     return {f"models/{end}.parquet", f"models/{end}.toml"} | scores
@@ -68,14 +75,7 @@ def _round(end):
 
 TAKEN = {
     "tracks/000060.parquet": (IMPORT, {f"tracks/{k:06d}.parquet" for k in (0, 120, 180)}),
-    "stats/000120.parquet": (
-        ANALYSE,
-        {"scores/000120.parquet", "stats/000180.parquet", "scores/000180.parquet"},
-    ),
-    "scores/000120.parquet": (
-        ANALYSE,
-        {"stats/000120.parquet", "stats/000180.parquet", "scores/000180.parquet"},
-    ),
+    **{name: (ANALYSE, {*ANALYSED, *_analysed("000180")} - {name}) for name in ANALYSED},
     "models/000120.toml": (CALIBRATE, _round("000180")),
     "models/000120.parquet": (CALIBRATE, _round("000180")),
     "scores/000120-model.parquet": (CALIBRATE, _round("000180")),

@@ -65,13 +65,13 @@ def test_once_makes_what_offline_commands_make_and_leaves(process, zfcal, trial,
     zfcal("analyse", "other")
     zfcal("calibrate", "other", *watching.quick)
     assert watching.contents(trial) == watching.contents(other)
-    assert len(first.lines) == 12
+    assert len(first.lines) == 14
     assert first.lines[0] == "trial/stats/000120.parquet"
     assert "watch: analyse, calibrate of trial." in first.err
     assert "calibrate: window to 120 s in" in first.err
     assert "\x1b" not in first.err
     assert sorted(again.lines) == sorted(first.lines)
-    assert "nothing to do, 12 up to date" in again.err
+    assert "nothing to do, 14 up to date" in again.err
     assert "arrived" in again.err
 
 

@@ -22,6 +22,7 @@ from zfcal.behaviour.statistics import measure, measure_robot
 from zfcal.parameters import gene_names, natural
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
+from zfcal.report.followed import followed_from
 from zfcal.report.page import write_report
 from zfcal.report.seen import see
 from zfcal.report.views import (
@@ -179,6 +180,7 @@ def make_view(two_rooms, course, rounds_of, wander):
                 halves=dict.fromkeys(FEATURE_NAMES, 0.9),
             ),
             sources=(),
+            following=followed_from(_followed_rows(540), start_s=300),
         )
         return replace(view, **changes)
 
@@ -225,6 +227,16 @@ def drawn_trial(tmp_path_factory, write_small_trial, stub_model):
         patch.setattr("zfcal.report.simulated.long_run", stub_model)
         write_report([root])
     return root
+
+
+def _followed_rows(end_s):
+    numbers = {"value": 0.3, "low": 0.1, "high": 0.5, "ceiling": 0.4, "floor": 0.2, "n": 9}
+    names = [("direction", lag_s) for lag_s in (-0.2, 0.0, 0.2)]
+    names += [(name, None) for name in ("following", "lead", "delay")]
+    names += [(name, None) for name in ("departures_led", "departures_followed")]
+    return [
+        {"window_end_s": end_s, "measure": name, "lag_s": lag_s, **numbers} for name, lag_s in names
+    ]
 
 
 def _lineage(schema, command):

@@ -10,7 +10,7 @@ def names(pictures):
 
 def test_a_whole_trial_is_told_from_the_scores_to_the_arena(make_view):
     """What matters most comes first."""
-    order = ["scores", "integration", "statistics", "parameters", "tracks", "arena"]
+    order = ["scores", "integration", "following", "statistics", "parameters", "tracks", "arena"]
 
     assert names(pictures_of_trial(make_view())) == order
 

@@ -180,6 +180,7 @@ def test_an_empty_trial_says_where_to_begin(make_view):
         courses={},
         rounds=[],
         integration=Integration(start_s=0, end_s=0),
+        following=None,
     )
     found = gaps(empty)
 

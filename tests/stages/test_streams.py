@@ -29,6 +29,11 @@ def test_statistics_bear_on_their_own_window(trial, folder):
     assert work_of(trial / folder / "000180.parquet").ends_s == {180}
 
 
+def test_what_a_robot_does_to_the_fish_bears_on_its_own_window(trial):
+    """It stands beside the statistics."""
+    assert work_of(trial / "stats" / "000180-following.parquet").ends_s == {180}
+
+
 @pytest.mark.parametrize(
     "name", ["", "trial.toml", "models/000120.toml", "scores/000120-model.parquet"]
 )

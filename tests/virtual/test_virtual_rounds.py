@@ -91,7 +91,8 @@ def test_without_calibration_there_is_no_process(experiment):
     rounds.finish()
     assert sorted(made(experiment.root)) == [
         *("models/000000.toml", "scores/000120.parquet", "scores/000180.parquet"),
-        *("stats/000120.parquet", "stats/000180.parquet"),
+        *("stats/000120-following.parquet", "stats/000120.parquet"),
+        *("stats/000180-following.parquet", "stats/000180.parquet"),
     ]
 
 

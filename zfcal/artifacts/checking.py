@@ -27,7 +27,15 @@ from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.reading.contents import hash_of, open_regular, unreadable
 from zfcal.artifacts.reading.places import check_inside, is_regular
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import POPULATION, RULES, SCORES, STATS, read_table, read_tracks
+from zfcal.artifacts.tables import (
+    FOLLOWING,
+    POPULATION,
+    RULES,
+    SCORES,
+    STATS,
+    read_table,
+    read_tracks,
+)
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.trial import CONFIG_NAME, LOOP_NAME, NUMBER, Trial, second_of
@@ -328,6 +336,7 @@ def _table_checker(schema: str) -> Callable[[_Place, Path], Iterator[Finding]]:
 
 _CHECKERS: dict[str, Callable[[_Place, Path], Iterator[Finding]]] = {
     rf"tracks/{NUMBER}\.parquet": _check_tracks,
+    rf"stats/{NUMBER}-following\.parquet": _table_checker(FOLLOWING),
     rf"stats/{NUMBER}(-[a-z-]+)?\.parquet": _table_checker(STATS),
     rf"scores/{NUMBER}-rules\.parquet": _table_checker(RULES),
     rf"scores/{NUMBER}(-[a-z-]+)?\.parquet": _table_checker(SCORES),

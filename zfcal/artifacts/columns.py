@@ -29,7 +29,8 @@ _TYPES: dict[str, pa.DataType] = {
     "list<float64>": pa.list_(pa.float64()),
 }
 TABLE_SCHEMAS = (
-    "zfcal.tracks/1", "zfcal.stats/1", "zfcal.scores/1", "zfcal.rules/1", "zfcal.population/1",
+    "zfcal.tracks/1", "zfcal.stats/1", "zfcal.following/1", "zfcal.scores/1", "zfcal.rules/1",
+    "zfcal.population/1",
 )  # fmt: skip
 """Names of the schemas that tables can have."""
 

@@ -35,6 +35,7 @@ __all__ = [
 
 TRACKS = "zfcal.tracks/1"
 STATS = "zfcal.stats/1"
+FOLLOWING = "zfcal.following/1"
 SCORES = "zfcal.scores/1"
 RULES = "zfcal.rules/1"
 POPULATION = "zfcal.population/1"

@@ -47,3 +47,19 @@ class Statement:
     answer: str
     figure: tuple[str, str] = ("", "")
     warns: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gap:
+    """Something that is not there yet, and the command that makes it.
+
+    Parameters
+    ----------
+    what
+        What is missing, and why it matters.
+    command
+        What to type; empty where nothing can be done.
+    """
+
+    what: str
+    command: str = ""

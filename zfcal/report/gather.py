@@ -20,12 +20,13 @@ from zfcal.artifacts.models import read_model_for, read_result
 from zfcal.artifacts.reading.contents import numbered_of, open_regular
 from zfcal.artifacts.segments import read_segment, segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import RULES, SCORES, STATS, read_extra, read_table
+from zfcal.artifacts.tables import FOLLOWING, RULES, SCORES, STATS, read_extra, read_table
 from zfcal.behaviour.features.registry import statistics
 from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
+from zfcal.report.followed import Followed, followed_from
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
 from zfcal.report.views import (
@@ -51,6 +52,7 @@ _NUMBER_COLUMNS = ("window_end_s", "value", "low", "high", "ceiling", "n_windows
 _ENDINGS = (
     ("tracks", ".parquet"),
     ("stats", ".parquet"),
+    ("stats", "-following.parquet"),
     ("scores", ".parquet"),
     ("scores", "-model.parquet"),
     ("scores", "-rules.parquet"),
@@ -146,6 +148,7 @@ def gather(
     ]
     calibrated = next((r for r in reversed(rounds) if r.second > 0), None)
     seen = see(_stretches(reader, watch))
+    start_s = _pooled_from(reader)
     counted = _statistics(reader, None if calibrated is None else calibrated.second)
     return TrialView(
         root=root,
@@ -157,8 +160,9 @@ def gather(
         model_statistics=_simulated(calibrated, trial, arena, counted) if alone else None,
         seen=seen,
         integration=measure_integration(
-            courses, seen, has_robot=trial.n_robots > 0, start_s=_pooled_from(reader)
+            courses, seen, has_robot=trial.n_robots > 0, start_s=start_s
         ),
+        following=_followed(reader, start_s),
         sources=list(_sources(reader)),
         rule_scores=_rule_scores(reader),
         left_out=list(reader.damaged.values()),
@@ -279,6 +283,15 @@ def _rule_score(row: Mapping[str, Any]) -> RuleScore:
         made_at_s=row["made_at_s"],
         score=Mark(value=value, low=low, high=high),
     )
+
+
+def _followed(reader: _Reader, start_s: int) -> Followed | None:
+    """Return whether fish follow the robot, over the windows whose file can be read."""
+    rows: list[Mapping[str, Any]] = []
+    for _, path in reader.files("stats", "-following.parquet"):
+        table = reader.attempt(path, lambda p: read_table(p, FOLLOWING))
+        rows += [] if table is None else table.to_pylist()
+    return followed_from(rows, start_s=start_s)
 
 
 def _named(said: Any) -> tuple[Mark | None, tuple[str, ...]]:

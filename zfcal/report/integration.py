@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from zfcal.artifacts.lineage import Lineage
+from zfcal.report.followed import followed_document
 from zfcal.report.seen import Seen
 from zfcal.report.views import FEATURE_NAMES, ROBOT, Course, CourseKey, Integration, Mark, TrialView
 
@@ -132,24 +133,26 @@ def integration_document(
     del origin["schema"]
     return {
         "schema": SCHEMA,
-        "trials": [_trial(view.name, view.integration, view.left_out) for view in views],
+        "trials": [_trial(view) for view in views],
         "files": dict(files),
         "lineage": origin,
     }
 
 
-def _trial(name: str, found: Integration, left_out: Sequence[str]) -> dict[str, Any]:
+def _trial(view: TrialView) -> dict[str, Any]:
+    found = view.integration
     robot = {
         "start_s": found.start_s,
         "end_s": found.end_s,
         "features": {feature: _mark(mark) for feature, mark in found.robot.items()},
     }
     return {
-        "trial": name,
+        "trial": view.name,
         "robot_vs_fish": robot if found.robot else None,
         "halves": dict(found.halves) or None,
         "missing": list(found.missing),
-        **({"left_out": list(left_out)} if left_out else {}),
+        **({} if view.following is None else {"following": followed_document(view.following)}),
+        **({"left_out": list(view.left_out)} if view.left_out else {}),
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from zfcal.report.figures.arena import arena_picture
+from zfcal.report.figures.followed import followed_picture
 from zfcal.report.figures.panels import Picture
 from zfcal.report.figures.parameters import parameters_picture
 from zfcal.report.figures.rules import rules_picture
@@ -21,6 +22,7 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
     """Return the pictures that a trial has the artifacts for; the arena always."""
     made = (
         *_scores([view]),
+        followed_picture(view.following),
         rules_picture(view.rule_scores),
         _statistics(view),
         parameters_picture(view.rounds),

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
-from zfcal.report.contents import Statement
+from zfcal.report.contents import Gap, Statement
 from zfcal.report.figures.parameters import outside_of
 from zfcal.report.figures.statistics import histogram_mean
+from zfcal.report.followed_words import followed_gap, followed_statement
 from zfcal.report.integration import NOT_COMPARED
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
@@ -38,22 +38,6 @@ OVERFITTING = "the model fits what happened there by chance as well (overfitting
 """What it means to score more than a perfect model does."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gap:
-    """Something that is not there yet, and the command that makes it.
-
-    Parameters
-    ----------
-    what
-        What is missing, and why it matters.
-    command
-        What to type; empty where nothing can be done.
-    """
-
-    what: str
-    command: str = ""
-
-
 def statements(view: TrialView) -> list[Statement]:
     """Return what there is to say about a trial, the most important first."""
     made = (
@@ -61,6 +45,7 @@ def statements(view: TrialView) -> list[Statement]:
         _named(view),
         _worst(view),
         _robot(view),
+        followed_statement(view),
         _halves(view),
         _parameters(view),
     )
@@ -69,7 +54,8 @@ def statements(view: TrialView) -> list[Statement]:
 
 def gaps(view: TrialView) -> list[Gap]:
     """Return what is missing in a trial, and which command makes it."""
-    return list(_gaps(view))
+    following = followed_gap(view)
+    return [*_gaps(view), *([following] if following else [])]
 
 
 def _gaps(view: TrialView) -> Iterator[Gap]:

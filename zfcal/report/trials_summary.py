@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from zfcal.report.contents import Statement
+from zfcal.report.contents import Gap, Statement
 from zfcal.report.numbers import mean_and_sd
-from zfcal.report.summary import OVERFITTING, Gap, gaps
+from zfcal.report.summary import OVERFITTING, gaps
 from zfcal.report.views import MODEL, PUBLISHED_S, TrialView
 
 

@@ -18,6 +18,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
+from zfcal.report.followed import Followed
 from zfcal.report.seen import Seen
 from zfcal.trial import Trial
 
@@ -262,6 +263,8 @@ class TrialView:
     rule_scores
         Forward scores of the rules by which models are published, in the order of their windows;
         empty where rules were not judged.
+    following
+        Whether fish follow the robot; None where it was not measured.
     left_out
         One line per file that could not be read.
     label
@@ -283,6 +286,7 @@ class TrialView:
     integration: Integration
     sources: Sequence[Source]
     rule_scores: Sequence[RuleScore] = ()
+    following: Followed | None = None
     left_out: Sequence[str] = ()
     label: str = ""
     scoring: str = "paper"

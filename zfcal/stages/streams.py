@@ -19,6 +19,9 @@ _ENDS_AFTER_S = {"tracks": (int(SEGMENT_S), 2 * int(SEGMENT_S)), "stats": (0,), 
 """By folder, what to add to the number of a file to get the ends of its windows."""
 
 
+_BESIDE = "-following.parquet"
+"""What stands beside the statistics of a window, and is of no other."""
+
 _MOST_NAMED = 8
 """Files and folders that a hint names."""
 
@@ -58,7 +61,8 @@ def work_of(path: Path) -> Work:
     if path.suffix == ".mcap":
         # What is counted comes from the segments, whose paths come as well.
         return Work(root=root, ends_s=frozenset())
-    second = second_of(path)
+    beside = path.parent.name == "stats" and path.name.endswith(_BESIDE)
+    second = second_of(path, _BESIDE) if beside else second_of(path)
     after_s = _ENDS_AFTER_S.get(path.parent.name)
     if second is None or after_s is None:
         return Work(root=root)

@@ -7,7 +7,7 @@ import pytest
 
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.settings import read_trial, write_trial
-from zfcal.artifacts.tables import read_extra, read_table
+from zfcal.artifacts.tables import read_extra, read_table, read_tracks, write_tracks
 from zfcal.behaviour.located import locate
 from zfcal.behaviour.rows import scores_from_rows, statistics_from_rows
 from zfcal.behaviour.scores import compare
@@ -123,8 +123,58 @@ def test_the_second_run_does_nothing(make_trial, heard, read_all):
     heard.clear()
     analyse(root, PAPER, heard.append)
     assert names_of(heard, Made) == []
-    assert len(names_of(heard, UpToDate)) == 6
+    assert len(names_of(heard, UpToDate)) == 9
     assert read_all(root) == before
+
+
+def test_of_an_older_trial_only_what_the_robot_does_to_the_fish_is_made(
+    make_trial, heard, read_all
+):
+    """Statistics and scores from before there was such a file stay as they are."""
+    root = make_trial(seconds=120, n_robots=1)
+    analyse(root, PAPER, heard.append)
+    before = read_all(root)
+    (root / "stats" / "000120-following.parquet").unlink()
+    heard.clear()
+    analyse(root, PAPER, heard.append)
+    assert names_of(heard, Made) == ["stats/000120-following.parquet"]
+    assert names_of(heard, UpToDate) == ["stats/000120.parquet", "scores/000120.parquet"]
+    assert read_all(root) == before
+
+
+def test_without_a_robot_nobody_is_followed(make_trial, heard):
+    """There is no such file."""
+    root = make_trial(seconds=120)
+    analyse(root, PAPER, heard.append)
+    assert names_of(heard, Made) == ["stats/000120.parquet", "scores/000120.parquet"]
+
+
+def test_a_control_does_not_bear_on_who_follows(make_trial, heard):
+    """The file is up to date, whatever the control group."""
+    root, control = make_trial(seconds=120, n_robots=1), make_trial("control", seconds=120, seed=3)
+    analyse(root, PAPER, heard.append)
+    heard.clear()
+    analyse(root, AnalyseOptions(control=(control,)), heard.append)
+    assert names_of(heard, UpToDate) == ["stats/000120-following.parquet"]
+
+
+def test_a_robot_that_is_lost_for_the_whole_window_gives_null(make_trial, heard):
+    """Its rows are there without a value; what fish do in its place is known."""
+    root = make_trial(seconds=120, n_robots=1)
+    for start in (0, 60):
+        path = root / "tracks" / f"{start:06d}.parquet"
+        tracks = read_tracks(path)
+        write_tracks(path, tracks.take(tracks.kind == FISH), read_lineage(path))
+    analyse(root, PAPER, heard.append)
+    table = read_table(root / "stats" / "000120-following.parquet", "zfcal.following/1")
+    rows = {(row["measure"], row["lag_s"]): row for row in table.to_pylist()}
+    assert len(rows) == 21 + 5
+    assert {row["value"] for row in rows.values()} == {None}
+    assert {row["floor"] for row in rows.values()} == {None}
+    assert rows["direction", 0.0]["n"] == 0
+    assert rows["following", None]["ceiling"] is not None
+    # One room: departures are not defined, rather than none.
+    assert rows["departures_led", None]["n"] is None
 
 
 def test_only_windows_of_a_changed_segment_are_made_again(make_trial, wandering, heard):
@@ -171,7 +221,7 @@ def test_force_makes_the_same_bytes_again(make_trial, heard, read_all):
     before = read_all(root)
     heard.clear()
     analyse(root, PAPER, heard.append, task=Task(force=True))
-    assert len(names_of(heard, Made)) == 6
+    assert len(names_of(heard, Made)) == 9
     assert read_all(root) == before
 
 
@@ -185,7 +235,7 @@ def test_one_window_alone_is_the_same_as_among_all(make_trial, copy_trial, heard
         heard.clear()
         task = Task(ends_s=frozenset({end}))
         analyse(online, PAPER, heard.append, task=task, segments=segments)
-        assert len(names_of(heard, Made)) == 2
+        assert len(names_of(heard, Made)) == 3
     assert read_all(online) == read_all(root)
 
 

@@ -17,8 +17,11 @@ from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.segments import segment_name, segment_path
-from zfcal.artifacts.tables import make_table, write_table
+from zfcal.artifacts.tables import FOLLOWING, make_table, write_table
+from zfcal.behaviour.departures import FOLLOW_S
 from zfcal.behaviour.features.registry import COUNTED, further, ordered
+from zfcal.behaviour.following import RANGE_M
+from zfcal.behaviour.influence import influence_to_rows, measure_influence
 from zfcal.behaviour.located import Located, join
 from zfcal.behaviour.rows import join_tables, statistics_to_rows
 from zfcal.errors import InputError
@@ -99,6 +102,13 @@ class _Shared:
 
     def scores_lineage(self, hashes: dict[int, str]) -> Lineage:
         return self._lineage(_SCORES, hashes, {"scoring": self.options.scoring})
+
+    def following_lineage(self, hashes: dict[int, str]) -> Lineage:
+        """Return that of what the robot does to the fish: the control bears on nothing of it."""
+        inputs = {segment_name(start): digest for start, digest in hashes.items()}
+        inputs |= hash_inputs(self.root, self.opened.arena_files)
+        options = {**self.opened.clock_options, "range_m": RANGE_M, "follow_s": FOLLOW_S}
+        return Lineage(schema=FOLLOWING, command=self.run.command, options=options, inputs=inputs)
 
     def _lineage(self, schema: str, hashes: dict[int, str], more: dict[str, JSON]) -> Lineage:
         inputs = {segment_name(start): digest for start, digest in hashes.items()}
@@ -225,6 +235,11 @@ def _window(shared: _Shared, end_s: int) -> Item:
         path=path_of("scores", end_s, ".parquet"), lineage=shared.scores_lineage(hashes)
     )
 
+    following = Output(
+        path=path_of("stats", end_s, "-following.parquet"), lineage=shared.following_lineage(own)
+    )
+    has_robot = shared.opened.trial.n_robots > 0
+
     def compute() -> Iterator[Draft]:
         tell, segments = shared.run.tell, shared.segments
         pooled = segments.pool(shared.opened, hashes, tell) if shared.is_pooled else None
@@ -241,17 +256,20 @@ def _window(shared: _Shared, end_s: int) -> Item:
             end_s=end_s,
             points=join([found[start] for start in own]),
             pool=None if pooled is None else pooled.pool,
-            has_robot=shared.opened.trial.n_robots > 0,
+            has_robot=has_robot,
             control=shared.control,
             further=shared.options.further,
         )
         yield Draft(output=stats, write=partial(_write_stats, shared, window))
+        if has_robot:
+            yield Draft(output=following, write=partial(_write_following, window))
         yield Draft(
             output=replace(scores, lineage=shared.scores_lineage(sound)),
             write=partial(_write_scores, shared, window, pooled_from_s=next(iter(sound))),
         )
 
-    return Item(outputs=[stats, scores], compute=compute, apart=True)
+    outputs = [stats, *([following] if has_robot else []), scores]
+    return Item(outputs=outputs, compute=compute, apart=True)
 
 
 def _pooled_starts(shared: _Shared, end_s: int) -> list[int]:
@@ -308,6 +326,11 @@ def _write_scores(
         for compared, feature, value, ceiling in zip(*columns, strict=True)
         if feature == "S"
     ]
+
+
+def _write_following(window: Window, path: Path, lineage: Lineage) -> None:
+    rows = influence_to_rows(measure_influence(window.points), window_end_s=window.end_s)
+    write_table(path, make_table(FOLLOWING, rows), lineage)
 
 
 def _void_notes(shared: _Shared, window: Window) -> list[Event]:
