@@ -9,7 +9,7 @@ import click
 
 from .durations import seconds
 from .foreign import FORMATS, foreign_options
-from .options import EXISTING, PLACE, arena_options, seed_option, speaks
+from .options import EXISTING, PLACE, seed_option, speaks, tank_options
 from .output import Output
 from .reproducing import check_together, reproduce_archives, reproduce_virtual
 
@@ -39,7 +39,7 @@ from .reproducing import check_together, reproduce_archives, reproduce_virtual
 )
 @click.option("-o", "--out", "folder", type=PLACE, help="Where it goes.  [default: reproduced]")
 @click.option("--format", "format_", type=click.Choice(FORMATS), help="Of the archives' tracks.")
-@arena_options
+@tank_options
 @foreign_options
 @seed_option("Of the first trial that is made.  [default: 1; of the twin 9001]")
 @click.option("--force", is_flag=True, help="Make everything again.")

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .foreign import import_options
-from .options import count_robots
 from .output import EXIT_DISAGREES, Output
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 _OF_TWIN = ("n_trials", "duration")
 _OF_ARCHIVES = (
-    "scoring", "arena", "radius_m", "side_m", "n_fish", "n_robots", "format_", "fps", "mm_per_px",
+    "scoring", "arena", "radius_m", "side_m", "n_fish", "format_", "fps", "mm_per_px",
     "origin", "noise_mm", "robots", "columns", "keypoint", "body_axis", "box", "first_frame",
     "min_confidence", "generations",
 )  # fmt: skip
@@ -100,7 +99,7 @@ def _new_trial(options: Mapping[str, Any]) -> NewTrial | None:
     return NewTrial(
         **{name: options[name] for name in _OF_TANK},
         n_fish=options["n_fish"],
-        n_robots=count_robots(robot=options["robot"], n_robots=options["n_robots"]) or 0,
+        n_robots=len(options["robots"] or ()) or int(options["robot"]),
         fps=options["fps"] or 15.0,
         seed=1 if options["seed"] is None else options["seed"],
     )

@@ -1,0 +1,132 @@
+"""`zfcal reproduce`: archives in, a verdict out."""
+
+import json
+
+import pytest
+
+from zfcal.artifacts.validation import check
+
+QUICK = ("--generations", "0")
+TANK = ("--arena", "open-square", "--fish", "3", "--robot", "--fps", "5")
+
+
+@pytest.fixture
+def archive(trial):
+    """Return a trial of two windows as an archive: what was made of its tracks is not there."""
+    return trial
+
+
+def said(folder):
+    """Return the document, which fits its schema."""
+    place = folder / "reproduction.json"
+    document = json.loads(place.read_text())
+    check(document, "reproduction", place)
+    return document
+
+
+def test_an_archive_is_calibrated_and_judged(zfcal, archive, tmp_path):
+    """One trial decides nothing: exit code 4, and the reason is said."""
+    before = sorted(path.relative_to(archive) for path in archive.rglob("*"))
+    done = zfcal("reproduce", "trial", "-o", "again", *QUICK)
+    assert done.code == 4, done.err
+    document = said(tmp_path / "again")
+    assert document["verdict"] == "undecided"
+    assert document["ways"][0]["trials"] == ["trial"]
+    assert "there is no standard error" in done.err
+    assert (tmp_path / "again" / "trial" / "models" / "000120.toml").exists()
+    assert sorted(path.relative_to(archive) for path in archive.rglob("*")) == before
+
+
+def test_twice_gives_the_same_bytes(zfcal, archive, tmp_path):
+    """The second run has nothing to do."""
+    zfcal("reproduce", "trial", "-o", "again", *QUICK)
+    names = ["reproduction.json", "reproduction.csv", "reproduction.png"]
+    first = [(tmp_path / "again" / name).read_bytes() for name in names]
+    done = zfcal("reproduce", "trial", "-o", "again", *QUICK)
+    assert "nothing to do" in done.err
+    assert [(tmp_path / "again" / name).read_bytes() for name in names] == first
+
+
+def test_a_reference_of_ones_own_decides(zfcal, archive, tmp_path):
+    """Its contrasts and no others; the window to 120 s is one of them."""
+    text = """schema = "zfcal.reference/1"
+source = "ours"
+n_trials = 5
+intervals = []
+[[contrasts]]
+name = "first"
+feature = "O"
+from_s = 120
+to_s = 120
+value = 0.9
+"""
+    (tmp_path / "ours.toml").write_text(text)
+    zfcal("reproduce", "trial", "-o", "again", "--reference", "ours.toml", *QUICK)
+    (contrast,) = said(tmp_path / "again")["ways"][0]["contrasts"]
+    assert (contrast["name"], contrast["published"], contrast["n"]) == ("first", 0.9, 1)
+
+
+def test_the_authors_scoring_is_another_number(zfcal, archive, tmp_path):
+    """Of the same models; W is not scored by it."""
+    values = {}
+    for scoring in ("paper", "legacy"):
+        zfcal("reproduce", "trial", "-o", scoring, "--scoring", scoring, *QUICK)
+        rows = said(tmp_path / scoring)["ways"][0]["intervals"]
+        values[scoring] = {(row["feature"], row["end_s"]): row["mean"] for row in rows}
+    assert ("W", 120) in values["paper"]
+    assert ("W", 120) not in values["legacy"]
+    assert values["paper"]["S", 120] != values["legacy"]["S", 120]
+
+
+def test_tracks_of_another_program_become_a_trial(zfcal, tracks_csv, tmp_path, monkeypatch):
+    """With the tank that is said."""
+    monkeypatch.chdir(tmp_path)
+    tracks_csv("old.csv")
+    done = zfcal("reproduce", "old.csv", "-o", "again", *TANK, *QUICK)
+    assert done.code == 4, done.err
+    assert said(tmp_path / "again")["ways"][0]["trials"] == ["old"]
+
+
+@pytest.mark.parametrize(("words", "says"), [
+    ((), "Missing argument 'ARCHIVE...'; or --twin."),
+    (("trial", "--twin"), "--twin makes its own trials"),
+    (("trial", "--trials", "3"), "--trials belongs to --twin."),
+    (("--twin", "--scoring", "legacy"), "--scoring belongs to archives."),
+    (("--twin", "--flip-y"), "--flip-y belongs to archives."),
+])  # fmt: skip
+def test_what_cannot_take_effect_is_wrong_usage(zfcal, archive, words, says):
+    """Exit code 2."""
+    done = zfcal("reproduce", *words)
+    assert done.code == 2
+    assert says in done.err
+
+
+@pytest.mark.parametrize(("words", "says"), [
+    (("nowhere",), "nowhere: no such archive."),
+    (("old.csv",), "old.csv: is not a trial, and its tank is not known."),
+    (("trial", "-o", "trial/again"), "lies in the archive trial"),
+])  # fmt: skip
+def test_a_wrong_archive_is_named(zfcal, archive, tracks_csv, words, says):
+    """One line, exit code 1."""
+    tracks_csv("old.csv")
+    done = zfcal("reproduce", *words)
+    assert done.code == 1
+    assert says in done.err
+
+
+@pytest.mark.slow
+def test_a_small_twin_says_what_holds(zfcal, tmp_path, monkeypatch):
+    """One trial of three minutes: four ways, all statements, none of them decided."""
+    monkeypatch.chdir(tmp_path)
+    done = zfcal("reproduce", "--twin", "--trials", "1", "--duration", "3min", "-o", "twin")
+    assert done.code == 4, done.err
+    document = said(tmp_path / "twin")
+    assert [way["name"] for way in document["ways"]] == [
+        "as published", "driving, random start", "driving, given start", "our default",
+    ]  # fmt: skip
+    assert {each["holds"] for each in document["statements"]} == {"open"}
+    given, random = (
+        {(row["feature"], row["end_s"]): row["mean"] for row in way["intervals"]}
+        for way in (document["ways"][2], document["ways"][1])
+    )
+    assert given["S", 180] != random["S", 180]
