@@ -95,6 +95,7 @@ def test_a_pipe_is_worked_on_line_by_line(command, trial):
         analyse.stdin.write("trial/tracks/000000.parquet\n")
         analyse.stdin.flush()
         assert analyse.stdout.readline() == "trial/stats/000120.parquet\n"
+        assert analyse.stdout.readline() == "trial/stats/000120-following.parquet\n"
         assert analyse.stdout.readline() == "trial/scores/000120.parquet\n"
         assert analyse.poll() is None
         analyse.stdin.close()
@@ -102,7 +103,8 @@ def test_a_pipe_is_worked_on_line_by_line(command, trial):
         guard.cancel()
         assert analyse.wait() == 0
     # The lines were hints; what they did not name is found at the end.
-    assert rest == ["trial/stats/000180.parquet", "trial/scores/000180.parquet"]
+    names = ("stats/000180", "stats/000180-following", "scores/000180")
+    assert rest == [f"trial/{name}.parquet" for name in names]
 
 
 @pytest.mark.slow
@@ -144,7 +146,7 @@ def test_several_trials_go_through_one_pipe(shell, tracks_csv, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert {line.split("/")[0] for line in done.stdout.split()} == {"a", "b"}
-    assert len(done.stdout.split()) == 8
+    assert len(done.stdout.split()) == 12
 
 
 @pytest.mark.slow
