@@ -4,7 +4,9 @@ Makes ``as_published.json`` and ``benchmarks-as-published.md``: in ``build/bench
 ``--write`` in ``benchmarks/results`` and ``docs``. Trials that are done stay in
 ``build/as-published`` and are not run again.
 
-    .venv/bin/python benchmarks/calibration/bench_as_published.py --trials 8
+No figures of it are committed yet, so it is no part of `make bench`.
+
+    .venv/bin/python benchmarks/calibration/as_published_ways.py --trials 8
 """
 
 from __future__ import annotations
@@ -130,7 +132,7 @@ def markdown(found: dict[str, Any]) -> str:
     for row in found["rows"]:
         means.setdefault(row["way"], {})[row["seed"]] = _means(row["rounds"])
     base = means["as published"]
-    said = f"""Made by `benchmarks/calibration/bench_as_published.py`; numbers in
+    said = f"""Made by `benchmarks/calibration/as_published_ways.py`; numbers in
         `benchmarks/results/as_published.json`. Machine: {found["machine"]}. {len(base)} virtual
         trials of {found["minutes"]} min, four fish whose parameters drift and a robot, from seed
         {SEEDS} on, on which nothing was chosen. *Reported* is the S that the round states, *anew*
