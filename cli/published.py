@@ -3,26 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import click
 from click.core import ParameterSource
 
 from .options import adds
-
-AS_PUBLISHED: Mapping[str, Any] = MappingProxyType(
-    {
-        "optimiser": "deap",
-        "seed_likelihood": False,
-        "publish": "score",
-        "confirm": 0,
-        "diversity": "population",
-        "renewal": False,
-    }
-)
-"""What ``--as-published`` stands for (Cazenille et al., How to Blend a Robot within a Group of
-Zebrafish): docs/as-published.md has the table. An option that is given keeps its own value."""
 
 published_options = adds(
     click.option(
@@ -64,6 +50,8 @@ published_options = adds(
 def as_asked(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options, those of the paper's way in place of what nobody gave.
 
+    The way itself stands in `zfcal.stages.calibrate.searching`.
+
     Raises
     ------
     click.UsageError
@@ -73,10 +61,21 @@ def as_asked(options: Mapping[str, Any]) -> dict[str, Any]:
         return dict(options)
     if options["champion"] is not None:
         raise click.UsageError("--as-published publishes by score: say otherwise by --publish.")
+    from zfcal.stages.calibrate.searching import AS_PUBLISHED
+
+    settings = AS_PUBLISHED.settings
+    way = {
+        "optimiser": settings.optimiser,
+        "seed_likelihood": AS_PUBLISHED.seed_likelihood,
+        "publish": settings.champion,
+        "confirm": settings.n_confirmed,
+        "diversity": settings.diversity,
+        "renewal": settings.renews,
+    }
     source = click.get_current_context().get_parameter_source
     unsaid = {
         name: value
-        for name, value in AS_PUBLISHED.items()
+        for name, value in way.items()
         if source(name) is not ParameterSource.COMMANDLINE
     }
     return {**options, **unsaid}
