@@ -12,7 +12,6 @@ from .options import EXISTING, Decorator, adds, population_option, seed_option, 
 from .published import as_asked, published_options
 
 if TYPE_CHECKING:
-    from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.trial_context import Task
 
@@ -92,7 +91,7 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
     click.UsageError
         Two options contradict each other, or one could not take effect.
     """
-    from zfcal.behaviour.features.registry import SCORED
+    from zfcal.behaviour.features.registry import SCORED, further
     from zfcal.calibrate.task import Settings
     from zfcal.stages.calibrate.searching import CalibrateOptions
     from zfcal.stages.trial_context import Task
@@ -112,8 +111,8 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         renews=options["renewal"],
         sampler=options["sampler"],
     )
-    if options.get("cluster") is not None:
-        _check_on_cluster(settings)
+    if options.get("cluster") is not None and further(settings.features):
+        raise click.UsageError("--cluster counts D, W, O, T and V: no other --features.")
     chosen = CalibrateOptions(
         settings=settings,
         budget_s=options["budget_s"],
@@ -129,13 +128,6 @@ def choose(options: Mapping[str, Any]) -> tuple[CalibrateOptions, MakeTask]:
         return Task(dry_run=options["dry_run"], force=options["force"], ends_s=ends_s)
 
     return chosen, task
-
-
-def _check_on_cluster(settings: Settings) -> None:
-    from zfcal.behaviour.features.registry import further
-
-    if further(settings.features):
-        raise click.UsageError("--cluster counts D, W, O, T and V: no other --features.")
 
 
 CHAMPIONS: dict[str, Any] = {
