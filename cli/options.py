@@ -131,12 +131,12 @@ tank_options = adds(
     click.option("--radius-m", type=POSITIVE, help="Radius of a circular arena, in metres."),
     click.option("--side-m", type=POSITIVE, help="Side of an open-square arena, in metres."),
     click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Number of fish."),
-    click.option("--robot", is_flag=True, help="There is one robot."),
 )
-"""The tank and who swims in it, where robots are not counted by an option."""
+"""The tank and the fish in it."""
 
 arena_options = adds(
     tank_options,
+    click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
     click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Number of robots."),
 )
 """What describes the tank and who swims in it."""

@@ -40,6 +40,7 @@ from .reproducing import check_together, reproduce_archives, reproduce_virtual
 @click.option("-o", "--out", "folder", type=PLACE, help="Where it goes.  [default: reproduced]")
 @click.option("--format", "format_", type=click.Choice(FORMATS), help="Of the archives' tracks.")
 @tank_options
+@click.option("--robot", is_flag=True, help="One robot, which the file itself names.")
 @foreign_options
 @seed_option("Of the first trial that is made.  [default: 1; of the twin 9001]")
 @click.option("--force", is_flag=True, help="Make everything again.")
