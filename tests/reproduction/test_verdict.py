@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from zfcal.report.comparison.power import detectable_shift
 from zfcal.reproduction.reference import Contrast, Reference
 from zfcal.reproduction.verdict import (
     compare_all,
     compare_contrast,
     judge,
     power_of,
-    smallest_difference,
     trial_value,
 )
 
@@ -139,10 +139,10 @@ def test_power_is_what_simulated_trials_show():
 
 
 def test_the_smallest_difference_has_the_power_that_is_said():
-    """By definition; it shrinks with the standard error."""
-    found = smallest_difference(0.02, 9.0, level=0.05 / 3)
+    """By definition, at the level that is shared out; a stricter level needs a larger one."""
+    found = 0.02 * detectable_shift(9.0, alpha=0.05 / 3)
     assert power_of(found, 0.02, 9.0, level=0.05 / 3) == pytest.approx(0.8)
-    assert smallest_difference(0.01, 9.0, level=0.05 / 3) == pytest.approx(found / 2)
+    assert detectable_shift(9.0, alpha=0.05) < detectable_shift(9.0, alpha=0.05 / 3)
 
 
 def test_a_trials_value_is_the_mean_over_its_windows():

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.report.comparison.power import ALPHA, POWER
 from zfcal.reproduction.courses import FEATURES, Course
 from zfcal.reproduction.reference import Reference
-from zfcal.reproduction.verdict import LEVEL, POWER, Compared, Verdict, compare_all, judge
+from zfcal.reproduction.verdict import Compared, Verdict, compare_all, error_of, judge
 
 SCHEMA = "zfcal.reproduction/1"
 
@@ -89,6 +90,7 @@ def _interval(way: Way, reference: Reference, feature: str, end_s: int) -> Inter
     n, mean = len(values), float(values.mean())
     sd = float(values.std(ddof=1)) if n > 1 else math.nan
     published = reference.published(feature, end_s)
+    error, _ = error_of(sd, n, math.nan, reference.n_trials)
     return Interval(
         feature=feature,
         end_s=end_s,
@@ -97,11 +99,7 @@ def _interval(way: Way, reference: Reference, feature: str, end_s: int) -> Inter
         sd=sd,
         published=published,
         difference=mean - published,
-        standard_error=(
-            math.nan
-            if math.isnan(published)
-            else sd * math.sqrt(1.0 / n + 1.0 / reference.n_trials)
-        ),
+        standard_error=math.nan if math.isnan(published) else error,
     )
 
 
@@ -146,7 +144,7 @@ def document_of(
             "n_trials": reference.n_trials,
             "scoring": reference.scoring,
             "margin": reference.margin,
-            "level": LEVEL,
+            "level": ALPHA,
             "power": POWER,
         },
         "ways": [_way(way, reference) for way in ways],

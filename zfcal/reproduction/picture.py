@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from zfcal.arrays import Floats
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture
 from zfcal.reproduction.document import Way
@@ -95,7 +96,7 @@ def _draw(axes: Axes, *, ways: Sequence[Way], reference: Reference, feature: str
     axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
 
 
-def _course(way: Way, feature: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _course(way: Way, feature: str) -> tuple[Floats, Floats, Floats]:
     rows = [(end, way.values(feature, end)) for end in way.ends_s]
     rows = [(end, values) for end, values in rows if values]
     mean = np.array([np.mean(values) for _, values in rows])

@@ -17,16 +17,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize, stats
+from scipy import stats
 
+from zfcal.report.comparison.power import ALPHA, detectable_shift
 from zfcal.reproduction.reference import Contrast, Reference
 
 Verdict = Literal["agrees", "disagrees", "undecided"]
-
-LEVEL = 0.05
-"""Of the family of all contrasts."""
-
-POWER = 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,12 +67,12 @@ class Compared:
     @property
     def is_within(self) -> bool:
         """Whether the difference is known to lie within the margin."""
-        return self.p_beyond_margin < LEVEL
+        return self.p_beyond_margin < ALPHA
 
     @property
     def is_apart(self) -> bool:
         """Whether it is more than chance."""
-        return self.p < LEVEL
+        return self.p < ALPHA
 
 
 def compare_contrast(
@@ -107,13 +103,13 @@ def compare_contrast(
     mean = float(known.mean()) if n else math.nan
     difference = mean - contrast.value
     sd = float(known.std(ddof=1)) if n > 1 else math.nan
-    error, freedom = _error(sd, n, contrast.sd, reference.n_trials)
+    error, freedom = error_of(sd, n, contrast.sd, reference.n_trials)
     if not error > 0:
         nothing = dict.fromkeys(_TESTED, math.nan)
         return Compared(contrast=contrast, n=n, mean=mean, sd=sd, difference=difference, **nothing)
     law = stats.t(freedom)
     half = float(law.ppf(0.975)) * error
-    each = LEVEL / n_contrasts
+    each = ALPHA / n_contrasts
     beyond = max(
         float(law.sf((difference + reference.margin) / error)),
         float(law.cdf((difference - reference.margin) / error)),
@@ -129,7 +125,7 @@ def compare_contrast(
         high=difference + half,
         p=min(1.0, n_contrasts * 2.0 * float(law.sf(abs(difference) / error))),
         p_beyond_margin=beyond,
-        smallest_shown=smallest_difference(error, freedom, level=each),
+        smallest_shown=error * detectable_shift(freedom, alpha=each),
         power=power_of(reference.margin, error, freedom, level=each),
     )
 
@@ -145,8 +141,21 @@ _TESTED = (
 )
 
 
-def _error(sd: float, n: int, published_sd: float, n_published: int) -> tuple[float, float]:
-    """Return the standard error of the difference, and its degrees of freedom (Welch 1947)."""
+def error_of(sd: float, n: int, published_sd: float, n_published: int) -> tuple[float, float]:
+    """Return the standard error of a difference of means, and its degrees of freedom (Welch 1947).
+
+    Parameters
+    ----------
+    sd, n
+        Of our trials.
+    published_sd, n_published
+        Of the published ones; a NaN is taken to be ours.
+
+    Returns
+    -------
+    error, freedom : float
+        NaN with fewer than two trials.
+    """
     if n < 2:
         return math.nan, math.nan
     own = sd**2 / n
@@ -175,24 +184,6 @@ def power_of(difference: float, error: float, freedom: float, *, level: float) -
     """
     limit = float(stats.t.ppf(1.0 - level / 2.0, freedom))
     return float(stats.ncf.sf(limit**2, 1, freedom, (difference / error) ** 2))
-
-
-def smallest_difference(error: float, freedom: float, *, level: float) -> float:
-    """Return the true difference that shows with a probability of `POWER`.
-
-    Parameters
-    ----------
-    error, freedom, level
-        As for `power_of`.
-    """
-
-    def short(ratio: float) -> float:
-        return power_of(ratio, 1.0, freedom, level=level) - POWER
-
-    most = 2.0
-    while short(most) < 0:
-        most *= 2.0
-    return error * float(optimize.brentq(short, 0.0, most))
 
 
 def judge(compared: Sequence[Compared]) -> Verdict:

@@ -95,8 +95,26 @@ def detectable_effect(n_a: int, n_b: int, *, alpha: float = ALPHA, power: float 
             f"Power must lie in [0.5, 1) and alpha in (0, 0.5), got {power!r} and {alpha!r}."
         )
 
-    df = n_a + n_b - 2
-    critical = float(t.isf(alpha / 2, df))
-    # Of the effects that are looked for, none has a chance worth naming beyond the other end.
-    shift = float(nctdtrinc(df, 1 - power, critical))
+    shift = detectable_shift(n_a + n_b - 2, alpha=alpha, power=power)
     return shift / math.sqrt(n_a * n_b / (n_a + n_b))
+
+
+def detectable_shift(df: float, *, alpha: float = ALPHA, power: float = POWER) -> float:
+    """Return the smallest true difference that a t test of both signs finds with some power.
+
+    Parameters
+    ----------
+    df
+        Degrees of freedom.
+    alpha
+        Level of the test.
+    power
+        How often it is to be found, from one half to one.
+
+    Returns
+    -------
+    float
+        In standard errors of the difference.
+    """
+    # Of the effects that are looked for, none has a chance worth naming beyond the other end.
+    return float(nctdtrinc(df, 1 - power, float(t.isf(alpha / 2, df))))
