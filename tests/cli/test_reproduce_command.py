@@ -5,6 +5,9 @@ import json
 import pytest
 
 from zfcal.artifacts.validation import check
+from zfcal.reproduction.courses import driving_courses, models_of
+from zfcal.reproduction.twin import random_start
+from zfcal.stages.trial_context import open_trial
 
 QUICK = ("--generations", "0")
 TANK = ("--arena", "open-square", "--fish", "3", "--robot", "--fps", "5")
@@ -85,6 +88,33 @@ def test_tracks_of_another_program_become_a_trial(zfcal, tracks_csv, tmp_path, m
     done = zfcal("reproduce", "old.csv", "-o", "again", *TANK, *QUICK)
     assert done.code == 4, done.err
     assert said(tmp_path / "again")["ways"][0]["trials"] == ["old"]
+
+
+def test_a_table_that_was_changed_is_made_again(zfcal, archive, tmp_path):
+    """And said; the numbers are those that they were."""
+    zfcal("reproduce", "trial", "-o", "again", *QUICK)
+    place = tmp_path / "again" / "reproduction.csv"
+    whole = place.read_bytes()
+    place.write_bytes(whole[:100])
+    done = zfcal("reproduce", "trial", "-o", "again", *QUICK, "-v")
+    assert "reproduction.csv is missing or was changed" in done.err
+    assert place.read_bytes() == whole
+
+
+def test_until_180_s_a_robot_has_what_it_began_with(zfcal, tracks_csv, tmp_path, monkeypatch):
+    """Then the model of the window that ended two minutes before, whatever it began with."""
+    monkeypatch.chdir(tmp_path)
+    tracks_csv("old.csv", seconds=250)
+    zfcal("reproduce", "old.csv", "-o", "again", *TANK, *QUICK)
+    root = tmp_path / "again" / "old"
+    given = models_of(open_trial(root))[0]
+    one, other = driving_courses(root, [given, random_start(root)])
+    assert {end_s for _, end_s in one} == {120, 180, 240}
+    assert one["S", 120] != other["S", 120]
+    assert one["S", 180] != other["S", 180]
+    assert one["S", 240] == other["S", 240]
+    (root / "models" / "000120.toml").write_bytes((root / "models" / "000180.toml").read_bytes())
+    assert driving_courses(root, [given])[0]["S", 240] != one["S", 240]
 
 
 @pytest.mark.parametrize(("words", "says"), [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +89,7 @@ def _paths(model: Parameters, opened: OpenTrial, end_s: int) -> Samples:
     return as_samples(xy_m, trial.dt_s)
 
 
-def driving_course(root: Path, start: Parameters | None = None) -> Course:
+def driving_courses(root: Path, starts: Sequence[Parameters]) -> list[Course]:
     """Return the score, on each window, of the model that drove in the window's last minute.
 
     A round begins with the end of its window and takes a minute, as on the published rig: in a
@@ -100,22 +100,25 @@ def driving_course(root: Path, start: Parameters | None = None) -> Course:
     ----------
     root
         A calibrated trial with statistics. Models are simulated anew, with other random numbers.
-    start
-        What drove at first; None for the trial's own starting model.
+    starts
+        Models with which the robot could have begun.
+
+    Returns
+    -------
+    list of Course
+        One for each start.
     """
     opened = open_trial(root)
-    models = models_of(opened)
-    if start is not None:
-        models[0] = start
-    found: dict[tuple[str, int], float] = {}
+    made = {end_s: model for end_s, model in models_of(opened).items() if end_s > 0}
+    courses: list[dict[tuple[str, int], float]] = [{} for _ in starts]
     for end_s, path in numbered_of(root / "stats", ".parquet").items():
-        before = [made_s for made_s in models if made_s <= end_s - 2 * STEP_S]
-        if not before:
-            continue
         control = read_control(path, opened.arena.zone_names)
-        simulated = _long_run(models[max(before)], opened, end_s)
-        found |= _rows(compare(simulated, control), end_s)
-    return found
+        before = [made_s for made_s in made if made_s <= end_s - 2 * STEP_S]
+        drove = [made[max(before)]] if before else starts
+        rows = [_rows(compare(_long_run(model, opened, end_s), control), end_s) for model in drove]
+        for k in range(len(starts)):
+            courses[k] |= rows[0 if before else k]
+    return list(courses)
 
 
 def models_of(opened: OpenTrial) -> dict[int, Parameters]:

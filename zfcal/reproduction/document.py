@@ -115,6 +115,7 @@ def document_of(
     lineage: Lineage,
     *,
     further: Mapping[str, JSON],
+    files: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return a reproduction as one document; the verdict is that of the first way.
 
@@ -128,6 +129,8 @@ def document_of(
         Of the reproduction.
     further
         What else there is to say, such as the statements that a twin is held against.
+    files
+        SHA-256 of table and picture, by name.
 
     Returns
     -------
@@ -149,6 +152,7 @@ def document_of(
         },
         "ways": [_way(way, reference) for way in ways],
         **further,
+        "files": dict(files),
         "lineage": origin,
     }
 
@@ -203,47 +207,62 @@ def _cell(value: float | str) -> str:
     return str(value)
 
 
-def lines_of(way: Way, reference: Reference) -> list[str]:
-    """Return what a way has found as lines for a terminal.
+def lines_of(document: Mapping[str, Any]) -> list[str]:
+    """Return what was found as texts for a terminal, one for each way and each statement.
 
     Per window S beside the published one, then each contrast with what these trials could show.
+
+    Parameters
+    ----------
+    document
+        As `document_of` returns it.
     """
-    compared, verdict = judged(way, reference)
-    n = max((each.n for each in compared), default=0)
-    lines = [f"{way.name}, {_count(n)}:"]
+    found = [_way_text(way, document["reference"]) for way in document["ways"]]
+    return [*found, *(_statement_text(each) for each in document.get("statements", ()))]
+
+
+def _way_text(way: Mapping[str, Any], reference: Mapping[str, Any]) -> str:
+    lines = [f"{way['name']}, {_count(len(way['trials']))}:"]
     lines += [
-        f"  window to {each.end_s:>5} s  S {_spread(each)}{_beside(each)}"
-        for each in intervals_of(way, reference)
-        if each.feature == "S"
+        f"  window to {each['end_s']:>5} s  S {_spread(each)}{_beside(each)}"
+        for each in way["intervals"]
+        if each["feature"] == "S"
     ]
-    lines += [f"  {line}" for each in compared for line in _contrast_lines(each, reference)]
-    return [*lines, f"  verdict: {verdict}"]
+    lines += [f"  {line}" for each in way["contrasts"] for line in _contrast_lines(each, reference)]
+    return "\n".join([*lines, f"  verdict: {way['verdict']}"])
 
 
 def _count(n: int) -> str:
     return "1 trial" if n == 1 else f"{n} trials"
 
 
-def _spread(each: Interval) -> str:
-    return f"{each.mean:.3f}" + ("" if math.isnan(each.sd) else f" ± {each.sd:.3f}")
+def _spread(each: Mapping[str, Any]) -> str:
+    return f"{each['mean']:.3f}" + ("" if each["sd"] is None else f" ± {each['sd']:.3f}")
 
 
-def _beside(each: Interval) -> str:
-    if math.isnan(each.published):
+def _beside(each: Mapping[str, Any]) -> str:
+    if each["published"] is None:
         return ""
-    error = "" if math.isnan(each.standard_error) else f" (se {each.standard_error:.3f})"
-    return f"   published {each.published:.3f}   difference {each.difference:+.3f}{error}"
+    error = "" if each["standard_error"] is None else f" (se {each['standard_error']:.3f})"
+    return f"   published {each['published']:.3f}   difference {each['difference']:+.3f}{error}"
 
 
-def _contrast_lines(each: Compared, reference: Reference) -> list[str]:
-    contrast = each.contrast
-    head = f"{contrast.name}: {contrast.feature} {each.mean:.3f}, published {contrast.value:.3f}"
-    if math.isnan(each.standard_error):
-        return [f"{head}; with {_count(each.n)} there is no standard error, and no verdict"]
-    span = f"{each.difference:+.3f} ({each.low:+.3f} to {each.high:+.3f})"
-    could = f"{_count(each.n)} show a difference of {each.smallest_shown:.3f}"
-    margin = f"one of the margin, {reference.margin:g}, with {each.power:.2f}"
+def _contrast_lines(each: Mapping[str, Any], reference: Mapping[str, Any]) -> list[str]:
+    mean = "none" if each["mean"] is None else f"{each['mean']:.3f}"
+    head = f"{each['name']}: {each['feature']} {mean}, published {each['published']:.3f}"
+    n = _count(each["n"])
+    if each["standard_error"] is None:
+        return [f"{head}; with {n} there is no standard error, and no verdict"]
+    span = f"{each['difference']:+.3f} ({each['low']:+.3f} to {each['high']:+.3f})"
+    shown = f"{each['smallest_shown']:.3f} with a probability of {reference['power']:g}"
+    margin = f"one of the margin, {reference['margin']:g}, with {each['power']:.2f}"
     return [
-        f"{head}, difference {span}, p {each.p:.2g}",
-        f"  {could} with a probability of {POWER:g}; {margin}",
+        f"{head}, difference {span}, p {each['p']:.2g}",
+        f"  {n} show a difference of {shown}; {margin}",
     ]
+
+
+def _statement_text(each: Mapping[str, Any]) -> str:
+    mean = "none" if each["mean"] is None else f"{each['mean']:+.3f}"
+    span = "" if each["low"] is None else f" ({each['low']:+.3f} to {each['high']:+.3f})"
+    return f"{each['way']}: {each['says']}: {each['holds']}; {each['measured']} {mean}{span}"

@@ -6,14 +6,15 @@ The commands are the ordinary ones; what they make stays, so that a second run h
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from zfcal.artifacts.atomic import write_bytes_whole
-from zfcal.artifacts.freshness import hash_inputs
+from zfcal.artifacts.atomic import write_bytes_whole, write_text_whole
+from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
-from zfcal.artifacts.reading.contents import numbered_of, read_limited
+from zfcal.artifacts.reading.contents import numbered_of, sha256_of
+from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError
 from zfcal.report.figures.panels import png_of
 from zfcal.reproduction.archives import Archives, bring_in
@@ -23,7 +24,6 @@ from zfcal.reproduction.document import (
     Way,
     document_of,
     intervals_csv,
-    judged,
     lines_of,
 )
 from zfcal.reproduction.picture import reproduction_picture
@@ -101,19 +101,21 @@ def reproduce(
     """
     task = task or Task()
     roots = bring_in(archives, folder, tell, task=task)
-    courses: dict[str, Course] = {}
     for root in roots:
         calibrated(root, options.calibrate, tell, task=task)
-        courses[root.name] = course_of(root, options.scored_by)
-    if not any(courses.values()):
-        raise InputError(
-            f"{folder}: no archive has a window with a model.",
-            hint="A window takes two whole minutes of tracks.",
-        )
-    ways = [Way(name=options.way, courses=courses)]
+
+    def ways() -> tuple[list[Way], dict[str, JSON]]:
+        courses = {root.name: course_of(root, options.scored_by) for root in roots}
+        if not any(courses.values()):
+            raise InputError(
+                f"{folder}: no archive has a window with a model.",
+                hint="A window takes two whole minutes of tracks.",
+            )
+        return [Way(name=options.way, courses=courses)], {}
+
     said: dict[str, JSON] = {"way": options.way, "scoring": options.scored_by}
-    found = Found(ways=ways, reference=options.reference, roots=roots, options=said)
-    return publish(found, folder, tell)
+    origin = Origin(reference=options.reference, roots=roots, options=said)
+    return publish(origin, ways, folder, tell, task=task)
 
 
 def calibrated(root: Path, options: CalibrateOptions, tell: Tell, *, task: Task) -> None:
@@ -128,77 +130,103 @@ def course_of(root: Path, scoring: Scoring) -> Course:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """What a reproduction has found.
+class Origin:
+    """What a reproduction comes from.
 
     Parameters
     ----------
-    ways
-        The first one decides.
     reference
         What was published.
     roots
         The trials that the numbers come from.
     options
-        What bears on the result, for the lineage.
-    further
-        More of the document.
+        What else bears on the result.
     """
 
-    ways: Sequence[Way]
     reference: Reference
     roots: Sequence[Path]
     options: Mapping[str, JSON]
-    further: Mapping[str, JSON] = field(default_factory=dict)
+
+    def lineage(self, folder: Path) -> Lineage:
+        """Return where the document comes from, paths relative to its folder."""
+        models = [p for root in self.roots for p in numbered_of(root / "models", ".toml").values()]
+        digest = hashlib.sha256(repr(self.reference).encode()).hexdigest()
+        return Lineage(
+            schema=SCHEMA,
+            command="reproduce",
+            options={**self.options, "reference": digest},
+            inputs=hash_inputs(folder, models),
+        )
 
 
-def publish(found: Found, folder: Path, tell: Tell) -> Verdict:
-    """Write document, table and picture where they have changed, and tell what was found.
+def publish(
+    origin: Origin,
+    ways: Callable[[], tuple[Sequence[Way], Mapping[str, JSON]]],
+    folder: Path,
+    tell: Tell,
+    *,
+    task: Task,
+) -> Verdict:
+    """Write document, table and picture unless they are up to date, and tell what was found.
 
     Parameters
     ----------
-    found
-        What there is to tell.
+    origin
+        What they come from.
+    ways
+        Returns the ways, of which the first decides, and more of the document.
     folder
         Where they go.
     tell
         Hears of them.
+    task
+        A forced one makes them again.
 
     Returns
     -------
     str
         The verdict.
     """
-    ways, reference = found.ways, found.reference
-    models = [p for root in found.roots for p in numbered_of(root / "models", ".toml").values()]
-    lineage = Lineage(
-        schema=SCHEMA,
-        command="reproduce",
-        options={**found.options, "reference": _hash_of(reference)},
-        inputs=hash_inputs(folder, models),
-    )
-    document = document_of(ways, reference, lineage, further=found.further)
-    contents = {
-        ".json": (to_json(document) + "\n").encode(),
-        ".csv": intervals_csv(ways, reference).encode(),
-        ".png": png_of(reproduction_picture(ways, reference)),
-    }
-    for ending, content in contents.items():
-        _write(folder / Path(NAME).with_suffix(ending), content, tell)
-    for way in ways:
-        tell(Note(text="\n".join(lines_of(way, reference))))
+    place, lineage = folder / NAME, origin.lineage(folder)
+    reason = "forced" if task.force else _reason(place, lineage)
+    if reason is not None:
+        _write(place, *ways(), origin.reference, lineage)
+    document = read_json(place)
+    for path in (place, *(folder / name for name in document["files"])):
+        tell(UpToDate(path=path) if reason is None else Made(path=path, reason=reason))
+    for text in lines_of(document):
+        tell(Note(text=text))
     tell(Result(value=document))
-    return judged(ways[0], reference)[1]
+    verdict: Verdict = document["verdict"]
+    return verdict
 
 
-def _hash_of(reference: Reference) -> str:
-    return hashlib.sha256(repr(reference).encode()).hexdigest()
+def _reason(place: Path, lineage: Lineage) -> str | None:
+    """Return why the document has to be made; None if it and its files are as they were made."""
+    reason = stale_reason([place], lineage)
+    if reason is not None:
+        return reason
+    for name, digest in read_json(place)["files"].items():
+        path = place.with_name(name)
+        if not path.is_file() or sha256_of(path) != digest:
+            return f"{name} is missing or was changed"
+    return None
 
 
-def _write(path: Path, content: bytes, tell: Tell) -> None:
-    if path.is_file() and read_limited(path) == content:
-        tell(UpToDate(path=path))
-        return
-    reason = "changed" if path.exists() else "missing"
-    write_bytes_whole(path, content)
-    tell(Made(path=path, reason=reason))
+def _write(
+    place: Path,
+    ways: Sequence[Way],
+    further: Mapping[str, JSON],
+    reference: Reference,
+    lineage: Lineage,
+) -> None:
+    contents = {
+        place.with_suffix(".csv"): intervals_csv(ways, reference).encode(),
+        place.with_suffix(".png"): png_of(reproduction_picture(ways, reference)),
+    }
+    for path, content in contents.items():
+        write_bytes_whole(path, content)
+    files = {path.name: sha256_of(path) for path in contents}
+    document = document_of(ways, reference, lineage, further=further, files=files)
+    check(document, "reproduction", place)
+    write_text_whole(place, to_json(document) + "\n")

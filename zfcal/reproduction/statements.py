@@ -54,12 +54,6 @@ class Statement:
     high: float
     holds: Holds
 
-    @property
-    def text(self) -> str:
-        """The statement as a line."""
-        span = "" if math.isnan(self.low) else f" ({self.low:+.3f} to {self.high:+.3f})"
-        return f"{self.way}: {self.says}: {self.holds}; {self.measured} {self.mean:+.3f}{span}"
-
     def as_dict(self) -> dict[str, JSON]:
         """Return it for a document; what is not known is null."""
         numbers = {"mean": self.mean, "low": self.low, "high": self.high}

@@ -18,14 +18,14 @@ from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters, from_genes, n_genes
 from zfcal.reproduction.archives import copy_trial
-from zfcal.reproduction.courses import Course, driving_course, reported_course
+from zfcal.reproduction.courses import Course, driving_courses, models_of, reported_course
 from zfcal.reproduction.document import Way
 from zfcal.reproduction.reference import Reference
-from zfcal.reproduction.reproduce import Found, calibrated, publish
+from zfcal.reproduction.reproduce import Origin, calibrated, publish
 from zfcal.reproduction.statements import statements_of
 from zfcal.reproduction.verdict import Verdict
 from zfcal.stages.calibrate.searching import AS_PUBLISHED, CalibrateOptions
-from zfcal.stages.events import Note, Progress, Tell
+from zfcal.stages.events import Progress, Tell
 from zfcal.stages.trial_context import Task, open_trial
 from zfcal.virtual.closed_loop import closed_loop
 from zfcal.virtual.trial import LoopOptions
@@ -99,31 +99,32 @@ def reproduce_twin(
     default = _all_calibrated(
         recorded, folder / "default", CalibrateOptions(keeps_way=True), tell, task
     )
-    ways = [
-        Way(name="as published", courses=_by_name(published, reported_course)),
-        Way(name="driving, random start", courses=_by_name(published, _driven_from_random)),
-        Way(name="driving, given start", courses=_by_name(published, driving_course)),
-        Way(name="our default", courses=_by_name(default, reported_course)),
-    ]
-    statements = statements_of(ways, reference)
-    further: dict[str, JSON] = {"statements": [each.as_dict() for each in statements]}
+
+    def ways() -> tuple[list[Way], dict[str, JSON]]:
+        driven = {root.name: _driven(root) for root in published}
+        found = [
+            Way(name="as published", courses=_by_name(published, reported_course)),
+            Way(
+                name="driving, random start",
+                courses={name: both[0] for name, both in driven.items()},
+            ),
+            Way(
+                name="driving, given start",
+                courses={name: both[1] for name, both in driven.items()},
+            ),
+            Way(name="our default", courses=_by_name(default, reported_course)),
+        ]
+        statements: list[JSON] = [each.as_dict() for each in statements_of(found, reference)]
+        return found, {"statements": statements}
+
     said: dict[str, JSON] = {
         "twin": True,
         "n_trials": options.n_trials,
         "duration_s": options.duration_s,
         "seed": options.seed,
     }
-    found = Found(
-        ways=ways,
-        reference=reference,
-        roots=[*published, *default],
-        options=said,
-        further=further,
-    )
-    verdict = publish(found, folder, tell)
-    for each in statements:
-        tell(Note(text=each.text))
-    return verdict
+    origin = Origin(reference=reference, roots=[*published, *default], options=said)
+    return publish(origin, ways, folder, tell, task=task)
 
 
 def _recorded(options: TwinOptions, folder: Path, tell: Tell, task: Task) -> list[Path]:
@@ -159,8 +160,9 @@ def _by_name(roots: Sequence[Path], course: Callable[[Path], Course]) -> dict[st
     return {root.name: course(root) for root in roots}
 
 
-def _driven_from_random(root: Path) -> Course:
-    return driving_course(root, random_start(root))
+def _driven(root: Path) -> list[Course]:
+    """Return what drove a robot that began with random parameters, and with the trial's model."""
+    return driving_courses(root, [random_start(root), models_of(open_trial(root))[0]])
 
 
 def random_start(root: Path) -> Parameters:
