@@ -29,7 +29,7 @@ T = TypeVar("T")
 Damage: TypeAlias = Callable[[DamagedError | SchemaError], None]
 """Hears of each file that is left out."""
 
-TABLES = ("tracks", "stats", "scores", "rules", "parameters", "findings")
+TABLES = ("tracks", "stats", "following", "scores", "rules", "parameters", "findings")
 """The tables of a trial: the methods of `TrialTables` that return one."""
 
 _PARAMETERS = (
