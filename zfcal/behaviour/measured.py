@@ -99,6 +99,9 @@ def floor_of(values: Floats) -> Floats:
 def quantile_of(values: Floats, share: float, *, between: bool = True) -> Floats:
     """Return a quantile of each column, NaN left out; NaN of a column without a value.
 
+    That of `numpy.nanquantile`, which goes column by column and takes some fifty times as long
+    for 19 shifts of 24 measures.
+
     Parameters
     ----------
     values : ndarray, shape (row, column)
