@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.freshness import hash_inputs
@@ -43,6 +43,7 @@ from zfcal.stages.calibrate.searching import (
     checkpoint_key,
     run_search,
 )
+from zfcal.stages.calibrate.way import as_before
 from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
 from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.skipping import skipped_path, without_skipped
@@ -157,7 +158,7 @@ class Calibrate(Stage[_Shared, _Window]):
 
     def open(self, run: Run) -> _Shared:
         """Read the trial and its starting model."""
-        opened, options = open_trial(run.root), _as_before(run.root, self.options)
+        opened, options = open_trial(run.root), as_before(run.root, self.options)
         group = make_group(opened, options)
         return _Shared(run=run, opened=opened, options=options, group=group)
 
@@ -181,52 +182,6 @@ class Calibrate(Stage[_Shared, _Window]):
             return None
         control = _control_or_tell(shared, places)
         return None if control is None else _round(shared, key, control)
-
-
-def _as_before(root: Path, options: CalibrateOptions) -> CalibrateOptions:
-    """Return options that publish as the rounds that a trial has, if that is wanted.
-
-    Raises
-    ------
-    InputError
-        None of the trial's rounds can be read, or they publish an estimate, which is not made.
-    """
-    if not options.keeps_way:
-        return options
-    champion = _champion_of(root)
-    if champion is None:
-        champion = "forward" if options.settings.is_scored else "score"
-    if champion == "likely" and not options.seed_likelihood:
-        raise InputError(
-            f"{root}: its rounds publish the likelihood estimate, which is not made.",
-            hint="Say what to publish instead: --publish forward or --publish score.",
-        )
-    return replace(options, settings=replace(options.settings, champion=champion))
-
-
-def _champion_of(root: Path) -> Any:
-    """Return by what the first round that can be read publishes; None where there are no rounds.
-
-    A model without a population is no round that another could go on from.
-    """
-    damaged: list[Path] = []
-    for ending in (".toml", ".parquet"):
-        for end, path in sorted(numbered_of(root / "models", ending).items()):
-            if end == 0 or not is_regular(path):
-                continue
-            try:
-                lineage = read_lineage(path)
-            except (InputError, DamagedError):
-                damaged += [path] if ending == ".parquet" else []
-                continue
-            if lineage.command == "calibrate":
-                return lineage.options.get("champion", "score")
-    if damaged:
-        raise InputError(
-            f"{damaged[0]}: cannot be read, nor can another round say what the trial publishes.",
-            hint="Say it: --publish forward, score or likelihood.",
-        )
-    return None
 
 
 def make_group(opened: OpenTrial, options: CalibrateOptions) -> Simulator:
