@@ -118,7 +118,9 @@ def _level(name: str, rows: Sequence[Mapping[str, Any]]) -> Level:
     n = np.array([count or 0 for count in counts], dtype=np.float64)
     weights = n if name in _SHARES else np.ones(len(ordered))
     own = _apart([int(row["window_end_s"]) for row in ordered], ~np.isnan(value))
-    interval = (np.nan, np.nan) if name in _SHARES else _interval(value[own])
+    interval = (
+        (np.nan, np.nan) if name in _SHARES else mean_interval(value[own], least=_LEAST_WINDOWS)
+    )
     return Level(
         value=_mean(value, weights),
         low=interval[0],
@@ -142,9 +144,17 @@ def _apart(ends_s: Sequence[int], known: Bools) -> list[int]:
     return chosen
 
 
-def _interval(values: Floats) -> tuple[float, float]:
-    """Return the 95 % interval of a mean, by Student's t."""
-    if len(values) < _LEAST_WINDOWS:
+def mean_interval(values: Floats, *, least: float = 2) -> tuple[float, float]:
+    """Return the 95 % interval of a mean, by Student's t.
+
+    Parameters
+    ----------
+    values : ndarray, shape (observation,)
+        All of them known.
+    least
+        With fewer there is none: NaN.
+    """
+    if len(values) < least:
         return np.nan, np.nan
     half = float(stats.t.ppf(0.975, len(values) - 1)) * float(stats.sem(values))
     mean = float(values.mean())

@@ -9,10 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.report.comparison.power import ALPHA, POWER
+from zfcal.report.numbers import mean_and_sd
 from zfcal.reproduction.courses import FEATURES, Course
 from zfcal.reproduction.reference import Reference
 from zfcal.reproduction.verdict import Compared, Verdict, compare_all, error_of, judge
@@ -86,9 +85,8 @@ def intervals_of(way: Way, reference: Reference) -> list[Interval]:
 
 
 def _interval(way: Way, reference: Reference, feature: str, end_s: int) -> Interval:
-    values = np.array(way.values(feature, end_s))
-    n, mean = len(values), float(values.mean())
-    sd = float(values.std(ddof=1)) if n > 1 else math.nan
+    values = way.values(feature, end_s)
+    n, (mean, sd) = len(values), mean_and_sd(values)
     published = reference.published(feature, end_s)
     error, _ = error_of(sd, n, math.nan, reference.n_trials)
     return Interval(

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from zfcal.arrays import Floats
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture
+from zfcal.report.numbers import mean_and_sd
 from zfcal.reproduction.document import Way
 from zfcal.reproduction.reference import Reference
 
@@ -99,8 +100,7 @@ def _draw(axes: Axes, *, ways: Sequence[Way], reference: Reference, feature: str
 def _course(way: Way, feature: str) -> tuple[Floats, Floats, Floats]:
     rows = [(end, way.values(feature, end)) for end in way.ends_s]
     rows = [(end, values) for end, values in rows if values]
-    mean = np.array([np.mean(values) for _, values in rows])
-    sd = np.array([np.std(values, ddof=1) if len(values) > 1 else np.nan for _, values in rows])
+    mean, sd = np.array([mean_and_sd(values) for _, values in rows]).reshape(-1, 2).T
     return np.array([end for end, _ in rows], dtype=np.float64), mean, sd
 
 

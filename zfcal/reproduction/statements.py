@@ -13,9 +13,9 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from scipy import stats
 
 from zfcal.artifacts.lineage import JSON
+from zfcal.report.followed import mean_interval
 from zfcal.reproduction.courses import Course
 from zfcal.reproduction.document import Way
 from zfcal.reproduction.reference import Reference
@@ -146,10 +146,7 @@ def _statement(
     values = np.array([of(course) for course in way.courses.values()])
     values = values[np.isfinite(values)]
     n, mean = len(values), float(values.mean()) if len(values) else math.nan
-    low = high = math.nan
-    if n > 1:
-        half = float(stats.t.ppf(0.975, n - 1) * stats.sem(values))
-        low, high = mean - half, mean + half
+    low, high = mean_interval(values)
     holds: Holds = "open"
     if low > bounds[0] and high < bounds[1]:
         holds = "holds"

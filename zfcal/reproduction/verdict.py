@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import stats
 
 from zfcal.report.comparison.power import ALPHA, detectable_shift
+from zfcal.report.numbers import mean_and_sd
 from zfcal.reproduction.reference import Contrast, Reference
 
 Verdict = Literal["agrees", "disagrees", "undecided"]
@@ -76,7 +76,7 @@ class Compared:
 
 
 def compare_contrast(
-    contrast: Contrast, values: ArrayLike, reference: Reference, *, n_contrasts: int
+    contrast: Contrast, values: Sequence[float], reference: Reference, *, n_contrasts: int
 ) -> Compared:
     """Hold one contrast of our trials against the published one.
 
@@ -84,7 +84,7 @@ def compare_contrast(
     ----------
     contrast
         One of the reference's.
-    values : array_like, shape (trial,)
+    values
         Its value in each of our trials; NaN where a trial has none.
     reference
         Says how many trials the published mean is of. Where no standard deviation was published,
@@ -97,12 +97,8 @@ def compare_contrast(
     Compared
         NaN throughout but for mean and difference with less than two trials.
     """
-    known = np.asarray(values, dtype=np.float64)
-    known = known[np.isfinite(known)]
-    n = len(known)
-    mean = float(known.mean()) if n else math.nan
+    n, (mean, sd) = sum(not math.isnan(value) for value in values), mean_and_sd(values)
     difference = mean - contrast.value
-    sd = float(known.std(ddof=1)) if n > 1 else math.nan
     error, freedom = error_of(sd, n, contrast.sd, reference.n_trials)
     if not error > 0:
         nothing = dict.fromkeys(_TESTED, math.nan)
