@@ -122,6 +122,7 @@ def test_the_recorded_counts_are_those_of_the_simulation(group, genes, n_counted
         np.testing.assert_array_equal(table, getattr(counted, ATTRIBUTES[name]))
 
 
+@pytest.mark.slow
 def test_both_samplers_have_one_law(group, genes):
     """Two hours by either are alike; where every kappa_0 is a quarter, 0.90 to 0.93 shows it.
 

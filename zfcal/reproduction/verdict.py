@@ -103,12 +103,11 @@ def compare_contrast(
     if not error > 0:
         nothing = dict.fromkeys(_TESTED, math.nan)
         return Compared(contrast=contrast, n=n, mean=mean, sd=sd, difference=difference, **nothing)
-    law = stats.t(freedom)
-    half = float(law.ppf(0.975)) * error
+    half = float(stats.t.ppf(0.975, freedom)) * error
     each = ALPHA / n_contrasts
     beyond = max(
-        float(law.sf((difference + reference.margin) / error)),
-        float(law.cdf((difference - reference.margin) / error)),
+        float(stats.t.sf((difference + reference.margin) / error, freedom)),
+        float(stats.t.cdf((difference - reference.margin) / error, freedom)),
     )
     return Compared(
         contrast=contrast,
@@ -119,7 +118,7 @@ def compare_contrast(
         standard_error=error,
         low=difference - half,
         high=difference + half,
-        p=min(1.0, n_contrasts * 2.0 * float(law.sf(abs(difference) / error))),
+        p=min(1.0, n_contrasts * 2.0 * float(stats.t.sf(abs(difference) / error, freedom))),
         p_beyond_margin=beyond,
         smallest_shown=error * detectable_shift(freedom, alpha=each),
         power=power_of(reference.margin, error, freedom, level=each),
