@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.calibrate import rounds
 from zfcal.calibrate.task import Settings
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
@@ -58,8 +59,8 @@ def measure(root: Path, minutes: int, budget_s: float) -> dict[str, Any]:
     simulate(root, SimulateOptions(model=model, duration_s=60.0 * minutes), say_nothing)
     analyse(root, AnalyseOptions(), say_nothing)
     last_s = 60 * minutes
-    for path in (root / "stats").iterdir():
-        if int(path.stem) < last_s - 60 * _ROUNDS_BEFORE:
+    for end_s, path in numbered_of(root / "stats", ".parquet").items():
+        if end_s < last_s - 60 * _ROUNDS_BEFORE:
             path.unlink()
     short = CalibrateOptions(settings=Settings(generations=1, champion="forward"))
     before = Task(ends_s=frozenset(range(last_s - 60 * _ROUNDS_BEFORE, last_s, 60)))
