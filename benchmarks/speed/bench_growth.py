@@ -131,7 +131,7 @@ def both_ways_ns(arena: Arena, n_agents: int, n_steps: int, *, repeats: int) -> 
 
     def run_all_pairs() -> None:
         counts = empty_counts(1, 1, n_zones)
-        count_runs(0, 1, seeds, sizes, people, packed, tank, counts)
+        count_runs(0, 1, seeds, sizes, people, np.empty((0, 3)), packed, tank, counts)
 
     least = [np.inf, np.inf]
     for _ in range(1 + repeats):

@@ -44,7 +44,7 @@ def words_per_step(steps: int, people: Floats, packed: Packed, tank: Tank, rando
     """Return how many random words an agent-step takes, by a twin that catches up."""
     n = people.shape[1]
     state, work, sight = np.zeros((STATES, n)), make_work(n, 0, GRID), make_sight(in_vectors(n * n))
-    start(state, 0, packed, tank, people, work, random)
+    start(state, 0, packed, tank, people, np.empty((0, 3)), work, random)
     twin, words = random.copy(), 0
     for _ in range(steps):
         advance(state, 0, packed, tank, sight, random, work, False)

@@ -31,7 +31,7 @@ from zfcal.calibrate.rounds import calibrate_window
 from zfcal.calibrate.scheduler import connect
 from zfcal.calibrate.task import Settings, Task
 from zfcal.errors import InputError, ZfcalError
-from zfcal.model.simulate import Counts
+from zfcal.model.simulate import Counts, Start, simulate_tracks
 from zfcal.parameters import natural
 
 distributed = pytest.importorskip("distributed", reason="the extra zfcal[cluster] is not there")
@@ -171,6 +171,16 @@ def test_a_population_counts_the_same_as_here(two, group, genes):
     assert there.occupation.shape == (12, 3, 2)
     assert there.occupation.sum() == 12 * 3 * 300 * 5
     assert same(here, there)
+
+
+def test_a_group_begins_where_it_was_seen_there_as_well(two, group, genes):
+    """Poses travel with the group."""
+    xy_m, heading = simulate_tracks(group.template, group.arena, n_agents=5, n_steps=1, seed=4)
+    start = Start(poses=np.column_stack([xy_m[0], heading[0]]), time_s=12.0)
+    words = {"n_counted": 4, "n_steps": 100, "seeds": SEEDS}
+    there = ClusterGroup(group=group, cluster=two).begun(start).simulate(genes, **words)
+    assert same(there, group.begun(start).simulate(genes, **words))
+    assert not same(there, group.simulate(genes, **words))
 
 
 def test_the_many_windows_of_one_model_count_the_same_as_here(two, group, genes):

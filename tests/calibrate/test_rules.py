@@ -8,6 +8,7 @@ import pytest
 
 from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import Statistics
+from zfcal.calibrate.judging import by_long_runs
 from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
@@ -64,6 +65,12 @@ def row(rule, end_s, score):
     )
 
 
+def judged(record, control, end_s, noise):
+    """Return a record with the models that are due, by their long runs."""
+    found = by_long_runs(record.due(end_s), control, noise)
+    return record.judged(found, end_s=end_s, n=int(control.occupation.sum()))
+
+
 def record_of(scores, *, n_rounds=5, in_charge=NEAREST):
     """Return a record of rules, each with a score per minute."""
     rows = [
@@ -78,9 +85,9 @@ def record_of(scores, *, n_rounds=5, in_charge=NEAREST):
 def test_a_model_is_judged_on_the_first_window_that_begins_after_it_was_made():
     """One made at 120 s is judged at 240 s and not at 180 s, whose first minute it has seen."""
     record = Record(models=(model(SCORE, 120), model(SCORE, 180)))
-    assert record.judged(statistics(), 180, NOISE).rows == ()
-    assert record.judged(statistics(), 239, NOISE).rows == ()
-    (found,) = record.judged(statistics(), 240, NOISE).rows
+    assert judged(record, statistics(), 180, NOISE).rows == ()
+    assert judged(record, statistics(), 239, NOISE).rows == ()
+    (found,) = judged(record, statistics(), 240, NOISE).rows
     assert (found.window_end_s, found.made_at_s, found.rule) == (240, 120, SCORE)
 
 
@@ -88,7 +95,7 @@ def test_a_row_says_what_the_model_scores_and_how_far_windows_differ():
     """S by the definition, 1.96 standard deviations to each side and no farther than 0 and 1."""
     control = statistics(40)
     record = Record(models=(model(SCORE, 120, n_first=60), model(KEEP, 120, n_first=40)))
-    first, second = record.judged(control, 240, NOISE).rows
+    first, second = judged(record, control, 240, NOISE).rows
     wanted = compare(statistics(60), control).S
     assert 0.5 < wanted < 1.0
     assert wanted == first.S
@@ -101,28 +108,28 @@ def test_a_row_says_what_the_model_scores_and_how_far_windows_differ():
 def test_every_model_of_a_round_is_judged_once():
     """A window that is seen again, or one that comes where nothing new is due, adds no row."""
     record = Record(models=tuple(model(rule, 120) for rule in RULES))
-    once = record.judged(statistics(), 240, NOISE)
+    once = judged(record, statistics(), 240, NOISE)
     assert [found.rule for found in once.rows] == list(RULES)
-    assert once.judged(statistics(), 240, NOISE).rows == once.rows
-    assert once.judged(statistics(), 300, NOISE).rows == once.rows
+    assert judged(once, statistics(), 240, NOISE).rows == once.rows
+    assert judged(once, statistics(), 300, NOISE).rows == once.rows
 
 
 def test_after_windows_that_were_passed_over_the_newest_models_are_judged_alone():
     """Made at 120, 180 and 240 s, nothing until 600 s: those of 240 s; the others never are."""
     record = Record(models=tuple(model(SCORE, end) for end in (120, 180, 240)))
-    later = record.judged(statistics(), 600, NOISE)
+    later = judged(record, statistics(), 600, NOISE)
     assert [found.made_at_s for found in later.rows] == [240]
-    assert later.judged(statistics(), 660, NOISE).rows == later.rows
+    assert judged(later, statistics(), 660, NOISE).rows == later.rows
 
 
 def test_a_window_that_holds_nothing_gives_no_number():
     """S and its interval are NaN, and so is an interval whose noise is unknown."""
     still = replace(model(SCORE, 120), long_run=NOTHING)
-    (found,) = Record(models=(still,)).judged(NOTHING, 240, NOISE).rows
+    (found,) = judged(Record(models=(still,)), NOTHING, 240, NOISE).rows
     assert all(map(math.isnan, (found.S, found.low, found.high)))
     assert found.n == 0
     record = Record(models=(model(SCORE, 120),))
-    (found,) = record.judged(statistics(), 240, math.nan).rows
+    (found,) = judged(record, statistics(), 240, math.nan).rows
     assert pytest.approx(1.0) == found.S
     assert math.isnan(found.low)
     assert math.isnan(found.high)
@@ -141,11 +148,11 @@ def test_no_model_is_dropped_before_its_window_comes():
     for apart in (60, 120, 180, 240, 600):
         record = Record()
         for end in range(120, 4000, apart):
-            record = record.judged(statistics(), end, NOISE)
+            record = judged(record, statistics(), end, NOISE)
             record = record.with_models([model(rule, end) for rule in RULES])
-        judged = {(found.rule, found.made_at_s) for found in record.rows}
-        ends = [end for end in range(120, 4000, apart) if end <= max(m for _, m in judged)]
-        assert judged == {(rule, end) for rule in RULES for end in ends}
+        seen = {(found.rule, found.made_at_s) for found in record.rows}
+        ends = [end for end in range(120, 4000, apart) if end <= max(m for _, m in seen)]
+        assert seen == {(rule, end) for rule in RULES for end in ends}
 
 
 def test_the_sixty_newest_models_that_rules_made_are_kept():
@@ -157,20 +164,11 @@ def test_the_sixty_newest_models_that_rules_made_are_kept():
     assert made == [120 + 60 * k for k in range(40, 100)]
 
 
-def test_the_nearest_is_the_model_that_scores_best_on_the_window():
-    """Of those that rules made, not of the one in use; without any there is none."""
-    record = Record(
-        models=(
-            model(SCORE, 120, n_first=10),
-            model(MEMORY, 180, n_first=42),
-            model(LIKELIHOOD, 240, n_first=70),
-            model(KEEP, 240, n_first=40),
-        )
-    )
-    found = record.nearest(statistics(40))
-    assert (found.rule, found.made_at_s) == (MEMORY, 180)
-    assert Record(models=(model(KEEP, 120),)).nearest(statistics()) is None
-    assert record.nearest(NOTHING).rule == SCORE
+def test_a_lead_is_held_against_the_noise_of_leads():
+    """That of S is much larger, and counts only as long as no window has told the other one."""
+    record = record_of({NEAREST: [0.7] * 5, MEMORY: [0.75] * 5})
+    assert record.choose([NEAREST, MEMORY], 0.2).rule == NEAREST
+    assert replace(record, lead_noise=0.01).choose([NEAREST, MEMORY], 0.2).rule == MEMORY
 
 
 def test_means_leave_out_what_has_no_number():
@@ -350,6 +348,6 @@ def test_every_rule_says_what_it_is():
 def test_judging_leaves_the_record_as_it_was():
     """Rounds that are killed are done again from it."""
     record = Record(models=(model(SCORE, 120),))
-    record.judged(statistics(), 240, NOISE)
+    judged(record, statistics(), 240, NOISE)
     replace(record).with_models([model(SCORE, 300)])
     assert (record.rows, len(record.models)) == ((), 1)

@@ -18,7 +18,7 @@ from zfcal.arrays import Floats, Seeds
 from zfcal.calibrate.group import Group
 from zfcal.calibrate.scheduler import Cluster
 from zfcal.model.effects.genome import check_genomes
-from zfcal.model.simulate import Counts, burn_in_steps
+from zfcal.model.simulate import Counts, Start, burn_in_steps
 from zfcal.parameters import Parameters
 
 LEAST_STEPS = 50_000
@@ -71,6 +71,10 @@ class ClusterGroup:
     def with_template(self, template: Parameters) -> ClusterGroup:
         """Return the same group with another template."""
         return ClusterGroup(group=self.group.with_template(template), cluster=self.cluster)
+
+    def begun(self, start: Start) -> ClusterGroup:
+        """Return the same group, whose simulations begin where agents were seen."""
+        return ClusterGroup(group=self.group.begun(start), cluster=self.cluster)
 
     @cached_property
     def _parcel(self) -> bytes:

@@ -7,7 +7,7 @@ simulation does in ``zfcal.model``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Literal, Protocol, runtime_checkable
 
@@ -22,7 +22,7 @@ from zfcal.errors import InputError
 from zfcal.model.effects import find_effect
 from zfcal.model.effects.genome import check_genomes, from_genome
 from zfcal.model.kernels.state import GRID
-from zfcal.model.simulate import Counts, pack_genes, simulate_counts
+from zfcal.model.simulate import Counts, Start, pack_genes, simulate_counts
 from zfcal.parameters import Parameters, n_genes
 
 Sampler = Literal["exact", "grid"]
@@ -42,6 +42,7 @@ class Purpose(IntEnum):
     RENEWAL = 6
     PROBE = 7
     RANDOM_SEARCH = 8
+    JUDGING = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +112,14 @@ class Simulator(Protocol):
 
 
 @runtime_checkable
+class Startable(Protocol):
+    """A group whose simulations can begin where agents were seen."""
+
+    def begun(self, start: Start) -> Simulator:
+        """Return the same group, begun there."""
+
+
+@runtime_checkable
 class Recorder(Protocol):
     """A group whose paths can be looked at, for statistics that `Simulator` does not count."""
 
@@ -137,6 +146,9 @@ class Group:
     sampler
         How headings are drawn: ``exact``, or ``grid``, the paper's numeric way. One law, other
         random numbers.
+    start
+        Where all are at the first sample; None for anywhere, 60 s before. From a start headings are
+        drawn exactly.
     """
 
     arena: Arena
@@ -145,6 +157,7 @@ class Group:
     n_robots: int
     n_workers: int = 1
     sampler: Sampler = "exact"
+    start: Start | None = field(default=None, compare=False, repr=False)
 
     @property
     def n_agents(self) -> int:
@@ -155,8 +168,12 @@ class Group:
         """Return the same group with another template."""
         return replace(self, template=template)
 
+    def begun(self, start: Start) -> Group:
+        """Return the same group, whose simulations begin where agents were seen."""
+        return replace(self, start=start)
+
     def simulate(self, genes: Floats, *, n_counted: int, n_steps: int, seeds: Seeds) -> Counts:
-        """Simulate every genome with every seed; the burn-in comes on top.
+        """Simulate every genome with every seed; the burn-in comes on top, if there is one.
 
         Parameters
         ----------
@@ -175,7 +192,7 @@ class Group:
             With leading axes (genome, run).
         """
         check_genomes(genes, self.template)
-        if self.sampler == "grid":
+        if self.sampler == "grid" and self.start is None:
             tables = self.record(
                 genes, tuple(ATTRIBUTES), n_counted=n_counted, n_steps=n_steps, seeds=seeds
             )
@@ -189,6 +206,7 @@ class Group:
             n_steps=n_steps,
             seeds=seeds,
             n_threads=self.n_workers,
+            start=self.start,
         )
 
     def record(

@@ -21,6 +21,7 @@ from zfcal.calibrate.evolve import State
 from zfcal.calibrate.group import Purpose, express, scale_gamma
 from zfcal.calibrate.history import Generation
 from zfcal.calibrate.intervals import Intervals, parameter_intervals
+from zfcal.calibrate.judging import judged, nearest
 from zfcal.calibrate.pace import Deadline
 from zfcal.calibrate.rules import (
     COMPROMISE,
@@ -242,14 +243,13 @@ def hand_on(task: Task, settings: Settings, best: Confirmed, noise: float) -> Ha
     noise
         Standard deviation of S between windows of one model.
     """
-    end_s = task.seeds.window_end_s
-    record = task.record.judged(task.control, end_s, noise)
+    record = judged(task, settings, noise)
     made = _made(task, settings, best)
     record = record.with_models(made.values())
     made |= _handed_before(task, settings, record)
-    nearest = record.nearest(task.control)
-    if nearest is not None:
-        made |= _swum(task, settings, {NEAREST: nearest.genes}, of_s=nearest.of_s)
+    near = nearest(task, settings, record.own)
+    if near is not None:
+        made |= _swum(task, settings, {NEAREST: near.genes}, of_s=near.of_s)
     choice = record.choose(set(made) - {KEEP}, noise)
     chosen = made[choice.rule]
     record = replace(

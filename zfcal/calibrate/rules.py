@@ -3,7 +3,8 @@
 A model that fits a window best fits what happened in it by chance as well, and the most likely
 model is none where the law is wrong. Which of these faults is the larger one differs between
 recordings, and no window that a model was fitted to can tell. So each rule has a record: what its
-models scored on the first window that they had not seen. One rule is in charge until another one is
+models scored on the first window that they had not seen, when they were simulated from where all
+were at its beginning. One rule is in charge until another one is
 surely better. The first is `NEAREST`: a window chooses among models of which most were made of
 others, so what fits a window by chance is not handed on for long.
 """
@@ -19,7 +20,6 @@ import numpy as np
 from scipy.special import stdtrit
 
 from zfcal.arrays import Floats
-from zfcal.behaviour.scores import compare
 from zfcal.behaviour.statistics import Statistics
 
 SCORE, LIKELIHOOD, COMPROMISE, MEMORY, NEAREST, KEEP = RULES = (
@@ -118,6 +118,26 @@ class Forward:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Followed:
+    """What models score on a window that followed them.
+
+    Parameters
+    ----------
+    scores
+        S of each; NaN where no feature can be counted.
+    noise
+        Standard deviation of S between windows of one model.
+    lead_noise
+        The same of what one model scores above another, where either of them is true; NaN where
+        that is not known.
+    """
+
+    scores: tuple[float, ...]
+    noise: float
+    lead_noise: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Lead:
     """By how much a rule's models have scored better than those of another one.
 
@@ -186,6 +206,9 @@ class Record:
         The model that was handed on last; None before the first round.
     in_charge
         The rule that published last, `NEAREST` before rules were judged.
+    lead_noise
+        Standard deviation between windows of what one model scores above another; NaN as long as
+        no window has told.
     """
 
     rows: tuple[Forward, ...] = ()
@@ -193,25 +216,55 @@ class Record:
     n_rounds: int = 0
     in_use: Candidate | None = None
     in_charge: str = NEAREST
+    lead_noise: float = math.nan
 
-    def judged(self, control: Statistics, end_s: int, noise: float) -> Record:
-        """Return the record with the models that a window is the first to follow.
+    def due(self, end_s: int) -> tuple[Candidate, ...]:
+        """Return the models that a window is the first to follow, the newest that are.
 
         Parameters
         ----------
-        control
-            The window's statistics.
         end_s
-            Where it ends.
-        noise
-            Standard deviation of S between windows of one model.
+            Where the window ends.
         """
         due = [m for m in self.models if m.made_at_s <= end_s - WINDOW_S]
         newest = max((m.made_at_s for m in due), default=0)
         known = {row.made_at_s for row in self.rows}
-        new = [m for m in due if m.made_at_s == newest and newest not in known]
-        rows = tuple(_row(model, control, end_s, noise) for model in new)
-        return replace(self, rows=self.rows + rows)
+        return tuple(m for m in due if m.made_at_s == newest and newest not in known)
+
+    def judged(self, found: Followed, *, end_s: int, n: int) -> Record:
+        """Return the record with what the models that are due have scored on a window.
+
+        Parameters
+        ----------
+        found
+            Of the models of `due`, in their order.
+        end_s
+            Where the window ends.
+        n
+            Positions of fish in it.
+        """
+        models = self.due(end_s)
+        if not models:
+            return self
+        half = 1.96 * found.noise
+        rows = tuple(
+            Forward(
+                window_end_s=end_s,
+                rule=model.rule,
+                made_at_s=model.made_at_s,
+                S=score,
+                low=float(np.maximum(0.0, score - half)),
+                high=float(np.minimum(1.0, score + half)),
+                n=n,
+            )
+            for model, score in zip(models, found.scores, strict=True)
+        )
+        return replace(self, rows=self.rows + rows, lead_noise=found.lead_noise)
+
+    @property
+    def own(self) -> tuple[Candidate, ...]:
+        """The models that rules have made of windows, the oldest first."""
+        return tuple(model for model in self.models if model.rule in MADE)
 
     def with_models(self, models: Iterable[Candidate]) -> Record:
         """Return the record with models of a round; those that nobody needs are dropped."""
@@ -226,15 +279,6 @@ class Record:
             if w or (o and n <= _MOST_MODELS)
         ]
         return replace(self, models=tuple(kept))
-
-    def nearest(self, control: Statistics) -> Candidate | None:
-        """Return the model made so far that is nearest to a window; None without any.
-
-        Most of them were made of other windows, so this one is their test.
-        """
-        own = [model for model in self.models if model.rule in MADE]
-        scores = [np.nan_to_num(compare(m.long_run, control).S, nan=-1.0) for m in own]
-        return own[int(np.argmax(scores))] if own else None
 
     def means(self) -> dict[str, float]:
         """Return each rule's mean forward score; rules that have none are left out."""
@@ -271,8 +315,10 @@ class Record:
         made
             Rules that have a model to publish.
         noise
-            Standard deviation of S between windows of one model.
+            Standard deviation of S between windows of one model; counts where that of leads is
+            not known.
         """
+        noise = noise if math.isnan(self.lead_noise) else self.lead_noise
         if self.n_rounds < FIRST_ROUNDS:
             first = LIKELIHOOD if LIKELIHOOD in made else SCORE
             return Choice(rule=first, because="no window has followed a model yet")
@@ -310,20 +356,6 @@ def _n_apart(ends_s: Sequence[int]) -> float:
     """
     covered = WINDOW_S + sum(min(WINDOW_S, later - end) for end, later in pairwise(ends_s))
     return covered / WINDOW_S
-
-
-def _row(model: Candidate, control: Statistics, end_s: int, noise: float) -> Forward:
-    score = compare(model.long_run, control).S
-    half = 1.96 * noise
-    return Forward(
-        window_end_s=end_s,
-        rule=model.rule,
-        made_at_s=model.made_at_s,
-        S=score,
-        low=float(np.maximum(0.0, score - half)),
-        high=float(np.minimum(1.0, score + half)),
-        n=int(control.occupation.sum()),
-    )
 
 
 def half_way(one: Floats, other: Floats) -> Floats:

@@ -24,6 +24,7 @@ from zfcal.calibrate.objective import Objective
 from zfcal.calibrate.rules import Record
 from zfcal.errors import InputError
 from zfcal.model.effects.genome import check_genomes, genome_length
+from zfcal.model.simulate import Start
 from zfcal.parameters import n_genes
 from zfcal.units import BURN_IN_S, WINDOW_S
 
@@ -35,6 +36,12 @@ _WORDS = {
 }
 _RULES_SIMULATED = 5
 """Models that a round simulates for the rules: four made, and the one that is handed on."""
+
+FOLLOWED_RUNS, NEAREST_RUNS = 60, 30
+"""Simulated windows of each model that a window follows, and of each that may be nearest to it."""
+
+_FOLLOWED = 6
+"""Models that a window is the first to follow: one a rule."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,6 +201,9 @@ class Task:
         The estimate over all minutes so far.
     record
         What each rule's earlier models have scored.
+    start
+        Where all were at the window's beginning, from which rules' models are judged; None where
+        nothing says it.
     moves_effects
         Whether the strengths of the model's effects are genes, or stay as they are.
     """
@@ -205,6 +215,7 @@ class Task:
     guests: Floats | None = field(default=None)
     memory: Floats | None = None
     record: Record = field(default_factory=Record)
+    start: Start | None = None
     moves_effects: bool = True
 
     def __post_init__(self) -> None:
@@ -267,4 +278,8 @@ class Task:
 
         more = {"likely": 0 if self.guests is None else 1, "forward": _RULES_SIMULATED}
         extra = more.get(settings.champion, 0)
-        return of(settings.n_confirmed) + (of(extra) if extra else 0.0)
+        rules = 0.0
+        if settings.champion == "forward" and self.start is not None:
+            n_windows = _FOLLOWED * FOLLOWED_RUNS + len(self.record.own) * NEAREST_RUNS
+            rules = self.work(n_genomes=n_windows, n_runs=1, n_steps=short)
+        return of(settings.n_confirmed) + (of(extra) if extra else 0.0) + rules

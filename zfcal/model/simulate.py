@@ -15,6 +15,7 @@ from zfcal.model.kernels.crowd_runs import count_crowd_runs, record_crowd_run
 from zfcal.model.kernels.run import Counts, count_runs, record_run
 from zfcal.model.kernels.state import GRID, Packed
 from zfcal.model.packing import pack, pack_genes
+from zfcal.model.start import Start
 from zfcal.model.tank import tank_of
 from zfcal.parameters import Parameters
 from zfcal.units import BURN_IN_S
@@ -22,6 +23,7 @@ from zfcal.units import BURN_IN_S
 __all__ = [
     "Counts",
     "Packed",
+    "Start",
     "burn_in_steps",
     "check_sampler",
     "individuals",
@@ -56,6 +58,7 @@ def simulate_counts(
     n_counted: int | None = None,
     n_robots: int = 0,
     n_threads: int | None = None,
+    start: Start | None = None,
 ) -> Counts:
     """Simulate every model with every seed and return the histograms.
 
@@ -76,6 +79,8 @@ def simulate_counts(
         all alike.
     n_threads
         None for one per core. The numbers do not depend on it.
+    start
+        Where all agents are at the first sample; there is no burn-in then.
 
     Returns
     -------
@@ -88,9 +93,17 @@ def simulate_counts(
             f"A simulation needs agents, steps and seeds; got {n_agents} agents of which "
             f"{counted} count, {n_steps} steps, {len(seeds)} seeds."
         )
+    if start is not None and len(start.poses) != n_agents:
+        raise InputError(
+            f"A simulation of {n_agents} agents begins at as many poses, got {len(start.poses)}."
+        )
     tank = tank_of(arena)
     counts = empty_counts(len(packed.zones), len(seeds), len(arena.zones))
-    sizes = (n_agents, counted, burn_in_steps(packed.dt_s), n_steps)
+    burn_in, poses = burn_in_steps(packed.dt_s), np.empty((0, 3))
+    if start is not None:
+        burn_in, poses = 0, start.poses
+        packed = packed._replace(clock_s=np.array([start.time_s, 1.0]))
+    sizes = (n_agents, counted, burn_in, n_steps)
     jobs = len(packed.zones) * len(seeds)
     # Pieces of some milliseconds, so that the last one is short on every core.
     per_piece = max(1, _JOB_STEPS // (n_agents * (n_steps + sizes[2])))
@@ -100,7 +113,7 @@ def simulate_counts(
     run = count_crowd_runs if is_crowd(n_agents, packed) else count_runs
 
     def work(first: int) -> None:
-        run(first, min(first + per_piece, jobs), words, sizes, people, packed, tank, counts)
+        run(first, min(first + per_piece, jobs), words, sizes, people, poses, packed, tank, counts)
 
     with ThreadPoolExecutor(n_threads or os.cpu_count() or 1) as pool:
         list(pool.map(work, range(0, jobs, per_piece)))

@@ -11,17 +11,19 @@ from zfcal.artifacts.checking import check_trial
 from zfcal.artifacts.inspecting import describe
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_result
-from zfcal.artifacts.tables import RULES, read_extra, read_table, write_table
+from zfcal.artifacts.tables import RULES, read_extra, read_table, read_tracks, write_table
 from zfcal.calibrate.rules import MADE
 from zfcal.errors import DamagedError, InputError
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate import calibrate as calibrate_module
 from zfcal.stages.calibrate import holdout
+from zfcal.stages.calibrate.beginning import seen_first
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.holdout import Span, calibrate_span
 from zfcal.stages.calibrate.rounds import RoundPlaces
 from zfcal.stages.events import LeftOut, Made, Note, Progress, Result, UpToDate, say_nothing
-from zfcal.stages.trial_context import Task
+from zfcal.stages.trial_context import Task, open_trial
+from zfcal.tracks import concatenate
 
 ENDS = (120, 180, 240, 300)
 
@@ -107,6 +109,35 @@ def test_the_lineage_names_the_record_that_a_round_carries_on(done):
     assert read_lineage(rules_of(done, 300)).schema == RULES
 
 
+def test_models_are_judged_from_where_all_were(done):
+    """Poses of the tracks at 120 s, of four fish or so; the record says how leads vary."""
+    opened = open_trial(done)
+    start = seen_first(opened, 240)
+    tracks = concatenate([read_tracks(done / "tracks" / f"{s:06d}.parquet") for s in (60, 120)])
+    for agent, pose in enumerate(start.poses):
+        own = (tracks.agent == agent) & (tracks.time_s <= 120.0 + 1e-9)
+        last = np.flatnonzero(own)[-1]
+        assert tracks.time_s[last] == pytest.approx(120.0)
+        np.testing.assert_allclose(pose[:2], [tracks.x_m[last], tracks.y_m[last]], atol=1e-9)
+        assert np.isfinite(pose[2])
+    assert start.time_s == pytest.approx(120.0)
+    noise = [read_extra(rules_of(done, end))["lead_noise"] for end in ENDS]
+    assert noise[:2] == [None, None]
+    assert 0 < noise[3] < 0.2
+    said = read_lineage(done / "models" / "000240.toml").options
+    assert said["judged_from"] == "start"
+
+
+def test_a_window_whose_beginning_is_lost_has_no_start(trial):
+    """Its first minute and the one before are damaged; the next window has one."""
+    for start in (60, 120):
+        path = trial / "tracks" / f"{start:06d}.parquet"
+        path.write_bytes(path.read_bytes()[:1000])
+    opened = open_trial(trial)
+    assert seen_first(opened, 240) is None
+    assert seen_first(opened, 120) is not None
+
+
 def test_the_second_run_does_nothing(done, forward, heard, read_all):
     """Four files a window are up to date."""
     before = read_all(done)
@@ -166,6 +197,8 @@ def test_without_the_estimate_other_rules_are_judged(trial, quick, forward):
     assert set(table["rule"]) == {"score", "nearest", "keep"}
     inputs = read_lineage(trial / "models" / "000300.toml").inputs
     assert not any("tracks" in name for name in inputs)
+    assert read_extra(rules_of(trial, 300))["lead_noise"] is None
+    assert "judged_from" not in read_lineage(trial / "models" / "000300.toml").options
     assert read_result(trial / "models" / "000120.toml")["published"]["rule"] == "score"
 
 

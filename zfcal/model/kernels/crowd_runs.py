@@ -45,7 +45,7 @@ def _count_state(
 @kernel
 def count_crowd_runs(
     first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], individuals: Floats,
-    packed: Packed, tank: Tank, counts: Counts,
+    poses: Floats, packed: Packed, tank: Tank, counts: Counts,
 ) -> None:  # fmt: skip
     """Simulate jobs ``first`` to ``last - 1``; parameters are those of `count_runs`."""
     n, n_counted, burn_in, samples = sizes
@@ -56,7 +56,7 @@ def count_crowd_runs(
         model, run = job // seeds.size, job % seeds.size
         random = seeded(seeds[run])
         state[:] = 0.0
-        start(state, burn_in, packed, tank, individuals, work, random)
+        start(state, burn_in, packed, tank, individuals, poses, work, random)
         for step in range(burn_in + samples):
             if step > 0:
                 for i in range(n_counted):
@@ -83,7 +83,7 @@ def record_crowd_run(
     work = make_work(n, 0, GRID)
     crowd = make_crowd(n, tank)
     random = seeded(seed)
-    start(state, burn_in, packed, tank, individuals, work, random)
+    start(state, burn_in, packed, tank, individuals, np.empty((0, 3)), work, random)
     record = np.empty((samples, n, 5))
     for step in range(burn_in + samples):
         if step > 0:

@@ -35,6 +35,7 @@ from zfcal.model.kernels.state import (
     make_work,
     note_late,
     place,
+    place_at,
     remember,
     settle,
     splits,
@@ -173,7 +174,7 @@ def hand_over(own: Counts, model: int, run: int, counts: Counts) -> None:
 @kernel
 def count_runs(
     first: int, last: int, seeds: Random, sizes: tuple[int, int, int, int], individuals: Floats,
-    packed: Packed, tank: Tank, counts: Counts,
+    poses: Floats, packed: Packed, tank: Tank, counts: Counts,
 ) -> None:  # fmt: skip
     """Simulate jobs ``first`` to ``last - 1`` and add up their histograms.
 
@@ -187,6 +188,8 @@ def count_runs(
         Agents, agents that count (the first ones), steps of burn-in, samples.
     individuals : ndarray, shape (2, agent)
         Kind and trait of each agent.
+    poses : ndarray, shape (agent, 3) or (0, 3)
+        Where each agent begins, see `start`.
     """
     n, n_counted, burn_in, samples = sizes
     state = np.zeros((STATES, n))
@@ -198,7 +201,7 @@ def count_runs(
         clear_counts(own)
         random = seeded(seeds[run])
         state[:] = 0.0
-        start(state, burn_in, packed, tank, individuals, work, random)
+        start(state, burn_in, packed, tank, individuals, poses, work, random)
         for _ in range(burn_in):
             advance(state, model, packed, tank, sight, random, work, False)
         state[TIME] = packed.clock_s[0]
@@ -214,13 +217,20 @@ def count_runs(
 
 @inlined
 def start(
-    state: Floats, burn_in: int, packed: Packed, tank: Tank, individuals: Floats, work: Work,
-    random: Random,
+    state: Floats, burn_in: int, packed: Packed, tank: Tank, individuals: Floats, poses: Floats,
+    work: Work, random: Random,
 ) -> None:  # fmt: skip
-    """Put all agents into the tank, so long before the first sample."""
+    """Put all agents into the tank, so long before the first sample.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (agent, 3) or (0, 3)
+        Where each begins, see `place_at`; with none, anywhere.
+    """
     state[TIME] = packed.clock_s[0] - burn_in * packed.dt_s * packed.clock_s[1]
     state[DT_S] = packed.dt_s
     place(state, tank, individuals, random)
+    place_at(state, poses, tank)
     work.steps[0] = 0.0
 
 
@@ -249,7 +259,7 @@ def record_run(
     work = make_work(n, packed.components.shape[0], grid if grid > 0 else GRID)
     sight = make_sight(in_vectors(n * n))
     random = seeded(seed)
-    start(state, burn_in, packed, tank, individuals, work, random)
+    start(state, burn_in, packed, tank, individuals, np.empty((0, 3)), work, random)
     for _ in range(burn_in):
         advance(state, 0, packed, tank, sight, random, work, grid > 0)
     state[TIME] = packed.clock_s[0]

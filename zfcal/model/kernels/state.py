@@ -207,6 +207,32 @@ def place(state: Floats, tank: Tank, individuals: Floats, random: NDArray[np.uin
 
 
 @kernel
+def place_at(state: Floats, poses: Floats, tank: Tank) -> None:
+    """Put agents where they were seen; who was not stays where `place` has put it.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (agent, 3) or (0, 3)
+        x and y in metres and heading in radians. One that is NaN or outside is none; without a
+        heading an agent keeps the one that it has.
+    """
+    if poses.shape[0] == 0:
+        return
+    for i in range(poses.shape[0]):
+        zone = zone_of(poses[i, 0], poses[i, 1], tank)
+        if zone == 0:
+            continue
+        state[X, i], state[Y, i], state[ZONE, i] = poses[i, 0], poses[i, 1], zone
+        if math.isfinite(poses[i, 2]):
+            state[HX, i], state[HY, i] = math.cos(poses[i, 2]), math.sin(poses[i, 2])
+            state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
+        settle(i, state, tank)
+    # Nobody has left the room in which chance had put it.
+    state[ROOM] = 0.0
+    remember(state, tank)
+
+
+@kernel
 def remember(state: Floats, tank: Tank) -> None:
     """Write what effects may ask of rooms and walls, for all agents that are there."""
     rooms = tank.rooms

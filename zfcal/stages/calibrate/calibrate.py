@@ -28,6 +28,7 @@ from zfcal.calibrate.task import Previous
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
 from zfcal.model.effects.genome import check_effects, genome_names
+from zfcal.stages.calibrate.beginning import seen_first
 from zfcal.stages.calibrate.likelihood import estimate, memory_span, remembered
 from zfcal.stages.calibrate.record import read_record
 from zfcal.stages.calibrate.rounds import (
@@ -287,6 +288,7 @@ def _lineage(shared: _Shared, places: RoundPlaces, before: _Before) -> Lineage:
         span_s = _window_span(places.end_s)
         if options.settings.champion == "forward":
             span_s = memory_span(places.end_s)
+            said |= {"judged_from": "start"}
         tracks = readable(segment_files(shared.root, span_s), say_nothing)
         said |= guess_options(tracks)
         files += tracks
@@ -305,11 +307,12 @@ def _search(
     options, tell = shared.options, shared.run.tell
     began_s = time.monotonic()
     template = shared.group.template
-    estimated = memory = None
+    estimated = memory = start = None
     if options.seed_likelihood:
         estimated = estimate(shared.opened, template, _window_span(places.end_s), tell)
     if options.seed_likelihood and options.settings.champion == "forward":
         memory = remembered(shared.opened, template, places.end_s, memory_span(places.end_s))
+        start = seen_first(shared.opened, places.end_s)
     round_task = RoundTask(
         group=shared.group,
         control=control,
@@ -318,6 +321,7 @@ def _search(
         previous=_previous(shared, before.population),
         memory=memory,
         record=_record(shared, before.rules),
+        start=start,
     )
     options = options.left_since(began_s)
     result = run_search(round_task, options, places.checkpoint, tell, key=key)

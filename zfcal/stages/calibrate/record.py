@@ -36,6 +36,7 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
             n_rounds=int(extra["n_rounds"]),  # type: ignore[arg-type]
             in_use=None if in_use is None else _candidate(in_use, zone_names, n_genes),
             in_charge=_rule(extra["in_charge"]),
+            lead_noise=_noise(extra.get("lead_noise")),
         )
     except (KeyError, TypeError, ValueError, OverflowError, InputError) as error:
         raise DamagedError(
@@ -46,6 +47,10 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
 
 def _numbers(row: dict[str, Any]) -> dict[str, float]:
     return {key: math.nan if row[key] is None else row[key] for key in ("S", "low", "high")}
+
+
+def _noise(value: object) -> float:
+    return math.nan if value is None else float(value)  # type: ignore[arg-type]
 
 
 def _rule(name: object) -> str:
@@ -91,6 +96,7 @@ def write_record(
         "in_use": None if record.in_use is None else _entry(record.in_use),
         "in_charge": record.in_charge,
         "n_rounds": record.n_rounds,
+        "lead_noise": None if math.isnan(record.lead_noise) else record.lead_noise,
     }
     write_table(path, make_table(RULES, columns), lineage, extra=extra)
 

@@ -1,0 +1,242 @@
+"""What models of rules score on a window: from where all were at its beginning."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from zfcal.artifacts.arenas import load_arena
+from zfcal.behaviour.scores import compare, population_scores
+from zfcal.calibrate.group import (
+    Group,
+    SeedSource,
+    as_statistics,
+    pool_runs,
+    runs_of,
+    with_measured_speeds,
+)
+from zfcal.calibrate.judging import by_long_runs, judged, nearest
+from zfcal.calibrate.rules import KEEP, LIKELIHOOD, MEMORY, NEAREST, Candidate, Record
+from zfcal.calibrate.task import Settings, Task
+from zfcal.errors import InputError
+from zfcal.model.simulate import simulate_tracks
+from zfcal.model.start import Start
+from zfcal.parameters import natural, to_genes
+
+N_STEPS = 600
+NOISE = 0.3
+
+
+@pytest.fixture(scope="module")
+def two_rooms():
+    """Return the default arena."""
+    return load_arena("two-rooms", Path())
+
+
+@pytest.fixture(scope="module")
+def models(two_rooms):
+    """Return natural fish, and fish that forget sooner where they were."""
+    zones = tuple((zone.name, zone.follows_walls) for zone in two_rooms.zones)
+    true = natural(zones, dt_s=0.2)
+    flat = tuple(
+        replace(
+            zone,
+            kappa_0=6.3,
+            kappa_f=20.0,
+            kappa_w=None,
+            alpha=20.0,
+            gamma=dict.fromkeys(zone.gamma, 1.0),
+        )
+        for zone in true.zones
+    )
+    return true, replace(true, zones=flat)
+
+
+@pytest.fixture(scope="module")
+def group(two_rooms, models):
+    """Return four fish and a robot."""
+    return Group(arena=two_rooms, template=models[0], n_fish=4, n_robots=1, n_workers=2)
+
+
+@pytest.fixture(scope="module")
+def starts(two_rooms, models):
+    """Return where the true model's agents were in different runs, after a minute."""
+
+    def at(seed):
+        xy_m, heading = simulate_tracks(
+            models[0], two_rooms, n_agents=5, n_steps=1, n_robots=1, seed=seed
+        )
+        return Start(poses=np.column_stack([xy_m[0], heading[0]]), time_s=0.0)
+
+    return [at(seed) for seed in range(36)]
+
+
+@pytest.fixture(scope="module")
+def candidates(group, models, two_rooms):
+    """Return a candidate of a rule for each model, with its long run."""
+    genes = np.stack([to_genes(model) for model in models])
+    seeds = np.arange(6, dtype=np.uint64)
+    runs = pool_runs(group.simulate(genes, n_counted=5, n_steps=9000, seeds=seeds))
+    return tuple(
+        Candidate(
+            rule=rule,
+            made_at_s=120,
+            of_s=120,
+            genes=own,
+            long_run=as_statistics(runs, k, two_rooms.zone_names),
+        )
+        for k, (rule, own) in enumerate(zip((MEMORY, NEAREST), genes, strict=True))
+    )
+
+
+@pytest.fixture(scope="module")
+def make_task(group, models, two_rooms, candidates):
+    """Return what makes the task of a window of the true model, from a start."""
+
+    def make(start, seed=77, *, given=True):
+        counts = group.begun(start).simulate(
+            to_genes(models[0])[None],
+            n_counted=4,
+            n_steps=N_STEPS,
+            seeds=np.array([seed], dtype=np.uint64),
+        )
+        return Task(
+            group=group,
+            control=as_statistics(pool_runs(counts), 0, two_rooms.zone_names),
+            seeds=SeedSource(trial_seed=7, window_end_s=240),
+            record=Record(models=candidates, n_rounds=2),
+            start=start if given else None,
+        )
+
+    return make
+
+
+def test_from_where_they_were_the_true_model_is_the_better_one(make_task, starts, candidates):
+    """Against long runs it is the worse one: fish are still where they have been.
+
+    So long runs would hand another model to the robot, whatever the number of windows.
+    """
+    by_long, by_start = [], []
+    for k, start in enumerate(starts):
+        task = make_task(start, seed=1000 + k)
+        true, other = judged(task, Settings(), NOISE).rows
+        by_start.append(true.S - other.S)
+        long = by_long_runs(candidates, task.control, NOISE).scores
+        by_long.append(long[0] - long[1])
+    assert np.mean(by_long) < 0 < np.mean(by_start)
+    assert np.mean(by_start) > 2 * np.std(by_start, ddof=1) / math.sqrt(len(by_start))
+
+
+def test_scores_and_noise_by_hand(make_task, starts, group, candidates):
+    """S of the pooled runs; noise of S and of leads between the runs, either model being true."""
+    task = make_task(starts[0])
+    record = judged(task, Settings(), NOISE)
+    template = with_measured_speeds(group.template, candidates[0].long_run)
+    runs = (
+        group.with_template(template)
+        .begun(starts[0])
+        .simulate(
+            np.stack([model.genes for model in candidates]),
+            n_counted=4,
+            n_steps=N_STEPS,
+            seeds=task.seeds.seeds(9, 60),
+        )
+    )
+    pooled = pool_runs(runs)
+    names = group.arena.zone_names
+    pools = [as_statistics(pooled, k, names) for k in range(2)]
+    assert [row.S for row in record.rows] == [compare(pool, task.control).S for pool in pools]
+    table = np.array(
+        [
+            [population_scores(runs_of(runs, true), runs_of(pooled, k)).S for k in range(2)]
+            for true in range(2)
+        ]
+    )
+    noise = math.sqrt((table[0, 0].var() + table[1, 1].var()) / 2)
+    lead = math.sqrt(((table[0, 0] - table[0, 1]).var() + (table[1, 0] - table[1, 1]).var()) / 2)
+    assert record.lead_noise == pytest.approx(lead)
+    assert 0 < lead < noise < NOISE
+    assert record.rows[0].low == pytest.approx(record.rows[0].S - 1.96 * noise)
+
+
+def test_without_a_start_long_runs_are_what_counts(make_task, starts, candidates):
+    """As where no track says where all were; the noise of leads is not known then."""
+    task = make_task(starts[0], given=False)
+    record = judged(task, Settings(), NOISE)
+    assert [row.S for row in record.rows] == list(
+        by_long_runs(candidates, task.control, NOISE).scores
+    )
+    assert math.isnan(record.lead_noise)
+
+
+def test_one_model_twice_has_no_noise_of_leads(make_task, starts, candidates):
+    """As in the first round, where the window's estimate is that of all minutes."""
+    twice = tuple(replace(candidates[0], rule=rule) for rule in (LIKELIHOOD, MEMORY, KEEP))
+    record = judged(replace(make_task(starts[0]), record=Record(models=twice)), Settings(), NOISE)
+    assert len({row.S for row in record.rows}) == 1
+    assert math.isnan(record.lead_noise)
+
+
+def test_nothing_is_due_in_the_first_rounds(make_task, starts):
+    """The record stays what it is."""
+    record = Record(n_rounds=1)
+    assert judged(replace(make_task(starts[0]), record=record), Settings(), NOISE) is record
+
+
+def test_the_nearest_is_the_model_that_scores_best(make_task, starts, candidates):
+    """By windows from the start, with the speeds of the window; without one by long runs."""
+    task = make_task(starts[3])
+    runs = task.simulator.begun(starts[3]).simulate(
+        np.stack([model.genes for model in candidates]),
+        n_counted=4,
+        n_steps=N_STEPS,
+        seeds=task.seeds.seeds(9, 30),
+    )
+    best = int(np.argmax(population_scores(pool_runs(runs), task.control).S))
+    assert nearest(task, Settings(), candidates) is candidates[best]
+    assert nearest(task, Settings(), candidates[::-1]) is candidates[best]
+    assert nearest(task, Settings(), ()) is None
+    far = replace(task, start=None)
+    scores = by_long_runs(candidates, task.control, NOISE).scores
+    assert nearest(far, Settings(), candidates) is candidates[int(np.argmax(scores))]
+
+
+def test_a_window_of_nothing_has_no_nearest_but_the_first(make_task, starts, candidates):
+    """All scores are null."""
+    task = make_task(starts[0], given=False)
+    empty = task.control - task.control
+    assert nearest(replace(task, control=empty), Settings(), candidates) is candidates[0]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A group that can begin nowhere but anywhere."""
+
+    template: object
+    n_agents: int = 5
+    n_fish: int = 4
+    n_workers: int = 1
+
+    def with_template(self, template):
+        """Return the same."""
+        return replace(self, template=template)
+
+
+def test_a_group_that_cannot_begin_there_says_so(make_task, starts, group, candidates):
+    """One line, as for statistics that a group cannot count."""
+    task = replace(make_task(starts[0]), group=Fixed(template=group.template))
+    with pytest.raises(InputError, match="Fixed cannot begin where agents were seen"):
+        nearest(task, Settings(), candidates)
+
+
+def test_a_closing_takes_the_time_of_judging(make_task, starts):
+    """Windows of each model that is due, and of each that may be the nearest."""
+    task = make_task(starts[0])
+    forward = Settings(champion="forward")
+    more = task.closing_work(forward) - replace(task, start=None).closing_work(forward)
+    n_own = len(task.record.own)
+    assert more == task.work(n_genomes=6 * 60 + n_own * 30, n_runs=1, n_steps=N_STEPS)
+    score = Settings()
+    assert task.closing_work(score) == replace(task, start=None).closing_work(score)
