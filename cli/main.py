@@ -47,6 +47,19 @@ COMMANDS = {
 }
 """Each command and the module that holds it, in the order of a day's work."""
 
+TASKS = {
+    "A first look": ("demo",),
+    "A trial and its tracks": ("init", "camera", "import", "track", "simulate"),
+    "Fish and their model": ("analyse", "calibrate", "diagnose", "extend"),
+    "The robot": ("drive", "watch"),
+    "Results": ("report", "compare", "reproduce", "export"),
+    "Files": ("inspect", "check"),
+}
+"""What people come to do, and the commands for it, as `zfcal --help` lists them."""
+
+_WHOLE_SENTENCE = 300
+"""Longer than the first sentence of any command's help, in characters."""
+
 _EXIT_USAGE = 2
 _EXIT_READER_GONE = 141
 _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -79,6 +92,19 @@ class _LazyGroup(click.Group):
         module = importlib.import_module(f".{COMMANDS[cmd_name]}", __package__)
         command: click.Command = module.command
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by task, each with the first sentence of its help."""
+        widest = max(map(len, COMMANDS))
+        for task, names in TASKS.items():
+            found = [(name, self.get_command(ctx, name)) for name in names]
+            rows = [
+                (name.ljust(widest), command.get_short_help_str(_WHOLE_SENTENCE))
+                for name, command in found
+                if command is not None
+            ]
+            with formatter.section(task):
+                formatter.write_dl(rows)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -1,6 +1,7 @@
 """The group: help, completion, and how errors and signals end."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import pytest
 
 from zfcal.errors import DamagedError, InputError, LockedError, StorageError, ZfcalError
 from zfcal_cli import main as main_module
-from zfcal_cli.main import COMMANDS, group, run
+from zfcal_cli.main import COMMANDS, TASKS, group, run
 
 
 def all_commands():
@@ -27,11 +28,16 @@ def every_part(name):
     return {f"{name} {part}": command for part, command in found.commands.items()}
 
 
-def test_help_lists_every_command(zfcal):
-    """In the order of a day's work."""
+def test_help_lists_every_command_below_its_task(zfcal):
+    """Each once, below the heading of its task, and with a whole sentence."""
     done = zfcal("--help")
-    shown = [line.split()[0] for line in done.out.partition("Commands:")[2].splitlines() if line]
-    assert shown == list(COMMANDS)
+    assert sorted(name for names in TASKS.values() for name in names) == sorted(COMMANDS)
+    for task, names in TASKS.items():
+        part = done.out.partition(f"\n{task}:\n")[2].partition("\n\n")[0]
+        rows = re.findall(r"^  (\S+)  .*$", part, flags=re.MULTILINE)
+        assert rows == list(names)
+        sentences = re.split(r"^  \S+", part, flags=re.MULTILINE)[1:]
+        assert all(text.rstrip().endswith(".") and "..." not in text for text in sentences)
     assert done.code == 0
 
 
