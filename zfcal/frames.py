@@ -258,15 +258,15 @@ class TrialTables:
         Parameters
         ----------
         path
-            Of the findings; by default those that the tables were opened with. The verdict is in
-            ``attrs``.
+            Of the findings; by default those that the tables were opened with.
 
         Returns
         -------
         DataFrame
             One row per effect and parameter: ``rank`` from 1 on, ``effect``, ``parameter``,
             ``value``, ``low``, ``high``, ``gain_nats_per_step``, ``p`` and ``ties`` (names, with
-            commas).
+            commas). ``attrs`` has the ``verdict`` and, once the model was extended, the rows of
+            its ``gap``.
 
         Raises
         ------
@@ -282,7 +282,7 @@ class TrialTables:
         check(found, "findings", place)
         rows = [row for rank, each in enumerate(found["effects"], 1) for row in _found(rank, each)]
         table = pd.DataFrame(rows, columns=list(_FINDINGS))
-        table.attrs["verdict"] = found["verdict"]
+        table.attrs = {"verdict": found["verdict"], "gap": found.get("gap") or []}
         return table
 
     def _numbered(self, folder: str, ending: str) -> list[Path]:

@@ -141,7 +141,7 @@ def extend(
     >>> zfcal.extend("trial", effect="alinment")
     Traceback (most recent call last):
         ...
-    zfcal.errors.InputError: No effect is called 'alinment'.
+    zfcal.errors.InputError: There is no effect 'alinment'.
     """
     chosen, task = extension_of(locals()), task_of(locals())
     return extend_one(work_of(trial).root, chosen, heard_by(tell), task=task)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
 from zfcal.api.values import PathLike
-from zfcal.errors import DamagedError
+from zfcal.errors import DamagedError, InputError
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
@@ -35,7 +35,14 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
     -------
     Path
         The page.
+
+    Raises
+    ------
+    InputError
+        There are no trials, or one of them is none.
     """
+    if not roots:
+        raise InputError("A report needs at least one trial.")
     folder = _TOGETHER if out is None and len(roots) > 1 else out
 
     def work() -> None:
