@@ -43,12 +43,12 @@ CASES = {
         ),
     ),
     "calibrate one window": (
-        f"calibrate trial --window 0:100 --held-out 100:200 -o half.toml --no-seed-likelihood {WORDS}",
+        f"calibrate trial --window 0:100 --held-out 100:200 -o half --no-seed-likelihood {WORDS}",
         lambda **more: zfcal.calibrate(
             zfcal.open("trial"),
             window=(0, 100),
             held_out="100:200",
-            out="half.toml",
+            out="half",
             seed_likelihood=False,
             **ROUND,
             **more,
@@ -116,10 +116,11 @@ def test_a_function_writes_what_its_command_writes(
     before, heard = children(), []
     call(tell=heard.append)
     assert children() <= before
-    assert [str(event.path) for event in heard if isinstance(event, Made | UpToDate)] == lines
+    told = [str(event.path) for event in heard if isinstance(event, Made | UpToDate)]
+    # A command says each path once.
+    assert list(dict.fromkeys(told)) == lines
     assert lines
     assert read_all(twin) == read_all(here)
-    capsys.readouterr()
     assert not [event for event in heard if isinstance(event, Planned)]
 
 
