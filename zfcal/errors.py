@@ -37,6 +37,9 @@ class ZfcalError(Exception):
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
         self.hint = hint
+        if hint:
+            # Who calls zfcal from Python sees it below the message.
+            self.add_note(f"hint: {hint}")
 
 
 class InputError(ZfcalError):

@@ -142,7 +142,9 @@ def test_mypy_types_the_functions(tmp_path):
 
 
 EXAMPLES = [
-    name if name not in {"diagnose", "report"} else pytest.param(name, marks=pytest.mark.slow)
+    name
+    if name not in {"diagnose", "extend", "report"}
+    else pytest.param(name, marks=pytest.mark.slow)
     for name in FUNCTIONS
 ]
 

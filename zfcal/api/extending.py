@@ -138,10 +138,8 @@ def extend(
     Examples
     --------
     >>> import zfcal
-    >>> zfcal.extend("trial", effect="alinment")
-    Traceback (most recent call last):
-        ...
-    zfcal.errors.InputError: There is no effect 'alinment'.
+    >>> print(zfcal.extend("trial", effect="turning-bias", generations=0, population=4))
+    trial/models/extended.toml
     """
     chosen, task = extension_of(locals()), task_of(locals())
     return extend_one(work_of(trial).root, chosen, heard_by(tell), task=task)
