@@ -33,7 +33,7 @@ from zfcal.errors import (
     ],
 )
 def test_each_error_has_its_exit_code(kind, code):
-    """1 for what a person can mend, 2 for wrong usage, 3 for a damaged file left out, 75 (tempfail) for a lock."""
+    """1 for what a person can mend, 2 for usage, 3 for a file left out, 75 for a lock."""
     assert kind("what").exit_code == code
 
 

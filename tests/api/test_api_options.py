@@ -11,8 +11,14 @@ import pandas as pd
 import pytest
 
 import zfcal
+from zfcal.api.analysing import analysis_of
+from zfcal.api.calibrating import calibration_of
+from zfcal.api.diagnosing import diagnosis_of
+from zfcal.api.extending import extension_of
+from zfcal.api.simulating import simulation_of
 from zfcal.errors import OptionError
 from zfcal.frames import TrialTables
+from zfcal.stages.events import say_nothing
 from zfcal_cli.main import group
 
 NEEDED = {
@@ -99,6 +105,137 @@ def test_the_words_of_an_option_are_those_of_the_argument(name):
             assert words == list(map(str, option.type.choices)), key
         else:
             assert words == [], key
+
+
+OTHERS = {
+    "analyse": {"control": "alone", "scoring": "legacy", "features": "residence"},
+    "calibrate": {
+        "generations": 3,
+        "budget": "5s",
+        "population": 8,
+        "runs": 2,
+        "steps": 20,
+        "optimiser": "deap",
+        "seed_likelihood": False,
+        "model": "trial/models/000000.toml",
+        "publish": "score",
+        "as_published": True,
+        "confirm": 3,
+        "diversity": "population",
+        "renewal": False,
+        "sampler": "grid",
+        "baselines": True,
+        "seed": 5,
+        "workers": 1,
+        "features": ("D", "W"),
+    },
+    "diagnose": {
+        "model": "trial/models/000000.toml",
+        "null_replicates": 199,
+        "quick": True,
+        "noise_mm": 0.5,
+        "window": (0, 60),
+        "seed": 5,
+        "workers": 1,
+        "out": "elsewhere",
+    },
+    "extend": {
+        "effect": "alignment",
+        "findings": "trial",
+        "generations": 3,
+        "budget": 2.5,
+        "population": 8,
+        "seed": 5,
+        "workers": 1,
+        "out": "elsewhere",
+    },
+    "simulate": {
+        "model": "alone/models/000000.toml",
+        "duration": "2min",
+        "seed": 5,
+        "arena": "ring",
+        "fish": 2,
+        "robot": True,
+        "robots": 2,
+        "fps": 10,
+        "video": True,
+        "video_file": "film.avi",
+    },
+}
+"""For each function other values than the usual ones: each changes what is done."""
+
+WITH_OTHERS = {
+    "calibrate": {"window": {"out": "x.toml"}, "held_out": {"window": "0:50", "out": "x.toml"}},
+    "simulate": {key: {"video": True} for key in ("look", "draw", "photograph")},
+}
+"""Of some options those without which they are refused."""
+
+BESIDE = {
+    "calibrate": {"window": "0:99", "held_out": "100:200"},
+    "simulate": {"look": "hard", "draw": {"noise_grey": 9}, "photograph": "trial/trial.toml"},
+}
+"""Their other values."""
+
+
+def chosen(name, **options):
+    """Return what options of a function come to, as those who do the work get it."""
+    usual = {
+        key: argument.default
+        for key, argument in inspect.signature(getattr(zfcal, name)).parameters.items()
+    }
+    needed = MODEL if name == "simulate" else {}
+    asked = {**usual, **needed, **options}
+    match name:
+        case "analyse":
+            return analysis_of(asked).chosen
+        case "calibrate":
+            with calibration_of(asked, say_nothing) as found:
+                return found.chosen, found.span
+        case "diagnose":
+            return diagnosis_of(asked)
+        case "extend":
+            return extension_of(asked)
+    found = simulation_of(asked)
+    return found.chosen, found.filmed
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_each_option_takes_effect(name, here):
+    """Whoever does the work gets something else: function and command share how."""
+    usual = chosen(name)
+    for key, value in OTHERS[name].items():
+        assert chosen(name, **{key: value}) != usual, key
+    for key, others in WITH_OTHERS.get(name, {}).items():
+        value = BESIDE[name][key]
+        assert chosen(name, **others, **{key: value}) != chosen_beside(name, others), key
+    command = group.get_command(None, name)
+    asked = options_of(command).keys() - {"dry_run", "force", "cluster"}
+    known = OTHERS[name].keys() | BESIDE.get(name, {}).keys()
+    # Of one window: where its model goes is asked for with it.
+    assert asked - {"out"} == known - {"out"}
+
+
+def chosen_beside(name, others):
+    """Return what the options that another one needs come to without it."""
+    try:
+        return chosen(name, **others)
+    except OptionError:
+        return None
+
+
+def test_where_the_model_of_a_window_goes(here):
+    """From `out`, as a path."""
+    _, span = chosen("calibrate", window="0:99", out="x.toml")
+    assert (span.train_s, span.held_out_s, str(span.output)) == ((0, 99), None, "x.toml")
+
+
+def test_what_the_paper_did_gives_way_to_what_is_said(here):
+    """Also where that is what is usual otherwise."""
+    paper, _ = chosen("calibrate", as_published=True)
+    said, _ = chosen("calibrate", as_published=True, confirm=10, renewal=True)
+    assert (paper.settings.n_confirmed, paper.settings.renews) == (0, False)
+    assert (said.settings.n_confirmed, said.settings.renews) == (10, True)
+    assert said.settings.optimiser == paper.settings.optimiser == "deap"
 
 
 def literals(hint):

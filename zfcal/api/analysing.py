@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,8 +20,32 @@ if TYPE_CHECKING:
     from zfcal.frames import TrialTables
 
 
-def analysis_of(options: Mapping[str, Any]) -> Callable[[Work, Tell], None]:
-    """Return what analyses a trial as the options of the command say.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Analysis:
+    """What analyses trials as the options of the command say.
+
+    Parameters
+    ----------
+    chosen
+        What bears on the numbers.
+    options
+        Those of the command.
+    segments
+        What was read already: trials may share it.
+    """
+
+    chosen: AnalyseOptions
+    options: Mapping[str, Any]
+    segments: Segments = field(default_factory=Segments)
+
+    def __call__(self, found: Work, tell: Tell) -> None:
+        """Analyse a trial."""
+        task = task_of(self.options, found.ends_s)
+        analyse_trial(found.root, self.chosen, tell, task=task, segments=self.segments)
+
+
+def analysis_of(options: Mapping[str, Any]) -> Analysis:
+    """Return what analyses trials as the options of the command say.
 
     Parameters
     ----------
@@ -41,13 +66,7 @@ def analysis_of(options: Mapping[str, Any]) -> Callable[[Work, Tell], None]:
     )
     if features is not None and not chosen.further:
         raise OptionError("--features names none beyond D, W, O, T and V: these are counted.")
-    segments = Segments()
-
-    def work(found: Work, tell: Tell) -> None:
-        task = task_of(asked, found.ends_s)
-        analyse_trial(found.root, chosen, tell, task=task, segments=segments)
-
-    return work
+    return Analysis(chosen=chosen, options=asked)
 
 
 def _controls(trials: TrialPath | Iterable[TrialPath]) -> tuple[Path, ...]:

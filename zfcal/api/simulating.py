@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
@@ -37,7 +38,37 @@ _FORMS: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def simulation_of(options: Mapping[str, Any]) -> Callable[[Path, Tell], None]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """What simulates a trial as the options of the command say.
+
+    Parameters
+    ----------
+    chosen
+        What to simulate.
+    filmed
+        What to draw of it; None for no images.
+    options
+        Those of the command.
+    """
+
+    chosen: SimulateOptions
+    filmed: FilmOptions | None
+    options: Mapping[str, Any]
+
+    def __call__(self, root: Path, tell: Tell) -> None:
+        """Simulate a trial."""
+        task = task_of(self.options)
+        if self.filmed is None:
+            simulate_trial(root, self.chosen, tell, task=task)
+            return
+        # What draws images takes a third of a second to import.
+        from zfcal.virtual.filming import simulate_on_film
+
+        simulate_on_film(root, self.chosen, self.filmed, tell, task=task)
+
+
+def simulation_of(options: Mapping[str, Any]) -> Simulation:
     """Return what simulates a trial as the options of the command say.
 
     Parameters
@@ -51,29 +82,16 @@ def simulation_of(options: Mapping[str, Any]) -> Callable[[Path, Tell], None]:
         One has another form, two contradict each other, or one could not take effect.
     """
     asked = taken(options, _FORMS)
-    filmed = _film(asked)
-    n_robots = count_robots(robot=asked["robot"], n_robots=asked["robots"])
-
-    def work(root: Path, tell: Tell) -> None:
-        chosen = SimulateOptions(
-            model=asked["model"],
-            duration_s=asked["duration"],
-            seed=asked["seed"],
-            arena=asked["arena"],
-            n_fish=asked["fish"],
-            n_robots=n_robots,
-            fps=asked["fps"],
-        )
-        task = task_of(asked)
-        if filmed is None:
-            simulate_trial(root, chosen, tell, task=task)
-            return
-        # What draws images takes a third of a second to import.
-        from zfcal.virtual.filming import simulate_on_film
-
-        simulate_on_film(root, chosen, filmed, tell, task=task)
-
-    return work
+    chosen = SimulateOptions(
+        model=asked["model"],
+        duration_s=asked["duration"],
+        seed=asked["seed"],
+        arena=asked["arena"],
+        n_fish=asked["fish"],
+        n_robots=count_robots(robot=asked["robot"], n_robots=asked["robots"]),
+        fps=asked["fps"],
+    )
+    return Simulation(chosen=chosen, filmed=_film(asked), options=asked)
 
 
 def count_robots(*, robot: bool, n_robots: int | None) -> int | None:
