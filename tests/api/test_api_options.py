@@ -1,7 +1,9 @@
 """Arguments of functions are the options of their commands, and refused like them."""
 
+import ast
 import importlib
 import inspect
+import re
 import shlex
 import typing
 
@@ -313,3 +315,20 @@ def test_numbers_of_numpy_are_numbers(here):
     heard = []
     zfcal.calibrate("trial", generations=0, population=4, steps=20, tell=heard.append, force=True)
     assert (here / "trial" / "models" / "000120.toml").read_bytes() == model
+
+
+def test_calls_in_the_documentation_are_possible(repository):
+    """Each function is there, and takes what it is given."""
+    text = (repository / "docs" / "python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    calls = [
+        node
+        for block in blocks
+        for node in ast.walk(ast.parse(block))
+        if isinstance(node, ast.Call) and re.fullmatch(r"zfcal\.\w+", ast.unparse(node.func))
+    ]
+    for call in calls:
+        function = getattr(zfcal, ast.unparse(call.func).removeprefix("zfcal."))
+        given = {keyword.arg: None for keyword in call.keywords}
+        inspect.signature(function).bind(*call.args, **given)
+    assert len(calls) >= 8
