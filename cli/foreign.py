@@ -20,6 +20,8 @@ FORMATS = (
     "sleap",
     "deeplabcut",
     "movement",
+    "robofish",
+    "fishmodel",
 )
 
 _M_PER_MM = 0.001

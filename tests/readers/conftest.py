@@ -188,6 +188,28 @@ def _movement(path):
     data.to_netcdf(path, engine="h5netcdf")
 
 
+def _robofish(path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file.attrs["format_version"] = np.array([1, 0], dtype=np.int32)
+        file.attrs["world_size_cm"] = np.array([100.0, 100.0], dtype=np.float32)
+        file.create_group("samplings/15 hz").attrs["frequency_hz"] = np.float32(15)
+        file["samplings"].attrs["default"] = "15 hz"
+        for name, xy_px in zip("01", XY_PX.transpose(1, 0, 2), strict=True):
+            entity = file.create_group(f"entities/{name}")
+            entity.attrs["category"] = "organism"
+            entity.create_dataset("positions", data=(xy_px / 10).astype(np.float32))
+            entity.create_dataset("orientations", data=np.full((4, 2), [0, 1], dtype=np.float32))
+
+
+def _fishmodel(path):
+    lines = []
+    for k, frame in enumerate(XY_PX / 1000):
+        cells = [f"{x} {y} 0.5" if np.isfinite(x) else "nan nan nan" for x, y in frame]
+        lines.append("\t".join([f"{k / 15:.6f}", *cells]))
+    path.write_text("\n".join(lines) + "\n")
+
+
 WRITERS = {
     "csv": ("tracks.csv", _csv),
     "cats": ("positions-1.txt", _cats),
@@ -198,7 +220,12 @@ WRITERS = {
     "sleap": ("tank.analysis.h5", _sleap),
     "deeplabcut": ("tankDLC.csv", _deeplabcut),
     "movement": ("tank.nc", _movement),
+    "robofish": ("tank.hdf5", _robofish),
+    "fishmodel": ("printed.txt", _fishmodel),
 }
+
+METRIC = {"csv", "cats", "trex", "robofish", "fishmodel"}
+"""Samples that are in metres or centimetres, and take no scale."""
 
 
 @pytest.fixture
@@ -209,7 +236,7 @@ def sample(tmp_path):
         file, write_file = WRITERS[name]
         path = tmp_path / file
         write_file(path)
-        return path, ({} if name in {"csv", "cats", "trex"} else {"m_per_px": PX})
+        return path, ({} if name in METRIC else {"m_per_px": PX})
 
     return writer
 
