@@ -20,6 +20,7 @@ FORMATS = (
     "sleap",
     "deeplabcut",
     "movement",
+    "nwb",
     "robofish",
     "fishmodel",
 )

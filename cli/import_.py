@@ -39,9 +39,9 @@ def command(
 
     Formats: csv (time_s, agent, x_m, y_m or x_px, y_px; kind, heading_rad and
     confidence if there are), cats (positions-*.txt of the older rig), trex,
-    idtracker, trajectorytools, mot, sleap, deeplabcut, movement, robofish (HDF5
-    of robofish-io), fishmodel (text of the older simulator). Pixels need a
-    scale; nothing is called metres without one.
+    idtracker, trajectorytools, mot, sleap (analysis .h5, labels .slp), deeplabcut,
+    movement, nwb, robofish (HDF5 of robofish-io), fishmodel (text of the older
+    simulator). Pixels need a scale; nothing is called metres without one.
 
     \b
     Example:

@@ -16,7 +16,7 @@ METRIC = {"csv", "cats", "trex", "robofish", "fishmodel"}
 RATELESS = {"mot", "sleap", "deeplabcut", "fishmodel"}
 """Formats without times and without a rate."""
 
-HDF5 = {"idtracker", "sleap", "movement", "robofish"}
+HDF5 = {"idtracker", "sleap", "movement", "nwb", "robofish"}
 """Samples that are HDF5: bytes flipped in there can crash the HDF5 library itself."""
 
 
@@ -32,6 +32,7 @@ def test_the_contract_names_these_formats():
         "sleap",
         "deeplabcut",
         "movement",
+        "nwb",
         "robofish",
         "fishmodel",
     )
@@ -157,6 +158,7 @@ def test_a_file_looks_like_its_own_format(name, sample):
         ("aa", "0.000000 0.1 0.2 1.5\n", None),
         ("a.txt", "something else\n", None),
         ("a.h5", "no HDF5", None),
+        ("a.slp", "", "sleap"),
         ("a.csv", "", None),
     ],
 )
@@ -215,7 +217,13 @@ def test_a_folder_is_read_by_trex_only(tmp_path, refused):
 
 @pytest.mark.parametrize(
     ("name", "package"),
-    [("sleap", "h5py"), ("idtracker", "h5py"), ("movement", "h5py"), ("robofish", "h5py")],
+    [
+        ("sleap", "h5py"),
+        ("idtracker", "h5py"),
+        ("movement", "h5py"),
+        ("nwb", "h5py"),
+        ("robofish", "h5py"),
+    ],
 )
 def test_a_missing_optional_package_is_named_with_its_extra(
     name, package, sample, refused, monkeypatch

@@ -18,6 +18,7 @@ from zfcal.readers.guess import guess_format
 from zfcal.readers.idtracker import read_idtracker
 from zfcal.readers.mot import read_mot
 from zfcal.readers.movement import read_movement
+from zfcal.readers.nwb import read_nwb
 from zfcal.readers.options import ImportOptions, given
 from zfcal.readers.robofish import read_robofish
 from zfcal.readers.sleap import read_sleap
@@ -63,6 +64,7 @@ _ALL = (
     Format(name="sleap", reader=read_sleap, options=_POSES),
     Format(name="deeplabcut", reader=read_deeplabcut, options=_POSES),
     Format(name="movement", reader=read_movement, options=_POSES),
+    Format(name="nwb", reader=read_nwb, options=_POSES),
     Format(name="robofish", reader=read_robofish),
     Format(name="fishmodel", reader=read_fishmodel),
 )

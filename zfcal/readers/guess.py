@@ -11,6 +11,7 @@ from zfcal.readers.fishmodel import LINE
 from zfcal.readers.text import first_lines
 
 _ENDINGS = {".npz": "trex", ".npy": "trajectorytools", ".xml": "cats", ".nc": "movement"}
+_ENDINGS |= {".slp": "sleap", ".nwb": "nwb"}
 
 _HEADERS = (
     (re.compile(r"timeStep\t"), "cats"),
@@ -28,6 +29,7 @@ _KEYS = (
     ("trajectories", "idtracker"),
     ("tracks", "sleap"),
     ("entities", "robofish"),
+    ("file_create_date", "nwb"),
 )
 
 
