@@ -169,7 +169,9 @@ def test_entities_of_different_samplings_are_refused_and_of_like_ones_read(make,
 
     assert "fish_1 is of sampling '15 hz', fish_2 of 'other'; expected one clock" in message
     assert len(read(make(_same_rate_by_another_name), "robofish").tracks) == 15
-    assert len(read(make(_second_clock), "robofish").tracks) == 15
+    unused = read(make(_second_clock), "robofish")
+    assert len(unused.tracks) == 15
+    assert "Sampling '15 hz' is taken, not used: other." in unused.notes
 
 
 def test_times_of_samples_are_taken_and_compared_with_the_rate(make, read, refused):

@@ -7,7 +7,8 @@ attribute ``category`` (organism, robot or obstacle; fish in older files) and da
 (sample, 2), unit vectors; NaN where it was lost. One sample alone holds for the whole recording.
 ``samplings`` has a group for each clock, with the attribute ``frequency_hz`` or a data set
 ``monotonic_time_points_us``; ``default`` names the one of all entities whose attribute ``sampling``
-names no other.
+names no other. No file of robofish-io was at hand to confirm ``default``, ``sampling`` and the
+times: where a file has several samplings, the import says which one it took.
 
 The format does not tell to which side of the tank y counts. BioTracker writes images' rows, which
 count downwards; simulators count upwards.
@@ -80,6 +81,7 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
     with open_hdf5(path) as file:
         world_cm = _world(path, file)
         entities, left_out = _entities(path, file)
+        unused = sorted(set(file["samplings"]) - {entity.sampling.name for entity in entities})
     sampling = _one_sampling(path, entities)
     n_samples = _length(path, entities, sampling)
     frame = np.arange(n_samples)
@@ -93,6 +95,8 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
         notes += check_declared(path, sampling.frequency_hz, options.fps)
     if left_out:
         notes.append(f"Entities that are neither fish nor robot are passed over: {left_out}.")
+    if unused:
+        notes.append(f"Sampling {sampling.name!r} is taken, not used: {', '.join(unused)}.")
     ended = [f"{e.name} ({len(e.xy)})" for e in entities if 1 < len(e.xy) < n_samples]
     if ended:
         notes.append(f"Some end before the last of {n_samples} samples: {', '.join(ended)}.")
