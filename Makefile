@@ -47,6 +47,10 @@ lint: install  ## Check style, formatting, types and layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy zfcal cli
+	@for system in win32 darwin; do \
+		echo "mypy for $$system"; \
+		$(BIN)/mypy --config-file mypy-elsewhere.ini --platform $$system \
+			--cache-dir .mypy_cache/$$system zfcal cli || exit 1; done
 	$(BIN)/lint-imports
 
 format: install  ## Format the code
