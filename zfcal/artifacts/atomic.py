@@ -220,13 +220,13 @@ def _remove_orphans(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    if os.name == "nt":
-        # There the signal that asks ends the process. Elsewhere it sees others' processes as well,
-        # which a system may hide from whoever lists them.
-        import psutil
-
-        return psutil.pid_exists(process)
     try:
+        if os.name == "nt":
+            # There the signal that asks ends the process. Elsewhere it sees those of other people
+            # as well, which a system may hide from whoever lists them.
+            import psutil
+
+            return psutil.pid_exists(process)
         os.kill(process, 0)
     except ProcessLookupError:
         return False
