@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -124,6 +125,22 @@ def test_a_link_in_place_of_the_lock_file_is_refused(tmp_path):
     with pytest.raises(StorageError), lock(tmp_path, "analyse"):
         pytest.fail("a link was followed")
     assert not (tmp_path / "elsewhere").exists()
+
+
+def test_another_thread_may_free_a_lock_and_none_may_take_it_before(tmp_path):
+    """A lock is the trial's, whichever thread asks."""
+    held = lock(tmp_path, "analyse")
+    held.__enter__()
+
+    def again():
+        with lock(tmp_path, "analyse"):
+            pass
+
+    with ThreadPoolExecutor(1) as other:
+        with pytest.raises(LockedError):
+            other.submit(again).result()
+        other.submit(held.__exit__, None, None, None).result()
+    again()
 
 
 FORKING = """

@@ -35,7 +35,13 @@ def lock(root: Path, command: str) -> Iterator[None]:
     path = root / f".lock-{command}"
     # The file stays: removing it would let two processes hold locks on two files of one name. And
     # where the file system has no locks that end with their process, there is none at all.
-    held = FileLock(path, blocking=False, preserve_lock_file=True, fallback_to_soft=False)
+    held = FileLock(
+        path,
+        blocking=False,
+        thread_local=False,
+        preserve_lock_file=True,
+        fallback_to_soft=False,
+    )
     _take(held, path, command)
     try:
         yield
