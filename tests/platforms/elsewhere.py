@@ -1,14 +1,18 @@
 """Take away from zfcal what only some systems have, as far as that can be done on Linux.
 
-What is gone is what Windows lacks, together with what macOS lacks. Other people's packages, and
-the standard library, have a version of their own for each system: they keep what that for Linux
-uses.
+What is gone is what Windows lacks, together with what macOS lacks; and as on Windows, a file that
+this process has open is neither replaced nor removed, and no folder is opened. Other people's
+packages, and the standard library, have a version of their own for each system: they keep what
+that for Linux uses.
 """
 
 import builtins
+import contextlib
+import errno
 import os
 import signal
 import sys
+from pathlib import Path
 from types import ModuleType
 
 MODULES = """
@@ -51,12 +55,41 @@ class _Elsewhere(ModuleType):
 _HIDDEN = frozenset(f"{OS_NAMES} {SIGNAL_NAMES}".split())
 _MISSING = frozenset(MODULES.split())
 _import = builtins.__import__
+_open, _replace, _unlink = os.open, os.replace, os.unlink
 
 
 def _import_elsewhere(name, globals=None, *rest, **named):  # noqa: A002 - its own name for it
     if name.partition(".")[0] in _MISSING and _is_ours(globals or {}):
         raise ModuleNotFoundError(f"no module {name} on this system", name=name)
     return _import(name, globals, *rest, **named)
+
+
+def _open_elsewhere(path, *rest, **named):
+    if _is_ours(sys._getframe(1).f_globals) and Path(path).is_dir():
+        raise PermissionError(errno.EACCES, "a folder", os.fspath(path))
+    return _open(path, *rest, **named)
+
+
+def _replace_elsewhere(source, target, **named):
+    _refuse_open(source)
+    _refuse_open(target)
+    return _replace(source, target, **named)
+
+
+def _unlink_elsewhere(path, **named):
+    if not named:
+        _refuse_open(path)
+    return _unlink(path, **named)
+
+
+def _refuse_open(path):
+    place = os.path.realpath(path)
+    for number in os.listdir("/proc/self/fd"):  # noqa: PTH208 - numbers, not paths
+        found = ""
+        with contextlib.suppress(OSError):
+            found = str(Path(f"/proc/self/fd/{number}").readlink())
+        if found == place:
+            raise PermissionError(errno.EACCES, "this process has it open", os.fspath(path))
 
 
 def _is_ours(names):
@@ -66,4 +99,5 @@ def _is_ours(names):
 def go_elsewhere():
     """Take it all away from what this process will import of zfcal."""
     builtins.__import__ = _import_elsewhere
+    os.open, os.replace, os.unlink = _open_elsewhere, _replace_elsewhere, _unlink_elsewhere
     os.__class__ = signal.__class__ = _Elsewhere
