@@ -47,6 +47,10 @@ lint: install  ## Check style, formatting, types and layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy zfcal cli
+	@for system in win32 darwin; do \
+		echo "mypy for $$system"; \
+		$(BIN)/mypy --config-file mypy-elsewhere.ini --platform $$system \
+			--cache-dir .mypy_cache/$$system zfcal cli || exit 1; done
 	$(BIN)/lint-imports
 
 format: install  ## Format the code
@@ -59,15 +63,20 @@ format: install  ## Format the code
 	@touch $@
 
 # Programs that zfcal exports for, in an environment of their own: they bring much, and other versions.
-.venv-programs/.installed: requirements-programs.lock
+# zfcal is there too, with the extra that takes one of them to read files.
+.venv-programs/.locked: requirements-programs.lock
 	$(PYTHON) -m venv --clear .venv-programs
 	.venv-programs/bin/python -m pip install --quiet --require-hashes --requirement requirements-programs.lock
+	@touch $@
+
+.venv-programs/.installed: .venv-programs/.locked pyproject.toml
+	.venv-programs/bin/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
 .PHONY: .venv-programs
 .venv-programs: .venv-programs/.installed
 
-test-programs: install .venv-programs  ## Let the programs open what zfcal exports for them
+test-programs: install .venv-programs  ## Let the programs open what zfcal exports, and read what they write
 	ZFCAL_PROGRAMS=1 $(BIN)/pytest tests/programs
 
 # BENCH_OPTIONS=--write renews benchmarks/results and the documentation.
@@ -96,9 +105,9 @@ COMPILE = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strateg
 # What zfcal is tested with depends neither on what it is compared with, nor on the programs that it
 # exports for: a lock for each.
 lock: install  ## Write the locks anew; pins that still fit stay
-	$(COMPILE) pyproject.toml --all-extras --output-file requirements.lock
+	$(COMPILE) pyproject.toml --extra dev --output-file requirements.lock
 	$(COMPILE) --group bench --constraint requirements.lock --output-file requirements-bench.lock
-	$(COMPILE) --group programs --output-file requirements-programs.lock
+	$(COMPILE) pyproject.toml --extra sleap --group programs --output-file requirements-programs.lock
 
 lock-upgrade:  ## Write the locks anew with the newest versions
 	$(MAKE) lock LOCK_OPTIONS=--upgrade

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from .options import EXISTING, makes_artifacts, names, speaks, takes_trials
 from .output import Output
 from .streams import each_trial
-
-if TYPE_CHECKING:
-    from zfcal.stages.streams import Work
 
 
 @click.command("analyse")
@@ -39,16 +35,7 @@ if TYPE_CHECKING:
 )
 @makes_artifacts
 @speaks
-def command(
-    out: Output,
-    trials: tuple[str, ...],
-    *,
-    control: tuple[Path, ...],
-    scoring: str,
-    features: tuple[str, ...] | None,
-    dry_run: bool,
-    force: bool,
-) -> None:
+def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Make statistics and scores of each window of 120 s, every 60 s.
 
     Writes stats/E.parquet and scores/E.parquet for each second E at which a
@@ -63,17 +50,7 @@ def command(
         zfcal analyse trial --features residence,curvature
         zfcal import tracks.csv trial --format csv | zfcal analyse -
     """
-    from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
-    from zfcal.stages.segments import Segments
-    from zfcal.stages.trial_context import Task
+    from zfcal.api.analysing import analysis_of
 
-    options = AnalyseOptions(scoring=scoring, control=control, features=features or ())
-    if features is not None and not options.further:
-        raise click.UsageError("--features names none beyond D, W, O, T and V: these are counted.")
-    segments = Segments()
-
-    def work(found: Work) -> None:
-        task = Task(dry_run=dry_run, force=force, ends_s=found.ends_s)
-        analyse(found.root, options, out.tell, task=task, segments=segments)
-
-    each_trial(out, trials, work)
+    work = analysis_of(options)
+    each_trial(out, trials, lambda found: work(found, out.tell))

@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .calibration import choose, round_options
+from .calibration import round_options
 from .durations import span
 from .options import PLACE, makes_artifacts, names, speaks, takes_trials
 from .output import Output
 from .streams import STDIN, each_trial, trials_together
-
-if TYPE_CHECKING:
-    from zfcal.stages.calibrate.searching import CalibrateOptions
-    from zfcal.stages.events import Tell
-    from zfcal.stages.streams import Work
-
-    from .calibration import MakeTask
 
 
 @click.command("calibrate")
@@ -31,7 +19,7 @@ if TYPE_CHECKING:
 @click.option("--cluster", metavar="ADDRESS", help="Simulate there, such as tcp://host:8786.")
 @click.option("--window", type=span, metavar="START:END", help="One pooled window instead.")
 @click.option("--held-out", type=span, metavar="START:END", help="Score the model there as well.")
-@click.option("-o", "--out", "output", type=PLACE, help="Where the model of --window goes.")
+@click.option("-o", "--out", type=PLACE, help="Where the model of --window goes.")
 @click.option(
     "--features",
     type=names,
@@ -42,7 +30,7 @@ if TYPE_CHECKING:
 )
 @makes_artifacts
 @speaks
-def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
+def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Find the model that comes nearest to each window of a trial.
 
     Writes models/E.toml, models/E.parquet, scores/E-model.parquet and
@@ -58,59 +46,13 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         zfcal calibrate trial --features D,W,O,T,residence,curvature
         zfcal calibrate trial --window 0:900 --held-out 900:1800 -o first-half.toml
     """
-    chosen, task = choose(options)
-    with _on_cluster(out, options, chosen) as placed:
-        if options["window"] is not None:
-            _span_task(out, trials, options, (placed, task))
+    from zfcal.api.calibrating import calibration_of
+
+    with calibration_of(options, out.tell) as work:
+        if work.span is not None and (len(trials) != 1 or STDIN in trials):
+            raise click.UsageError("--window takes one trial, since -o names one file.")
+        cluster = work.chosen.cluster
+        if cluster is None or work.span is not None or STDIN in trials:
+            each_trial(out, trials, lambda found: work(found, out.tell))
         else:
-            _each_round(out, trials, placed, task)
-
-
-@contextmanager
-def _on_cluster(
-    out: Output, options: Mapping[str, Any], chosen: CalibrateOptions
-) -> Iterator[CalibrateOptions]:
-    """Give the options the cluster that is asked for; a dry run needs none."""
-    if options["cluster"] is None or options["dry_run"]:
-        yield chosen
-        return
-    from zfcal.calibrate.scheduler import connect
-
-    with connect(options["cluster"]) as cluster:
-        size = f"workers {cluster.n_workers}, threads {cluster.n_threads}"
-        out.note(f"Cluster {cluster.address}: {size}.")
-        yield dataclasses.replace(chosen, cluster=cluster)
-
-
-def _each_round(
-    out: Output, trials: tuple[str, ...], chosen: CalibrateOptions, task: MakeTask
-) -> None:
-    """Calibrate trials round by round; on a cluster, several trials at the same time."""
-    from zfcal.stages.calibrate.calibrate import calibrate
-
-    def work(found: Work, tell: Tell) -> None:
-        calibrate(found.root, chosen, tell, task=task(found.ends_s))
-
-    if chosen.cluster is None or STDIN in trials:
-        each_trial(out, trials, functools.partial(work, tell=out.tell))
-    else:
-        trials_together(out, trials, work, n_threads=chosen.cluster.n_threads)
-
-
-def _span_task(
-    out: Output,
-    trials: tuple[str, ...],
-    options: Mapping[str, Any],
-    chosen: tuple[CalibrateOptions, MakeTask],
-) -> None:
-    """Calibrate one pooled window of one trial."""
-    from zfcal.stages.calibrate.holdout import Span, calibrate_span
-
-    if len(trials) != 1 or trials[0] == "-":
-        raise click.UsageError("--window takes one trial, since -o names one file.")
-    asked = Span(
-        train_s=options["window"], held_out_s=options["held_out"], output=options["output"]
-    )
-    calibration, task = chosen
-    work = functools.partial(calibrate_span, Path(trials[0]), asked, calibration, out.tell)
-    out.attempt(lambda: work(task=task(None)))
+            trials_together(out, trials, work, n_threads=cluster.n_threads)

@@ -37,14 +37,14 @@ def _is_option(word: str) -> bool:
 
 @click.command("compare", cls=_TwoSets)
 @click.argument("trials", nargs=-1, required=True, metavar="A...")
-@click.option(
-    _AGAINST, "others", multiple=True, required=True, metavar="B...", help="The trials of set B."
-)
-@click.option("-o", "--out", "folder", type=PLACE, help="Folder for compare.json and a picture.")
-@click.option("--format", "kind", type=click.Choice(["png", "svg"]), help="Of the picture.  [png]")
+@click.option(_AGAINST, multiple=True, required=True, metavar="B...", help="The trials of set B.")
+@click.option("-o", "--out", type=PLACE, help="Folder for compare.json and a picture.")
+@click.option("--format", type=click.Choice(["png", "svg"]), help="Of the picture.  [png]")
 @makes_artifacts
 @speaks
-def command(out: Output, trials: tuple[str, ...], others: tuple[str, ...], **options: Any) -> None:
+def command(
+    out: Output, /, trials: tuple[str, ...], against: tuple[str, ...], **options: Any
+) -> None:
     r"""Compare two sets of trials: differences with intervals, and tests over whole trials.
 
     A trial counts once, however long it is. With fewer than four trials on a side
@@ -56,10 +56,12 @@ def command(out: Output, trials: tuple[str, ...], others: tuple[str, ...], **opt
         zfcal compare day1/* --against day2/* -o days
         zfcal compare a1 a2 a3 a4 --against b1 b2 b3 b4 --json
     """
-    from .comparison import check_options, compare_sets
+    from zfcal.api.comparing import comparison_of
 
-    check_options(options)
-    sets = roots_of(out, trials), roots_of(out, others)
+    from .comparison import compare_and_say
+
+    asked = comparison_of(options)
+    sets = roots_of(out, trials), roots_of(out, against)
     if not out.exit_code:
         out.bare = True
-        out.attempt(lambda: compare_sets(out, sets, options))
+        out.attempt(lambda: compare_and_say(out, sets, asked))

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .calibration import CHAMPIONS, published_by
 from .closed_loop_options import closed_loop_options
 from .options import PLACE, speaks
 from .output import Output
-from .report import write_page
 
 if TYPE_CHECKING:
     from zfcal.stages.trial_context import Task
@@ -43,6 +41,7 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
         zfcal demo baseline --closed-loop --no-video --swims random --seed 3
         zfcal demo on --closed-loop --fish-model fish.toml --model extended.toml
     """
+    from zfcal.api.reporting import write_page
     from zfcal.stages.trial_context import Task
     from zfcal.virtual.demo import run_demo
 
@@ -53,13 +52,14 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
             trial = run_demo(folder, out.tell, task=task)
         else:
             trial = _closed_loop(out, folder, loop, task)
-        write_page(out, [trial], None, task)
+        write_page([trial], None, out.tell, task=task)
         out.note(f"Figures: {trial / 'report'} (open {trial / 'report' / 'index.html'})")
 
     out.attempt(work)
 
 
 def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -> Path:
+    from zfcal.api.rounds import CHAMPIONS, published_by
     from zfcal.units import M_PER_MM
     from zfcal.virtual.closed_loop import closed_loop
     from zfcal.virtual.fish import FishOptions

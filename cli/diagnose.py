@@ -18,7 +18,7 @@ from .options import (
     workers_option,
 )
 from .output import Output
-from .streams import roots_of
+from .streams import STDIN, roots_of
 
 
 def _listed(name: str) -> str:
@@ -31,21 +31,18 @@ def _listed(name: str) -> str:
 @click.option("--model", type=EXISTING, help="Another model than that of the newest round.")
 @click.option(
     "--null-replicates",
-    "n_null",
     type=click.Choice(["39", "199"]),
-    default="39",
-    show_default=True,
-    help="Trials simulated without any effect, to learn what chance does.",
+    help="Trials simulated without any effect, to learn what chance does.  [default: 39]",
 )
 @click.option("--quick", is_flag=True, help="Take that from theory instead: seconds, less sure.")
 @click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate.")
-@click.option("--window", "window_s", type=span, metavar="START:END", help="Only this stretch.")
+@click.option("--window", type=span, metavar="START:END", help="Only this stretch.")
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @workers_option
-@click.option("-o", "--out", "out_dir", type=PLACE, help="Folder.  [default: TRIAL/diagnosis]")
+@click.option("-o", "--out", type=PLACE, help="Folder.  [default: TRIAL/diagnosis]")
 @makes_artifacts
 @speaks
-def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
+def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Find the effect that a model misses: where it shows, what it is, how sure that is.
 
     Writes diagnosis/findings.json with pictures and report.html. Findings about a
@@ -58,8 +55,13 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         zfcal diagnose trial --model trial/models/extended.toml
         zfcal diagnose day1 day2 --window 0:1800 --noise-mm 0.5
     """
-    from .diagnosis import choose, diagnose_all
+    from zfcal.api.diagnosing import diagnosis_of
+    from zfcal.api.trials import task_of
 
-    chosen, task = choose(options, trials)
+    from .diagnosis import diagnose_all
+
+    chosen = diagnosis_of(options)
+    if chosen.out_dir is not None and (len(trials) != 1 or trials[0] == STDIN):
+        raise click.UsageError("-o is for one trial: its findings would overwrite each other's.")
     out.bare = len(trials) == 1
-    diagnose_all(out, roots_of(out, trials), chosen, task)
+    diagnose_all(out, roots_of(out, trials), chosen, task_of(options))

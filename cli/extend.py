@@ -19,28 +19,27 @@ from .options import (
     workers_option,
 )
 from .output import Output
-from .streams import roots_of
+from .streams import STDIN, roots_of
 
 
 @click.command("extend")
 @takes_trials
 @click.option(
     "--effect",
-    "names",
     multiple=True,
     metavar="NAME",
     help="Add this one; repeat it for several.  [default: those in the findings]",
 )
 @click.option("--findings", type=EXISTING, help="Take these.  [default: diagnosis/findings.json]")
 @click.option("--generations", type=click.IntRange(min=0), help="Per model.  [default: 15]")
-@click.option("--budget", "budget_s", type=seconds, metavar="TIME", help="Per model, such as 50s.")
+@click.option("--budget", type=seconds, metavar="TIME", help="Per model, such as 50s.")
 @population_option
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @workers_option
-@click.option("-o", "--out", "output", type=PLACE, help="Model.  [default: models/extended.toml]")
+@click.option("-o", "--out", type=PLACE, help="Model.  [default: models/extended.toml]")
 @makes_artifacts
 @speaks
-def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
+def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Add the missing effect to the model and show on held-out minutes that the gap shrinks.
 
     Learns from every other minute: fits the effect, then calibrates the model with it,
@@ -53,9 +52,20 @@ def command(out: Output, trials: tuple[str, ...], **options: Any) -> None:
         zfcal extend trial --effect alignment --generations 30 --seed 1
         zfcal diagnose trial --model trial/models/extended.toml
     """
-    from .extension import choose, extend_one
+    from zfcal.api.extending import extend_one, extension_of
+    from zfcal.api.trials import task_of
 
-    chosen, task = choose(options, trials)
+    chosen, task = extension_of(options), task_of(options)
+    _check_one(trials, options)
     out.bare = len(trials) == 1
     for root in roots_of(out, trials):
-        out.attempt(functools.partial(extend_one, out, root, chosen, task))
+        out.attempt(functools.partial(extend_one, root, chosen, out.tell, task=task))
+
+
+def _check_one(trials: tuple[str, ...], options: dict[str, Any]) -> None:
+    """Refuse options that name one file where there are several trials."""
+    if len(trials) == 1 and trials[0] != STDIN:
+        return
+    for name, option in (("findings", "--findings"), ("out", "-o")):
+        if options[name] is not None:
+            raise click.UsageError(f"{option} is for one trial, got several or a pipe.")

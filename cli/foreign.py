@@ -20,6 +20,9 @@ FORMATS = (
     "sleap",
     "deeplabcut",
     "movement",
+    "nwb",
+    "robofish",
+    "fishmodel",
 )
 
 _M_PER_MM = 0.001

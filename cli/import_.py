@@ -39,13 +39,15 @@ def command(
 
     Formats: csv (time_s, agent, x_m, y_m or x_px, y_px; kind, heading_rad and
     confidence if there are), cats (positions-*.txt of the older rig), trex,
-    idtracker, trajectorytools, mot, sleap, deeplabcut, movement. Pixels need
-    a scale; nothing is called metres without one.
+    idtracker, trajectorytools, mot, sleap (analysis .h5, labels .slp), deeplabcut,
+    movement, nwb, robofish (HDF5 of robofish-io), fishmodel (text of the older
+    simulator). Pixels need a scale; nothing is called metres without one.
 
     \b
     Example:
         zfcal import tracks.csv trial --format csv
         zfcal import video.npy ring --format idtracker --mm-per-px 1.08 --origin 0,1024 --flip-y
+        zfcal import tank.hdf5 trial --format robofish --origin -50,-50
         zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
     """
     from zfcal.stages.import_ import Source, import_tracks

@@ -10,7 +10,6 @@ from .options import (
     PLACE,
     POSITIVE,
     arena_options,
-    count_robots,
     makes_artifacts,
     seed_option,
     speaks,
@@ -61,6 +60,7 @@ def command(
         zfcal init trial --arena two-rooms --fish 4 --robot --fps 15
         zfcal init tank --radius-m 0.25 --fish 6 --source "shoal 3, Tuesday"
     """
+    from zfcal.api.simulating import count_robots
     from zfcal.stages.init import NewTrial, create_trial
     from zfcal.stages.trial_context import Task
 

@@ -10,6 +10,7 @@ import difflib
 import errno
 import gc
 import importlib
+import io
 import os
 import signal
 import sys
@@ -68,6 +69,9 @@ _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _OBJECTS = 50_000
 """New objects after which Python looks for those that refer to each other and to nothing else."""
+
+_LINUX_MODULES = {"fcntl", "termios", "tty"}
+"""What drives a robot needs them."""
 
 _BUG_HINT = "Run it again with --traceback to see where, and report it."
 
@@ -213,9 +217,15 @@ def run(argv: Sequence[str]) -> int:
 
 
 def _open_streams() -> None:
-    """Put the null device where a standard stream was closed (``<&-``): Python has None there."""
+    """Put the null device where a standard stream was closed (``<&-``): Python has None there.
+
+    On Windows they are UTF-8, as files are: a page of its own has no place for some of our signs.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
+        stream = getattr(sys, name)
+        if os.name == "nt" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8")
+        if stream is None:
             # It lives as long as the process.
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
@@ -250,7 +260,12 @@ def _explain(error: Exception, argv: Sequence[str]) -> int:
         return error.exit_code
     if "--traceback" in argv or "-vv" in argv:
         traceback.print_exception(error)
-    if isinstance(error, OSError) and error.filename is not None:
+    if isinstance(error, ModuleNotFoundError) and error.name in _LINUX_MODULES:
+        complain(
+            f"this runs on Linux alone: there is no module {error.name} on this system.",
+            hint="See docs/platforms.md for what runs where.",
+        )
+    elif isinstance(error, OSError) and error.filename is not None:
         complain(f"{error.filename}: {error.strerror or error}.")
     elif isinstance(error, OSError) and error.errno in _STREAM_FULL:
         complain(

@@ -10,6 +10,9 @@ from typing import Any
 
 import click
 
+from zfcal.api import values
+from zfcal.errors import OptionError
+
 from .output import Output
 
 Command = Callable[..., None]
@@ -52,10 +55,10 @@ POSITIVE = FiniteRange(min=0, min_open=True)
 
 def names(text: str) -> tuple[str, ...]:
     """Return the names that stand between commas."""
-    found = tuple(name.strip() for name in text.split(","))
-    if not all(found):
-        raise click.BadParameter(f"{text!r} holds an empty name; give them as D,W,O,T.")
-    return found
+    try:
+        return values.names(text)
+    except OptionError as error:
+        raise click.BadParameter(str(error)) from None
 
 
 def adds(*options: Decorator) -> Decorator:
@@ -91,10 +94,18 @@ def speaks(command: Command, *, as_json: str = "One JSON document instead of pat
             raise click.UsageError("--quiet and --verbose contradict each other.")
         name = context.info_name or ""
         with Output(name, as_json=as_json, verbose=verbose, quiet=quiet) as out:
-            command(out, **options)
+            _obey(command, out, options)
         context.exit(out.exit_code)
 
     return laid_out(run)
+
+
+def _obey(command: Command, out: Output, options: dict[str, Any]) -> None:
+    """Run a command; options that cannot be are wrong usage."""
+    try:
+        command(out, **options)
+    except OptionError as error:
+        raise click.UsageError(str(error)) from None
 
 
 makes_artifacts = adds(
@@ -142,39 +153,13 @@ arena_options = adds(
 """What describes the tank and who swims in it."""
 
 
-_NEW_TRIAL = adds(
+new_trial_options = adds(
     click.option(
         "--arena", metavar="NAME|FILE", help="Arena of a new trial; default: the model's."
     ),
-    click.option("--fish", "n_fish", type=click.IntRange(min=0), help="Its fish."),
+    click.option("--fish", type=click.IntRange(min=0), help="Its fish."),
     click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),
-    click.option("--robots", "n_robots", type=click.IntRange(min=0), help="Its robots."),
+    click.option("--robots", type=click.IntRange(min=0), help="Its robots."),
     click.option("--fps", type=POSITIVE, help="Its frame rate, in hertz."),
 )
-
-
-def new_trial_options(command: Command) -> Command:
-    """Add what a simulation may say of a trial that it makes, handed over as ``new``."""
-
-    @functools.wraps(command)
-    def run(
-        *args: Any,
-        arena: str | None,
-        n_fish: int | None,
-        robot: bool,
-        n_robots: int | None,
-        fps: float | None,
-        **options: Any,
-    ) -> None:
-        n_robots = count_robots(robot=robot, n_robots=n_robots)
-        new = {"arena": arena, "n_fish": n_fish, "n_robots": n_robots, "fps": fps}
-        command(*args, new=new, **options)
-
-    return _NEW_TRIAL(run)
-
-
-def count_robots(*, robot: bool, n_robots: int | None) -> int | None:
-    """Return the number of robots that --robot and --robots ask for; None if neither does."""
-    if robot and n_robots not in (None, 1):
-        raise click.UsageError(f"--robot means one robot, --robots says {n_robots}.")
-    return 1 if robot else n_robots
+"""What a simulation may say of a trial that it makes."""

@@ -139,11 +139,16 @@ class Output:
                 self._results.append(event.value)
 
     def attempt(self, work: Callable[[], object]) -> None:
-        """Do a part of the work; an error that a person can mend ends that part alone."""
-        from zfcal.errors import ZfcalError
+        """Do a part of the work; an error that a person can mend ends that part alone.
+
+        Options that cannot be are wrong usage of the command, whatever it was to work on.
+        """
+        from zfcal.errors import OptionError, ZfcalError
 
         try:
             work()
+        except OptionError:
+            raise
         except ZfcalError as error:
             self._fail(error)
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Self, final
 import click
 from click.core import ParameterSource
 
-from .calibration import choose
 from .output import Output
 from .status_line import StatusLine, describe
 from .tracking import track_options
@@ -26,11 +25,10 @@ _DEFAULT_BUDGET_S = 50.0
 
 _OWN = {"trial", "stages", "poll", "once", "until_idle_s"}
 _OF_CALIBRATE = {
-    "generations", "budget_s", "population", "runs", "steps", "optimiser", "seed_likelihood",
+    "generations", "budget", "population", "runs", "steps", "optimiser", "seed_likelihood",
     "champion", "publish", "model", "baselines", "seed", "workers", "as_published", "confirm",
     "diversity", "renewal", "sampler",
 }  # fmt: skip
-_NOT_HERE = {"window": None, "held_out": None, "output": None, "cluster": None}
 
 
 def watch_options(trial: Path, options: Mapping[str, Any]) -> WatchOptions:
@@ -57,10 +55,12 @@ def watch_options(trial: Path, options: Mapping[str, Any]) -> WatchOptions:
 
 
 def _round(options: Mapping[str, Any]) -> CalibrateOptions:
-    asked = {**options, **_NOT_HERE, "dry_run": False, "force": False}
-    if asked["generations"] is None and asked["budget_s"] is None:
-        asked["budget_s"] = _DEFAULT_BUDGET_S
-    return choose(asked)[0]
+    from zfcal.api.rounds import round_options
+
+    asked = dict(options)
+    if asked["generations"] is None and asked["budget"] is None:
+        asked["budget"] = _DEFAULT_BUDGET_S
+    return round_options(asked)
 
 
 def _stages(trial: Path, options: Mapping[str, Any]) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from zfcal.errors import (
     DamagedError,
     InputError,
     LockedError,
+    OptionError,
     SchemaError,
     StorageError,
     TakenError,
@@ -21,10 +23,17 @@ from zfcal.errors import (
 
 @pytest.mark.parametrize(
     ("kind", "code"),
-    [(ZfcalError, 1), (InputError, 1), (StorageError, 1), (DamagedError, 3), (LockedError, 75)],
+    [
+        (ZfcalError, 1),
+        (InputError, 1),
+        (OptionError, 2),
+        (StorageError, 1),
+        (DamagedError, 3),
+        (LockedError, 75),
+    ],
 )
 def test_each_error_has_its_exit_code(kind, code):
-    """1 for what a person can mend, 3 for a damaged file left out, 75 (tempfail) for a lock."""
+    """1 for what a person can mend, 2 for usage, 3 for a file left out, 75 for a lock."""
     assert kind("what").exit_code == code
 
 
@@ -34,8 +43,8 @@ def test_every_error_of_the_module_is_of_the_tree():
     kinds = {kind for kind in made if issubclass(kind, Exception)}
 
     assert kinds == {
-        ZfcalError, InputError, SchemaError, DamagedError, StorageError, TakenError, ChangedError,
-        LockedError,
+        ZfcalError, InputError, OptionError, SchemaError, DamagedError, StorageError, TakenError,
+        ChangedError, LockedError,
     }  # fmt: skip
     assert all(issubclass(kind, ZfcalError) for kind in kinds)
     assert not issubclass(OSError, ZfcalError)
@@ -48,6 +57,17 @@ def test_the_message_is_the_text_and_the_hint_stands_apart():
     assert str(error) == "fps is 0."
     assert error.hint == "Give a rate in hertz."
     assert InputError("no hint").hint == ""
+
+
+def test_python_shows_the_hint_below_the_message():
+    """As a note, which tracebacks and notebooks print; without a hint there is none."""
+    error = InputError("fps is 0.", hint="Give a rate in hertz.")
+
+    assert traceback.format_exception_only(error) == [
+        "zfcal.errors.InputError: fps is 0.\n",
+        "hint: Give a rate in hertz.\n",
+    ]
+    assert len(traceback.format_exception_only(InputError("no hint"))) == 1
 
 
 def test_a_schema_error_names_the_file_and_both_schemas():

@@ -4,6 +4,7 @@
 
     ZfcalError            exit 1
     ├── InputError        what a person gave is wrong: a value, a file, an option
+    │   ├── OptionError   options contradict each other, or have another form; exit 2
     │   └── SchemaError   an artifact of another schema or version
     ├── DamagedError      a file that cannot be read whole; the rest goes on, exit 3
     ├── StorageError      the disk is full, or a place cannot be written
@@ -36,10 +37,22 @@ class ZfcalError(Exception):
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
         self.hint = hint
+        if hint:
+            # Who calls zfcal from Python sees it below the message.
+            self.add_note(f"hint: {hint}")
 
 
 class InputError(ZfcalError):
     """Something that a person gave is wrong."""
+
+
+class OptionError(InputError):
+    """An option has another form, or could not take effect beside the others.
+
+    Options have their names of the command line: ``--held-out`` is ``held_out`` in Python.
+    """
+
+    exit_code = 2
 
 
 class SchemaError(InputError):

@@ -65,6 +65,8 @@ class TrialTables:
         Its directory, or anything in it.
     on_damage
         Hears of each damaged file, which is then left out; None to refuse its table.
+    findings
+        The findings that are meant where none are named; None for ``diagnosis/findings.json``.
 
     Raises
     ------
@@ -80,9 +82,17 @@ class TrialTables:
     ['fish', 'robot']
     """
 
-    def __init__(self, trial: str | Path, *, on_damage: Damage | None = None) -> None:
+    def __init__(
+        self,
+        trial: str | Path,
+        *,
+        on_damage: Damage | None = None,
+        findings: str | Path | None = None,
+    ) -> None:
         self._trial = read_trial(find_trial(Path(trial)))
         self._on_damage = on_damage
+        usual = self.root / "diagnosis" / "findings.json"
+        self._findings = usual if findings is None else Path(findings)
 
     @property
     def trial(self) -> Trial:
@@ -117,8 +127,7 @@ class TrialTables:
             case "parameters":
                 return self._numbered("models", ".toml")
             case "findings":
-                found = self.root / "diagnosis" / "findings.json"
-                return [found] if found.is_file() else []
+                return [self._findings] if self._findings.is_file() else []
         return self._numbered(table, ".parquet")
 
     def tracks(self) -> pd.DataFrame:
@@ -249,14 +258,15 @@ class TrialTables:
         Parameters
         ----------
         path
-            Of the findings; ``diagnosis/findings.json`` by default. The verdict is in ``attrs``.
+            Of the findings; by default those that the tables were opened with.
 
         Returns
         -------
         DataFrame
             One row per effect and parameter: ``rank`` from 1 on, ``effect``, ``parameter``,
             ``value``, ``low``, ``high``, ``gain_nats_per_step``, ``p`` and ``ties`` (names, with
-            commas).
+            commas). ``attrs`` has the ``verdict`` and, once the model was extended, the rows of
+            its ``gap``.
 
         Raises
         ------
@@ -265,14 +275,14 @@ class TrialTables:
         DamagedError
             They are no JSON.
         """
-        place = self.root / "diagnosis" / "findings.json" if path is None else Path(path)
+        place = self._findings if path is None else Path(path)
         if not place.is_file():
             raise _nothing(place, f"First: zfcal diagnose {self.root}")
         found = read_json(place)
         check(found, "findings", place)
         rows = [row for rank, each in enumerate(found["effects"], 1) for row in _found(rank, each)]
         table = pd.DataFrame(rows, columns=list(_FINDINGS))
-        table.attrs["verdict"] = found["verdict"]
+        table.attrs = {"verdict": found["verdict"], "gap": found.get("gap") or []}
         return table
 
     def _numbered(self, folder: str, ending: str) -> list[Path]:

@@ -1,19 +1,28 @@
 """Files that are whole or absent, whatever happens while they are written."""
 
+import errno
 import os
 import resource
 import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import numpy as np
 import pytest
 
-from zfcal.artifacts.atomic import append_bytes, is_orphan, is_part, write_text_whole, write_whole
+from zfcal.artifacts.atomic import (
+    append_bytes,
+    is_orphan,
+    is_part,
+    storage_error,
+    write_text_whole,
+    write_whole,
+)
 from zfcal.artifacts.reading.contents import sha256_of
-from zfcal.errors import InputError, StorageError, ZfcalError
+from zfcal.errors import InputError, StorageError, TakenError, ZfcalError
 
 
 def names_in(folder):
@@ -176,6 +185,41 @@ def test_the_part_of_a_living_process_is_left_alone(tmp_path):
     write_whole(tmp_path / "file", write)
 
     assert (tmp_path / "file").read_text() == "outer"
+
+
+def test_on_windows_processes_are_listed_not_signalled(tmp_path, monkeypatch):
+    """There signal 0 ends a process. A thread tells one way from the other: it is not listed."""
+    pytest.importorskip("psutil")  # it asks which system this is
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    living = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    leave = threading.Event()
+    thread = threading.Thread(target=leave.wait)
+    thread.start()
+    names = []
+    write_whole(tmp_path / "file", lambda part: names.append(part.name) or part.touch())
+    numbers = (ended.pid, living.pid, thread.native_id)
+    parts = [tmp_path / names[0].replace(f"-{os.getpid()}-", f"-{n}-") for n in numbers]
+
+    here = [is_orphan(part) for part in parts]
+    with monkeypatch.context() as windows:
+        windows.setattr(os, "name", "nt")
+        there = [is_orphan(part) for part in parts]
+
+    leave.set()
+    living.communicate(b"\n")
+    assert here == [True, False, False]
+    assert there == [True, False, True]
+
+
+@pytest.mark.parametrize("number", [errno.EISDIR, errno.EPERM, errno.EACCES])
+def test_a_place_that_a_folder_has_taken_is_told_whatever_the_system_calls_it(tmp_path, number):
+    """Linux says EISDIR where a folder is to be removed, macOS EPERM, Windows EACCES."""
+    error = OSError(number, os.strerror(number))
+    assert isinstance(storage_error(tmp_path, error), TakenError)
+    assert isinstance(storage_error(tmp_path / "file", error), TakenError) == (
+        number == errno.EISDIR
+    )
 
 
 def limit_file_size():

@@ -1,9 +1,11 @@
 """Two commands of one name never work on one trial at a time."""
 
+import os
 import signal
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -88,5 +90,88 @@ def test_the_lock_file_says_nothing(tmp_path):
 
 def test_a_place_that_cannot_be_locked_is_an_error(tmp_path):
     """Such as a trial that is not there."""
-    with pytest.raises(StorageError, match="cannot be written"), lock(tmp_path / "x", "analyse"):
+    with pytest.raises(StorageError, match="No such file"), lock(tmp_path / "x", "analyse"):
         pytest.fail("there is no such folder")
+    # One that was moved away just now does not come into being again where it was.
+    assert not (tmp_path / "x").exists()
+
+
+def test_the_lock_file_stays_when_it_is_free(tmp_path):
+    """Two processes never hold locks on two files of one name."""
+    with lock(tmp_path, "analyse"):
+        before = (tmp_path / ".lock-analyse").stat().st_ino
+    with lock(tmp_path, "analyse"):
+        pass
+    assert (tmp_path / ".lock-analyse").stat().st_ino == before
+
+
+def test_a_lock_file_with_content_and_one_that_is_a_pipe_lock_as_well(tmp_path):
+    """What stands there is neither emptied nor waited for."""
+    (tmp_path / ".lock-analyse").write_bytes(b"from elsewhere")
+    os.mkfifo(tmp_path / ".lock-track")
+    for command in ("analyse", "track"):
+        with (
+            lock(tmp_path, command),
+            pytest.raises(LockedError),
+            lock(tmp_path, command),
+        ):
+            pytest.fail("the lock was held")
+    assert (tmp_path / ".lock-analyse").read_bytes() == b"from elsewhere"
+
+
+def test_a_link_in_place_of_the_lock_file_is_refused(tmp_path):
+    """The file would come into being wherever it leads."""
+    (tmp_path / ".lock-analyse").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StorageError), lock(tmp_path, "analyse"):
+        pytest.fail("a link was followed")
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_another_thread_may_free_a_lock_and_none_may_take_it_before(tmp_path):
+    """A lock is the trial's, whichever thread asks."""
+    held = lock(tmp_path, "analyse")
+    held.__enter__()
+
+    def again():
+        with lock(tmp_path, "analyse"):
+            pass
+
+    with ThreadPoolExecutor(1) as other:
+        with pytest.raises(LockedError):
+            other.submit(again).result()
+        other.submit(held.__exit__, None, None, None).result()
+    again()
+
+
+FORKING = """
+    import os, sys, time
+    from pathlib import Path
+    from zfcal.artifacts.lock import lock
+
+    with lock(Path(sys.argv[1]), "analyse"):
+        child = os.fork()
+        if child:
+            print(child, flush=True)
+        time.sleep(60)
+"""
+
+
+def test_a_fork_does_not_hold_the_lock_of_the_one_that_was_killed(tmp_path):
+    """The lock is that of the process that took it, and dies with it."""
+    command = [sys.executable, "-c", textwrap.dedent(FORKING), str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    child = int(process.stdout.readline())
+    try:
+        with pytest.raises(LockedError), lock(tmp_path, "analyse"):
+            pytest.fail("the lock was held")
+        process.kill()
+        process.wait()
+
+        os.kill(child, 0)
+        with lock(tmp_path, "analyse"):
+            pass
+    finally:
+        process.kill()
+        process.wait()
+        os.kill(child, signal.SIGKILL)
+        process.stdout.close()

@@ -1,5 +1,6 @@
 """The group: help, completion, and how errors and signals end."""
 
+import io
 import os
 import re
 import signal
@@ -314,3 +315,17 @@ def test_libraries_have_one_thread_beside_those_of_a_command(asked, expected):
         check=True,
     )  # fmt: skip
     assert done.stdout.strip() == expected
+
+
+def test_on_windows_the_standard_streams_are_utf_8(monkeypatch):
+    """The page of a western Windows has no minus sign and no Greek."""
+    printed = io.BytesIO()
+    with monkeypatch.context() as windows:
+        windows.setattr(os, "name", "nt")
+        stream = io.TextIOWrapper(printed, encoding="cp1252")
+        windows.setattr(sys, "stdout", stream)
+        main_module._open_streams()
+        stream.write("\u22121 \u03bc")
+        stream.flush()
+
+    assert printed.getvalue() == "\u22121 \u03bc".encode()

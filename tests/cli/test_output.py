@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from zfcal.errors import InputError, LockedError
+from zfcal.errors import InputError, LockedError, OptionError
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, Result, UpToDate
 from zfcal_cli.output import Output
 
@@ -87,6 +87,16 @@ def test_of_several_errors_the_worst_counts(speak):
     assert speak(damage, locked)[2] == 75
     assert speak(locked, damage)[2] == 75
     assert speak(damage, wrong, locked)[2] == 1
+
+
+def test_options_that_cannot_be_end_the_command():
+    """They are wrong for every trial: the next one is not tried."""
+
+    def work():
+        raise OptionError("--window is none.")
+
+    with pytest.raises(OptionError, match="--window"):
+        Output("test", as_json=False, verbose=0, quiet=False).attempt(work)
 
 
 def test_the_same_error_is_said_once(speak):

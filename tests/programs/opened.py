@@ -1,6 +1,6 @@
 """Open a file with the program that it is for, and say what the program sees.
 
-Run by the interpreter of `.venv-programs`, in which zfcal is not installed:
+Run by the interpreter of `.venv-programs`:
 ``opened.py PROGRAM FILE RATE OUT``. ``OUT`` gets an array ``xy`` of shape (frame, agent, 2), NaN
 where nobody was seen, and ``names`` of the agents, by each loader.
 """

@@ -4,24 +4,20 @@ They are in an environment of their own: ``make test-programs`` builds it, from
 ``requirements-programs.lock``. Without it these tests are skipped.
 """
 
-import os
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from zfcal.artifacts.lineage import read_lineage
-from zfcal.artifacts.tables import read_tracks, write_tracks
+from zfcal.artifacts.tables import read_tracks
 from zfcal.stages.events import say_nothing
 from zfcal.stages.export.export import export
 from zfcal.stages.export.options import ExportOptions
 
 FPS = 5.0
 HERE = Path(__file__).resolve()
-PYTHON = HERE.parents[2] / ".venv-programs" / "bin" / "python"
 OPENER = HERE.parent / "opened.py"
-BUILD = "the programs are not installed: make test-programs"
 
 CASES = {
     "movement": ("movement", "tracks.nc"),
@@ -36,28 +32,6 @@ CASES = {
 
 ORIGIN_PX = (0.0, 1000.0)
 """Where (0, 0) m lies in an image of a square metre at 1 mm a pixel."""
-
-
-@pytest.fixture(scope="module")
-def python():
-    """Return the interpreter of the programs."""
-    if not PYTHON.exists():
-        if os.environ.get("ZFCAL_PROGRAMS"):
-            pytest.fail(BUILD)
-        pytest.skip(BUILD)
-    return PYTHON
-
-
-@pytest.fixture
-def trial(make_trial):
-    """Return 70 s of 3 fish and a robot; fish 1 is lost from 10 to 12 s, fish 2 until 20 s."""
-    root = make_trial(seconds=70, n_robots=1)
-    path = root / "tracks" / "000000.parquet"
-    tracks = read_tracks(path)
-    time_s, agent = tracks.time_s, tracks.agent
-    lost = (agent == 1) & (time_s >= 10) & (time_s < 12) | (agent == 2) & (time_s < 20)
-    write_tracks(path, tracks.take(~lost), read_lineage(path))
-    return root
 
 
 def expected(root):

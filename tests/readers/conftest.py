@@ -188,6 +188,66 @@ def _movement(path):
     data.to_netcdf(path, engine="h5netcdf")
 
 
+def nwb_series(group, xy_px, part="body", *, confidence=0.9, rate_hz=None, time_s=None):
+    """Write a body part of an animal as ndx-pose does, with a rate from 0 on or with times."""
+    node = group.create_group(part)
+    node.attrs["neurodata_type"] = "PoseEstimationSeries"
+    node["data"] = xy_px
+    node["data"].attrs["unit"] = "pixels"
+    node["confidence"] = np.full(len(xy_px), confidence)
+    if rate_hz is not None:
+        node["starting_time"] = 0.0 if time_s is None else time_s
+        node["starting_time"].attrs["rate"] = rate_hz
+    elif time_s is not None:
+        node["timestamps"] = time_s
+
+
+def nwb_animal(file, name, module="SLEAP_VIDEO_000_tank", video="tank.mp4"):
+    """Make the group of an animal."""
+    group = file.create_group(f"processing/{module}/track={name}")
+    group.attrs["neurodata_type"] = "PoseEstimation"
+    group["original_videos"] = [video.encode()]
+    return group
+
+
+def _nwb(path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file["file_create_date"] = [b"2026-01-01T00:00:00+00:00"]
+        nwb_series(nwb_animal(file, "0"), XY_PX[:, 0], rate_hz=15.0)
+        seen = ~np.isnan(XY_PX[:, 1, 0])
+        times = {"time_s": np.arange(4)[seen] / FPS}
+        nwb_series(nwb_animal(file, "1"), XY_PX[seen, 1], **times)
+
+
+@pytest.fixture
+def nwb():
+    """Return what writes animals and their body parts into an open NWB file."""
+    return nwb_animal, nwb_series
+
+
+def _robofish(path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file.attrs["format_version"] = np.array([1, 0], dtype=np.int32)
+        file.attrs["world_size_cm"] = np.array([100.0, 100.0], dtype=np.float32)
+        file.create_group("samplings/15 hz").attrs["frequency_hz"] = np.float32(15)
+        file["samplings"].attrs["default"] = "15 hz"
+        for name, xy_px in zip("01", XY_PX.transpose(1, 0, 2), strict=True):
+            entity = file.create_group(f"entities/{name}")
+            entity.attrs["category"] = "organism"
+            entity.create_dataset("positions", data=(xy_px / 10).astype(np.float32))
+            entity.create_dataset("orientations", data=np.full((4, 2), [0, 1], dtype=np.float32))
+
+
+def _fishmodel(path):
+    lines = []
+    for k, frame in enumerate(XY_PX / 1000):
+        cells = [f"{x} {y} 0.5" if np.isfinite(x) else "nan nan nan" for x, y in frame]
+        lines.append("\t".join([f"{k / 15:.6f}", *cells]))
+    path.write_text("\n".join(lines) + "\n")
+
+
 WRITERS = {
     "csv": ("tracks.csv", _csv),
     "cats": ("positions-1.txt", _cats),
@@ -198,7 +258,13 @@ WRITERS = {
     "sleap": ("tank.analysis.h5", _sleap),
     "deeplabcut": ("tankDLC.csv", _deeplabcut),
     "movement": ("tank.nc", _movement),
+    "nwb": ("tank.nwb", _nwb),
+    "robofish": ("tank.hdf5", _robofish),
+    "fishmodel": ("printed.txt", _fishmodel),
 }
+
+METRIC = {"csv", "cats", "trex", "robofish", "fishmodel"}
+"""Samples that are in metres or centimetres, and take no scale."""
 
 
 @pytest.fixture
@@ -209,7 +275,7 @@ def sample(tmp_path):
         file, write_file = WRITERS[name]
         path = tmp_path / file
         write_file(path)
-        return path, ({} if name in {"csv", "cats", "trex"} else {"m_per_px": PX})
+        return path, ({} if name in METRIC else {"m_per_px": PX})
 
     return writer
 

@@ -10,7 +10,13 @@ from zfcal.readers import FORMATS, ImportOptions, guess_format, read_foreign
 
 NAMES = tuple(FORMATS)
 
-HDF5 = {"idtracker", "sleap", "movement"}
+METRIC = {"csv", "cats", "trex", "robofish", "fishmodel"}
+"""Formats in metres or centimetres."""
+
+RATELESS = {"mot", "sleap", "deeplabcut", "fishmodel"}
+"""Formats without times and without a rate."""
+
+HDF5 = {"idtracker", "sleap", "movement", "nwb", "robofish"}
 """Samples that are HDF5: bytes flipped in there can crash the HDF5 library itself."""
 
 
@@ -26,6 +32,9 @@ def test_the_contract_names_these_formats():
         "sleap",
         "deeplabcut",
         "movement",
+        "nwb",
+        "robofish",
+        "fishmodel",
     )
 
 
@@ -64,7 +73,7 @@ def test_every_format_has_the_columns_and_types_of_tracks(name, sample):
 def test_every_format_turns_y_up_about_the_origin(name, sample, read):
     """The point given as the origin becomes (0, 0): x - 0.1, 0.5 - y."""
     path, options = sample(name)
-    per_metre = {"csv": 1, "cats": 1, "trex": 100}.get(name, 1000)
+    per_metre = {"trex": 100, "robofish": 100}.get(name, 1 if name in METRIC else 1000)
     origin = (0.1 * per_metre, 0.5 * per_metre)
 
     tracks = read(path, name, **options, flip_y=True, origin=origin).tracks
@@ -73,7 +82,7 @@ def test_every_format_turns_y_up_about_the_origin(name, sample, read):
     assert tracks.y_m == pytest.approx([0.30, 0.10, 0.30, 0.11, 0.30, 0.30, 0.13], abs=1e-12)
 
 
-@pytest.mark.parametrize("name", sorted(set(NAMES) - {"csv", "cats", "trex"}))
+@pytest.mark.parametrize("name", sorted(set(NAMES) - METRIC))
 def test_nothing_in_pixels_is_called_metres_without_a_scale(name, sample, refused):
     """The hint names the option that gives the scale."""
     path, _ = sample(name)
@@ -84,7 +93,7 @@ def test_nothing_in_pixels_is_called_metres_without_a_scale(name, sample, refuse
     assert "--mm-per-px" in message
 
 
-@pytest.mark.parametrize("name", ["csv", "cats", "trex"])
+@pytest.mark.parametrize("name", sorted(METRIC))
 def test_a_scale_for_metres_or_centimetres_cannot_take_effect(name, sample, refused):
     """An option that is without effect is an error, never passed over."""
     path, _ = sample(name)
@@ -92,7 +101,7 @@ def test_a_scale_for_metres_or_centimetres_cannot_take_effect(name, sample, refu
     assert "cannot take effect" in refused(path, name, m_per_px=0.001)
 
 
-@pytest.mark.parametrize("name", sorted(set(NAMES) - {"mot", "sleap", "deeplabcut"}))
+@pytest.mark.parametrize("name", sorted(set(NAMES) - RATELESS))
 def test_another_frame_rate_is_refused_with_both_rates(name, sample, refused):
     """Formats with times or a stated rate are compared with --fps."""
     path, options = sample(name)
@@ -143,8 +152,13 @@ def test_a_file_looks_like_its_own_format(name, sample):
         ("a.csv", "frame,time,X#wcentroid (cm),Y#wcentroid (cm)\n", "trex"),
         ("a.csv.gz", "scorer,net\n", "deeplabcut"),
         ("a.txt", "X1\tY1\tProbId1\t\n", "idtracker"),
+        ("aa", "0.000000\t0.1 0.2 -3e-05\t1 0.5 6.28\n", "fishmodel"),
+        ("aa", "0.000000\t0.1 0.2 1.5\t1 0.5\n", None),
+        ("aa", "0.000000\t0.1\t0.2\t1.5\n", None),
+        ("aa", "0.000000 0.1 0.2 1.5\n", None),
         ("a.txt", "something else\n", None),
         ("a.h5", "no HDF5", None),
+        ("a.slp", "", "sleap"),
         ("a.csv", "", None),
     ],
 )
@@ -176,6 +190,8 @@ def test_a_wrong_format_is_told_which_one_it_looks_like(sample, refused):
         ("mot", {"keypoint": "head"}),
         ("csv", {"box": "centre"}),
         ("cats", {"first_frame": 1}),
+        ("robofish", {"keypoint": "head"}),
+        ("fishmodel", {"first_frame": 1}),
         ("sleap", {"columns": (("agent", "id"),)}),
         ("trex", {"body_axis": ("tail", "head")}),
     ],
@@ -200,7 +216,14 @@ def test_a_folder_is_read_by_trex_only(tmp_path, refused):
 
 
 @pytest.mark.parametrize(
-    ("name", "package"), [("sleap", "h5py"), ("idtracker", "h5py"), ("movement", "h5py")]
+    ("name", "package"),
+    [
+        ("sleap", "h5py"),
+        ("idtracker", "h5py"),
+        ("movement", "h5py"),
+        ("nwb", "h5py"),
+        ("robofish", "h5py"),
+    ],
 )
 def test_a_missing_optional_package_is_named_with_its_extra(
     name, package, sample, refused, monkeypatch

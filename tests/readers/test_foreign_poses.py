@@ -1,5 +1,7 @@
 """SLEAP, DeepLabCut and movement: body parts, axes and layouts."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -330,3 +332,13 @@ def test_headings_of_movement_over_other_axes_are_refused(tmp_path, refused):
     with h5py.File(path, "r+") as file:
         file["heading_rad"] = np.zeros(3)
     assert "expected heading_rad" in refused(path, "movement", m_per_px=PX)
+
+
+def test_labels_of_sleap_without_sleap_io_say_what_to_install(write, refused, monkeypatch):
+    """The one line names the package and the extra that brings it."""
+    monkeypatch.setitem(sys.modules, "sleap_io", None)
+
+    message = refused(write("tank.slp", "labels"), "sleap", m_per_px=PX)
+
+    assert "tank.slp: reading this format needs the package 'sleap-io'" in message
+    assert "pip install 'zfcal[sleap]'" in message

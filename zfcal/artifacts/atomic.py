@@ -36,6 +36,9 @@ _HINTS = {
     errno.ELOOP: "A symbolic link stands where the file is to go: move it away.",
     errno.EISDIR: "A folder stands where the file is to go: move it away.",
 }
+_FOLDER_SAYS = {errno.EPERM, errno.EACCES}
+"""What macOS and Windows say where a folder is to be removed, or replaced, as if it were a file."""
+
 # What a directory that cannot be flushed says: some network file systems have no such call.
 _NO_FLUSH = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
 
@@ -172,7 +175,8 @@ def storage_error(path: Path, error: OSError, *, what: str = "written") -> Stora
     what
         What cannot be done with it.
     """
-    kind = TakenError if error.errno == errno.EISDIR else StorageError
+    is_taken = error.errno == errno.EISDIR or (error.errno in _FOLDER_SAYS and path.is_dir())
+    kind = TakenError if is_taken else StorageError
     return kind(
         f"{path}: cannot be {what} ({error.strerror or error}). What was there is kept.",
         hint=(
@@ -217,6 +221,12 @@ def _remove_orphans(path: Path) -> None:
 
 def _is_alive(process: int) -> bool:
     try:
+        if os.name == "nt":
+            # There the signal that asks ends the process. Elsewhere it sees those of other people
+            # as well, which a system may hide from whoever lists them.
+            import psutil
+
+            return psutil.pid_exists(process)
         os.kill(process, 0)
     except ProcessLookupError:
         return False
@@ -226,7 +236,8 @@ def _is_alive(process: int) -> bool:
 
 
 def _flush(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+    # Windows flushes only what may be written, and knows no such thing of a folder (EACCES).
+    descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import fcntl
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from filelock import BaseFileLock, FileLock, Timeout
 
 from zfcal.artifacts.atomic import storage_error
 from zfcal.errors import LockedError
@@ -31,24 +33,29 @@ def lock(root: Path, command: str) -> Iterator[None]:
         The lock file cannot be made.
     """
     path = root / f".lock-{command}"
+    # The file stays: removing it would let two processes hold locks on two files of one name. And
+    # where the file system has no locks that end with their process, there is none at all.
+    held = FileLock(
+        path,
+        blocking=False,
+        thread_local=False,
+        preserve_lock_file=True,
+        fallback_to_soft=False,
+    )
+    _take(held, path, command)
     try:
-        # A link is not followed: the file would come into being wherever it leads.
-        how = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-        descriptor = os.open(path, how, 0o666)
-    except OSError as error:
-        raise storage_error(path, error) from error
-    try:
-        _take(descriptor, path, command)
         yield
     finally:
-        # The file stays: removing it would let two processes hold locks on two files of one name.
-        os.close(descriptor)
+        held.release()
 
 
-def _take(descriptor: int, path: Path, command: str) -> None:
+def _take(held: BaseFileLock, path: Path, command: str) -> None:
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+        if not path.parent.is_dir():
+            # The library would make the folder: a trial that was moved away must not come back.
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        held.acquire()
+    except Timeout as error:
         raise LockedError(
             f"{path.parent}: another zfcal {command} is at work on this trial.",
             hint="Wait until it is done; the lock frees itself when that process ends.",

@@ -169,7 +169,8 @@ def _serve(pipe: Connection, job: Job, niceness: int) -> None:
     # Ctrl-C goes to all processes of the terminal; whoever gives the orders ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    os.nice(niceness)
+    if hasattr(os, "nice"):
+        os.nice(niceness)
     _hand_on_logs(pipe.send)
     with contextlib.suppress(EOFError, OSError, _TerminatedError):
         while True:
@@ -192,7 +193,7 @@ def _die_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None  # noqa: S101 - for the type checker
     connection.wait([parent.sentinel])
-    os.kill(os.getpid(), signal.SIGKILL)
+    os._exit(1)
 
 
 def _hand_on_logs(tell: Tell) -> None:

@@ -28,6 +28,10 @@ _MIRRORED = (
 
 METRES_PER = {"m": 1.0, "cm": M_PER_CM, "mm": M_PER_MM}
 
+UNITS = {"px": "px", "pixel": "px", "pixels": "px"} | {unit: unit for unit in METRES_PER}
+UNITS |= {"metre": "m", "metres": "m", "meter": "m", "meters": "m"}
+"""Units by the names that files have for them."""
+
 _INT32 = np.iinfo(np.int32)
 
 

@@ -22,10 +22,10 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from zfcal.arrays import Floats, Ints
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
-from zfcal.readers.clock import check_rate
+from zfcal.readers.clock import check_rate, frames_of
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.raw import Grid, Rows
 from zfcal.readers.text import Layout, TextTable, cell_error, header_of, numbers
@@ -65,7 +65,7 @@ def _text_rows(path: Path, options: ImportOptions) -> Rows:
         notes.append(f"{int(invalid.sum())} positions at exactly (0, 0) are taken as missing.")
     grid = Grid(
         xy=xyd[..., :2],
-        frame=_frames(time_s, options.fps),
+        frame=frames_of(time_s, options.fps),
         time_s=time_s - start_s,
         unit="m",
         heading_rad=np.where(xyd[..., 2] == 0, np.nan, xyd[..., 2]),
@@ -105,16 +105,6 @@ def _times(table: TextTable) -> Floats:
         expected, got = "a later time in each row", f"{time_s[row]:.10g}{before}"
         raise cell_error(table, "timeStep", row, expected=expected, got=got)
     return time_s
-
-
-def _frames(time_s: Floats, fps: float) -> Ints:
-    """Return frame numbers: whole frames since the row before, at least one.
-
-    A wall clock wavers: rounding each time by itself would put two rows into one
-    frame whenever the times drift past the middle of a frame.
-    """
-    steps = np.maximum(np.rint(np.diff(time_s) * fps), 1).astype(np.int64)
-    return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(steps)])
 
 
 def _xml_rows(path: Path, options: ImportOptions) -> Rows:

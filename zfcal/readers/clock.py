@@ -1,4 +1,4 @@
-"""Does the file run at the frame rate that it should? No frame is moved here."""
+"""Does the file run at the frame rate that it should? And the frames of its times."""
 
 from __future__ import annotations
 
@@ -70,6 +70,28 @@ def _compare(path: Path, rate_hz: float, fps: float, *, n_steps: int) -> None:
             f"{path}: the times advance at {rate_hz:.4g} Hz, expected fps = {fps:.6g} Hz.",
             hint=f"Give --fps {rate_hz:.4g}, the same as in trial.toml, if the file is right.",
         )
+
+
+def frames_of(time_s: Floats, fps: float) -> Ints:
+    """Return frame numbers: whole frames since the row before, at least one.
+
+    A wall clock wavers: rounding each time by itself would put two rows into one
+    frame whenever the times drift past the middle of a frame.
+
+    Parameters
+    ----------
+    time_s : ndarray of float64, shape (row,)
+        Strictly ascending.
+    fps
+        In hertz.
+
+    Returns
+    -------
+    ndarray of int64, shape (row,)
+        From 0.
+    """
+    steps = np.maximum(np.rint(np.diff(time_s) * fps), 1).astype(np.int64)
+    return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(steps)])
 
 
 def check_declared(path: Path, declared_hz: float, fps: float) -> tuple[str, ...]:

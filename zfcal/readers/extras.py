@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from zfcal.errors import InputError
 
 
-def _require(module: str, path: Path) -> Any:
+def require(module: str, path: Path, *, extra: str = "formats") -> Any:
     """Return an optional module, or say what to install.
 
     Parameters
@@ -28,13 +28,21 @@ def _require(module: str, path: Path) -> Any:
         Such as ``h5py``.
     path
         The file that needs it, named in the message.
+    extra
+        Of zfcal, which brings it.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
     """
     try:
         return importlib.import_module(module)
     except ImportError as error:
+        package = module.replace("_", "-")
         raise InputError(
-            f"{path}: reading this format needs the package {module!r}, which is not installed.",
-            hint="Install it with: pip install 'zfcal[formats]'",
+            f"{path}: reading this format needs the package {package!r}, which is not installed.",
+            hint=f"Install it with: pip install 'zfcal[{extra}]'",
         ) from error
 
 
@@ -85,7 +93,7 @@ def whole(path: Path, kind: str) -> Iterator[None]:
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
     """Open an HDF5 file for reading; whatever is damaged in it is an `InputError`."""
-    h5py = _require("h5py", path)
+    h5py = require("h5py", path)
     with whole(path, "HDF5"), h5py.File(path, "r") as file:
         yield file
 

@@ -13,11 +13,14 @@ from zfcal.readers.assemble import Imported
 from zfcal.readers.cats import read_cats
 from zfcal.readers.csv import read_csv
 from zfcal.readers.deeplabcut import read_deeplabcut
+from zfcal.readers.fishmodel import read_fishmodel
 from zfcal.readers.guess import guess_format
 from zfcal.readers.idtracker import read_idtracker
 from zfcal.readers.mot import read_mot
 from zfcal.readers.movement import read_movement
+from zfcal.readers.nwb import read_nwb
 from zfcal.readers.options import ImportOptions, given
+from zfcal.readers.robofish import read_robofish
 from zfcal.readers.sleap import read_sleap
 from zfcal.readers.text import check_unpacked
 from zfcal.readers.trajectorytools import read_trajectorytools
@@ -61,6 +64,9 @@ _ALL = (
     Format(name="sleap", reader=read_sleap, options=_POSES),
     Format(name="deeplabcut", reader=read_deeplabcut, options=_POSES),
     Format(name="movement", reader=read_movement, options=_POSES),
+    Format(name="nwb", reader=read_nwb, options=_POSES),
+    Format(name="robofish", reader=read_robofish),
+    Format(name="fishmodel", reader=read_fishmodel),
 )
 
 _SHARED = {"idtracker", "trajectorytools"}

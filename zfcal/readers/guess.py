@@ -7,9 +7,11 @@ from pathlib import Path
 
 from zfcal.errors import InputError
 from zfcal.readers.extras import open_hdf5
+from zfcal.readers.fishmodel import LINE
 from zfcal.readers.text import first_lines
 
 _ENDINGS = {".npz": "trex", ".npy": "trajectorytools", ".xml": "cats", ".nc": "movement"}
+_ENDINGS |= {".slp": "sleap", ".nwb": "nwb"}
 
 _HEADERS = (
     (re.compile(r"timeStep\t"), "cats"),
@@ -19,9 +21,16 @@ _HEADERS = (
     (re.compile(r"(.*,)?[XY](#\w+)?( \((cm|px)\))?(,|$)"), "trex"),
     (re.compile(r"(.*,)?(x_m|x_px)(,|$)"), "csv"),
     (re.compile(r"frame,id,|(\s*-?[\d.]+\s*,){5,}"), "mot"),
+    (re.compile(rf"(?:{LINE.pattern})$"), "fishmodel"),
 )
 
-_KEYS = (("df_with_missing", "deeplabcut"), ("trajectories", "idtracker"), ("tracks", "sleap"))
+_KEYS = (
+    ("df_with_missing", "deeplabcut"),
+    ("trajectories", "idtracker"),
+    ("tracks", "sleap"),
+    ("entities", "robofish"),
+    ("file_create_date", "nwb"),
+)
 
 
 def guess_format(path: Path) -> str | None:

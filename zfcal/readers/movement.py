@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
-from zfcal.readers.assemble import METRES_PER, Imported, assemble
+from zfcal.readers.assemble import UNITS, Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
@@ -33,8 +33,6 @@ from zfcal.readers.poses import Poses, choose
 _LEGACY = {"keypoints": "keypoint", "individuals": "individual"}
 """Names of dimensions before version 0.17, and since."""
 
-_UNITS = {"px": "px", "pixel": "px", "pixels": "px"} | {unit: unit for unit in METRES_PER}
-_UNITS |= {"metre": "m", "metres": "m", "meter": "m", "meters": "m"}
 _ORDER = ("time", "individual", "keypoint", "space")
 
 
@@ -208,8 +206,8 @@ def _number(path: Path, text: str) -> float:
 
 def _unit(path: Path, position: _Variable) -> str:
     stated = position.attributes.get("space_unit", position.attributes.get("units", "px"))
-    if stated not in _UNITS:
+    if stated not in UNITS:
         raise InputError(
-            f"{path}: positions are in {stated!r}, expected one of {', '.join(_UNITS)}."
+            f"{path}: positions are in {stated!r}, expected one of {', '.join(UNITS)}."
         )
-    return _UNITS[stated]
+    return UNITS[stated]

@@ -1,4 +1,6 @@
-"""Tracks of SLEAP: its analysis HDF5 file.
+"""Tracks of SLEAP: its analysis HDF5 file, and its labels.
+
+Labels, ``.slp``, are read by sleap-io: see `zfcal.readers.slp`.
 
 SLEAP (``sleap/info/write_tracking_h5.py``) writes its arrays transposed, for
 MATLAB: ``tracks`` is (track, xy, node, frame) and ``point_scores`` (track, node,
@@ -23,6 +25,7 @@ from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
+from zfcal.readers.slp import labelled
 
 _MATLAB = ("track", "xy", "node", "frame")
 
@@ -30,15 +33,20 @@ _OURS = ("frame", "track", "node", "xy")
 
 
 def read_sleap(path: Path, options: ImportOptions) -> Imported:
-    """Read a SLEAP analysis file, in pixels.
+    """Read a SLEAP analysis file or labels, in pixels.
 
     Parameters
     ----------
     path
-        ``.analysis.h5``; not ``.slp``.
+        ``.analysis.h5``, or ``.slp``.
     options
         Needs ``m_per_px``, and ``keypoint`` when there are several nodes.
     """
+    poses = labelled(path, options) if path.suffix == ".slp" else _analysed(path, options)
+    return assemble(path, choose(path, poses, options).rows(), options)
+
+
+def _analysed(path: Path, options: ImportOptions) -> Poses:
     with open_hdf5(path) as file:
         order = _order(path, file)
         position = _arranged(path, dataset(file, "tracks", path), order)
@@ -56,7 +64,7 @@ def read_sleap(path: Path, options: ImportOptions) -> Imported:
             f"{n_nodes} nodes, {n_frames} frames."
         )
     frame = np.arange(n_frames)
-    poses = Poses(
+    return Poses(
         position=position,
         score=score if score is None or score.shape == position.shape[:3] else None,
         frame=frame,
@@ -64,7 +72,6 @@ def read_sleap(path: Path, options: ImportOptions) -> Imported:
         agents=agents,
         keypoints=keypoints,
     )
-    return assemble(path, choose(path, poses, options).rows(), options)
 
 
 def _order(path: Path, file: Any) -> tuple[str, ...]:

@@ -61,6 +61,25 @@ def first_lines(path: Path, count: int) -> list[str]:
     return lines
 
 
+def all_lines(path: Path) -> list[tuple[int, str]]:
+    """Return the lines of a text file that are not empty, without their ends, by number from 1.
+
+    Raises
+    ------
+    InputError
+        As of `first_lines`.
+    """
+    first_lines(path, 1)
+    try:
+        with _open(path) as file:
+            lines = [(k, line.rstrip("\r\n")) for k, line in enumerate(file, start=1)]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: expected a text file in UTF-8, got other bytes.") from error
+    except _BROKEN as error:
+        raise InputError(f"{path}: cannot be read ({error}).") from error
+    return [(k, line) for k, line in lines if line.strip()]
+
+
 def check_unpacked(path: Path) -> None:
     """Refuse a compressed text that unpacks to more than a table may have.
 

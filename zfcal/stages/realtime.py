@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import gc
 import os
+import sys
 import threading
 from collections.abc import Iterator
 
@@ -25,6 +27,9 @@ def ahead_of_others(niceness: int) -> Iterator[OSError | None]:
     OSError or None
         Why it is not allowed; then everything goes on as it was.
     """
+    if sys.platform == "win32":
+        yield OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+        return
     with contextlib.ExitStack() as stack:
         problem = None
         try:
@@ -40,6 +45,8 @@ def ahead_of_others(niceness: int) -> Iterator[OSError | None]:
 
 def _lower(thread: int, niceness: int) -> None:
     """Take back the priority of a thread, if it is still there."""
+    if sys.platform == "win32":
+        return
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, thread, niceness)
 

@@ -51,8 +51,9 @@ def _fill(file: Any, source: Source) -> None:
     file["node_names"] = np.array([BODY.encode()])
     file["edge_names"] = np.empty((0, 2), dtype="S1")
     file["edge_inds"] = np.empty((0, 2), dtype=np.int64)
-    for name in ("labels_path", "video_path"):
-        file[name] = ""
+    file["labels_path"] = ""
+    # Nobody knows its name here, but sleap-io saves no labels (.slp) of a video that has none.
+    file["video_path"] = "tracks.mp4"
     file["video_ind"] = 0
     file["provenance"] = json.dumps({"source": "zfcal", "fps": found.fps})
     file.attrs["preset"] = "matlab"

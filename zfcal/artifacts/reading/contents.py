@@ -34,6 +34,10 @@ Looks: TypeAlias = tuple[int, ...]
 _HASHES: dict[Looks, tuple[Looks, str]] = {}
 """For each inode what its file looked like when it was hashed, and the hash."""
 
+_NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
+"""How a link is refused and a pipe keeps nobody waiting; Windows has neither flags nor need."""
+
 _TICK_NS = 50_000_000
 """Files are stamped by a clock that ticks every few milliseconds. Two contents that are written
 within a tick look the same: a hash is kept only of a file that has been left alone longer."""
@@ -233,7 +237,7 @@ def open_to_write(path: Path, *, append: bool = False) -> io.BufferedWriter:
         The place cannot be written, is no regular file, or lies outside the trial.
     """
     how = os.O_APPEND if append else os.O_TRUNC
-    descriptor = _descriptor(path, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | how)
+    descriptor = _descriptor(path, os.O_WRONLY | os.O_CREAT | _NO_FOLLOW | how)
     return os.fdopen(descriptor, "ab" if append else "wb")
 
 
@@ -241,14 +245,15 @@ def _descriptor(path: Path, flags: int) -> int:
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "a name cannot hold a zero byte", str(path))
     check_inside(path)
-    descriptor = os.open(path, flags | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY, 0o666)
+    descriptor = os.open(path, flags | _NO_WAIT, 0o666)
     kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
     if kind != stat.S_IFREG:
         os.close(descriptor)
         number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
         text = f"expected a regular file, got {KINDS.get(kind, 'something else')}"
         raise OSError(number, text, str(path))
-    os.set_blocking(descriptor, True)
+    if _NO_WAIT and hasattr(os, "set_blocking"):
+        os.set_blocking(descriptor, True)
     return descriptor
 
 
@@ -393,7 +398,8 @@ def _digest_of(path: Path | str) -> str:
         return known[1]
     asked_ns = time.time_ns()
     digest = sha256_of(Path(path))
-    if looks == looks_of(path) and abs(asked_ns - looks[3]) > _TICK_NS:
+    # The second of the times is that of the last change; on Windows, of the making.
+    if looks == looks_of(path) and abs(asked_ns - max(looks[2:4])) > _TICK_NS:
         _HASHES[looks[:2]] = (looks, digest)
     return digest
 

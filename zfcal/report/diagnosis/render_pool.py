@@ -5,8 +5,11 @@ from __future__ import annotations
 import importlib
 import os
 import signal
+import sys
 import threading
+from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -72,21 +75,18 @@ class RenderPool:
     def _begin(self) -> bool:
         """Start the processes; whether they could be."""
         others = set(active_children())
-        # An interrupt from the keyboard goes to all processes. Those that draw say nothing of it,
-        # whoever began them does; they are born with it held back.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            spawn = get_context("spawn")
-            self._pool = ProcessPoolExecutor(_HANDS, mp_context=spawn, initializer=_get_ready)
-            # Each starts when there is something to do and nobody at leisure.
-            for _ in range(_HANDS):
-                self._pool.submit(int)
+            with _interrupts_held_back():
+                spawn = get_context("spawn")
+                self._pool = ProcessPoolExecutor(_HANDS, mp_context=spawn, initializer=_get_ready)
+                # Each starts when there is something to do and nobody at leisure.
+                for _ in range(_HANDS):
+                    self._pool.submit(int)
         except OSError:
             begun = False
         else:
             begun = True
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             self._hands = set(active_children()) - others
         if not begun:
             self._let_go(at_once=True)
@@ -103,8 +103,25 @@ class RenderPool:
         self._pool = None
 
 
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Begin processes that say nothing of an interrupt from the keyboard, which goes to all.
+
+    Whoever began them does; they are born with it held back, where the system can do that.
+    """
+    if sys.platform == "win32" or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _get_ready() -> None:
     """Load what drawing needs, and end with the process that one draws for."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     importlib.import_module("zfcal.report.diagnosis.drawing")
 

@@ -6,13 +6,13 @@ What it starts from and where its result goes is the business of those who ask f
 from __future__ import annotations
 
 import math
-import os
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from zfcal.artifacts.atomic import append_bytes, check_free, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
+from zfcal.artifacts.machine import cores
 from zfcal.artifacts.reading.contents import read_limited
 from zfcal.calibrate.baselines import random_search, unchanged
 from zfcal.calibrate.checkpoint import from_bytes, to_bytes
@@ -98,7 +98,7 @@ class CalibrateOptions:
     @property
     def workers(self) -> int:
         """Threads to use."""
-        return self.n_workers or len(os.sched_getaffinity(0))
+        return self.n_workers or cores()
 
     def model_of(self, trial: Trial) -> Path:
         """Return the file of the model that is calibrated in a trial."""

@@ -7,7 +7,6 @@ a `Draw`.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +15,7 @@ from typing import Any
 
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.machine import cores
 from zfcal.artifacts.models import newest_model, read_model_for
 from zfcal.diagnose.document import SCHEMA, findings_document
 from zfcal.diagnose.findings import Diagnosis
@@ -69,7 +69,7 @@ class DiagnoseOptions:
     @property
     def workers(self) -> int:
         """Threads to use."""
-        return self.n_workers or len(os.sched_getaffinity(0))
+        return self.n_workers or cores()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

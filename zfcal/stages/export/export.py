@@ -86,7 +86,7 @@ def _layout_item(run: Run, options: ExportOptions) -> Item:
     x0, y0, x1, y1 = map(float, opened.arena.outline.bounds)
     text = json.dumps(foxglove_layout(topics, (x0, y0, x1, y1)), indent=2) + "\n"
     place = Place(root=run.root, name=_LAYOUT, folder=options.folder)
-    files = {"foxglove-layout.json": lambda path, _: path.write_text(text, encoding="utf-8")}
+    files = {"foxglove-layout.json": lambda path, _: path.write_bytes(text.encode())}
     return exported(run, place, lineage, lambda: Content(files=files))
 
 

@@ -1,0 +1,119 @@
+"""`zfcal.report`, and what its command does with its options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
+from zfcal.api.values import PathLike
+from zfcal.errors import DamagedError, InputError
+from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
+from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
+from zfcal.stages.stage import settled
+from zfcal.stages.trial_context import Task, at_work
+
+_TOGETHER = Path("report")
+_HINT = "Make it again, or copy it again from where it was made."
+
+
+def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Task) -> Path:
+    """Write the report of trials, unless it is up to date.
+
+    Parameters
+    ----------
+    roots
+        The trials' directories.
+    out
+        Where it goes; None for ``report`` in the trial, or here if there are several.
+    tell
+        Hears of every file, and of what is left out.
+    task
+        How to go about it.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        There are no trials, or one of them is none.
+    """
+    if not roots:
+        raise InputError("A report needs at least one trial.")
+    folder = _TOGETHER if out is None and len(roots) > 1 else out
+
+    def work() -> None:
+        reason = report_reason(roots, folder) or ("forced" if task.force else None)
+        if reason is None:
+            for path in report_files(roots, folder):
+                tell(UpToDate(path=path))
+            for line in report_left_out(roots, folder):
+                tell(LeftOut(path=Path(), problem=line, hint=_HINT))
+        elif task.dry_run:
+            tell(Planned(path=(folder or roots[0] / "report") / PAGE, reason=reason))
+        else:
+            for path in write_report(roots, folder, on_damage=tell_damage(tell)):
+                tell(Made(path=path, reason=reason))
+
+    with at_work(roots[0], "report", task):
+        settled(work, tell)
+    return (folder or roots[0] / "report") / PAGE
+
+
+def tell_damage(tell: Tell) -> Callable[[DamagedError], None]:
+    """Return what tells of a damaged file that it is left out."""
+    return lambda error: tell(LeftOut(path=Path(), problem=str(error), hint=error.hint))
+
+
+def report(
+    trials: TrialPath | Iterable[TrialPath],
+    *,
+    out: PathLike | None = None,
+    dry_run: bool = False,
+    force: bool = False,
+    tell: Tell | None = None,
+) -> Path:
+    """Write a page with figures, of one trial or of several in one report: ``zfcal report``.
+
+    The page holds its figures; they lie beside it as PNG too. Over several trials it shows mean
+    and standard deviation per window. What is up to date stays.
+
+    Parameters
+    ----------
+    trials
+        One trial or several: directories, or their tables.
+    out
+        Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``.
+    dry_run
+        Write nothing; `tell` hears whether it would be made, and why.
+    force
+        Make it again, even if it is up to date.
+    tell
+        Hears of every file, and of what is left out (`zfcal.stages.events`). By default what is
+        left out is a warning, and the rest is logged as ``zfcal``.
+
+    Returns
+    -------
+    Path
+        The page, also where a dry run has not made it.
+
+    Raises
+    ------
+    InputError
+        One is no trial, a trial is named twice, or their arenas have other zones.
+    StorageError
+        The disk is full, or the place cannot be written.
+    LockedError
+        The same is at work on the first trial.
+
+    Examples
+    --------
+    >>> import zfcal
+    >>> print(zfcal.report("trial"))
+    trial/report/index.html
+    """
+    folder = None if out is None else Path(out)
+    return write_page(roots_of(trials), folder, heard_by(tell), task=task_of(locals()))
