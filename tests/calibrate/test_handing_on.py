@@ -146,7 +146,7 @@ def test_the_compromise_is_half_way_between_best_and_estimate(later, old, forwar
 
 def test_a_model_that_is_kept_stays_to_the_bit(later, old, forward):
     """It says of which window it is, and is judged as it drives on: with speeds of the new one."""
-    task = later({KEEP: 0.9, NEAREST: 0.5}, old)
+    task = later({KEEP: 0.9, MEMORY: 0.5}, old)
     slow = np.zeros_like(task.control.speed)
     slow[:, 0] = task.control.speed.sum(axis=1)
     task = replace(task, control=replace(task.control, speed=slow))

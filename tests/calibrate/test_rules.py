@@ -164,6 +164,18 @@ def test_the_sixty_newest_models_that_rules_made_are_kept():
     assert made == [120 + 60 * k for k in range(40, 100)]
 
 
+def test_the_estimate_over_all_minutes_is_in_charge_first():
+    """Where there are estimates; without tracks it is the nearest of all models."""
+    assert Record(n_rounds=2).choose({SCORE, MEMORY, NEAREST}, NOISE).rule == MEMORY
+    assert Record().choose({LIKELIHOOD}, NOISE).in_charge == MEMORY
+    without = record_of({SCORE: [0.6] * 3, NEAREST: [0.6] * 3}, in_charge=MEMORY)
+    choice = without.choose({SCORE, NEAREST}, NOISE)
+    assert (choice.rule, choice.in_charge) == (NEAREST, NEAREST)
+    # One that has had models stays in charge over a window without.
+    had = record_of({MEMORY: [0.6] * 3, NEAREST: [0.6] * 3}, in_charge=MEMORY)
+    assert had.choose({SCORE, NEAREST}, NOISE).in_charge == MEMORY
+
+
 def test_a_lead_is_held_against_the_noise_of_leads():
     """That of S is much larger, and counts only as long as no window has told the other one."""
     record = record_of({NEAREST: [0.7] * 5, MEMORY: [0.75] * 5})
@@ -241,7 +253,7 @@ def test_the_first_two_rounds_publish_the_estimate(n_rounds):
 
 def test_without_any_score_the_nearest_is_published():
     """Nothing was judged yet, or on windows without a number."""
-    assert Record(n_rounds=7).choose({SCORE, NEAREST}, NOISE).rule == NEAREST
+    assert Record(n_rounds=7).choose({SCORE, MEMORY}, NOISE).rule == MEMORY
     blind = record_of({SCORE: [math.nan], NEAREST: [math.nan]})
     choice = blind.choose({SCORE, NEAREST}, NOISE)
     assert (choice.rule, choice.because, choice.lead) == (NEAREST, "no rule has been better", None)
@@ -330,7 +342,7 @@ def test_chance_alone_seldom_changes_the_rule(minutes):
             for end in ends
         ]
         record = Record(rows=tuple(rows), n_rounds=9)
-        changed += record.choose(rules, NOISE).rule != NEAREST
+        changed += record.choose(rules, NOISE).rule != MEMORY
     assert 0.02 < changed / 2000 < 0.2 + 3 * math.sqrt(0.16 / 2000)
 
 

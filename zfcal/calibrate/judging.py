@@ -1,8 +1,12 @@
 """What the models of rules score on a window: simulated from where all were at its beginning.
 
-A long run from anywhere is no measure of two minutes of fish that still are where they have been.
-Fish of the very model score .78 against its long run in two rooms, fish of another one .80, since
-that one forgets sooner where it was. From where they were, the true model is the best one.
+Two things make a score by one long run unfit to choose a model. Fish still are where they have
+been, so their two minutes resemble a model that soon forgets where it was more than their own. And
+a run that visits a zone in which no fish was in these two minutes counts as wholly unlike them
+there, so a model that never goes where fish seldom go is ahead of the true one. So a window is held
+against single windows of a model, from where all were, with what these differ among themselves: a
+kernel score, which is highest for the true model in the mean (Gneiting and Raftery 2007,
+section 5).
 """
 
 from __future__ import annotations
@@ -19,7 +23,6 @@ from zfcal.calibrate.group import (
     Purpose,
     Simulator,
     Startable,
-    pool_runs,
     runs_of,
     with_measured_speeds,
 )
@@ -83,7 +86,7 @@ def nearest(task: Task, settings: Settings, models: Sequence[Candidate]) -> Cand
         scores = np.array(by_long_runs(models, task.control, math.nan).scores)
     else:
         runs = _runs(task, settings, task.simulator, models, NEAREST_RUNS)
-        scores = population_scores(pool_runs(runs), task.control).S
+        scores = kernel_scores(runs, task.control)
     return models[int(np.argmax(np.nan_to_num(scores, nan=-1.0)))]
 
 
@@ -94,21 +97,44 @@ def _followed(
     template = with_measured_speeds(task.group.template, models[0].long_run)
     group = task.group.with_template(template)
     runs = _runs(task, settings, group, models, FOLLOWED_RUNS)
-    pooled = pool_runs(runs)
-    apart = _between_windows(runs, pooled)
-    own = np.array([table[k] for k, table in enumerate(apart)])
     first = next((k for k, model in enumerate(models) if model.rule == in_charge), 0)
-    leads = [
-        truth[k] - truth[first]
-        for k in range(len(models))
-        for truth in (apart[k], apart[first])
-        if k != first and not np.array_equal(models[k].genes, models[first].genes)
-    ]
+    among = [_apart(_alike(runs_of(runs, k), runs_of(runs, k))) for k in range(len(models))]
+    leads = []
+    for k, model in enumerate(models):
+        if not np.array_equal(model.genes, models[first].genes):
+            across = _alike(runs_of(runs, k), runs_of(runs, first))
+            leads.append(_mean(among[k], 1) - _mean(across, 1))
+            leads.append(_mean(across, 0) - _mean(among[first], 1))
     return Followed(
-        scores=tuple(population_scores(pooled, task.control).S.tolist()),
-        noise=_spread(own),
-        lead_noise=_spread(np.array(leads)) if leads else math.nan,
+        scores=tuple(kernel_scores(runs, task.control).tolist()),
+        noise=_spread([_mean(own, 1) for own in among]),
+        lead_noise=_spread(leads),
     )
+
+
+def kernel_scores(runs: Counts, control: Statistics) -> Floats:
+    """Return how well models foretell a window, about as large as S.
+
+    The mean S of the window and a simulated one, and half of what two simulated ones lack to 1.
+
+    Parameters
+    ----------
+    runs
+        Simulated windows, leading axes (model, run).
+    control
+        The window.
+
+    Returns
+    -------
+    ndarray, shape (model,)
+        NaN where no feature can be counted.
+    """
+    toward = _mean(population_scores(runs, control).S, 1)
+    among = [
+        _mean(_apart(_alike(runs_of(runs, k), runs_of(runs, k))).ravel(), 0)
+        for k in range(len(toward))
+    ]
+    return np.asarray(toward + (1 - np.array(among)) / 2)
 
 
 def _runs(
@@ -125,25 +151,28 @@ def _runs(
     )
 
 
-def _between_windows(runs: Counts, pooled: Counts) -> list[Floats]:
-    """Return, for each model as the truth, what all models score on its windows.
-
-    Returns
-    -------
-    list of ndarray, shape (model, run)
-    """
-    n_models = len(pooled.occupation)
-    return [
-        np.stack(
-            [
-                population_scores(runs_of(runs, truth), runs_of(pooled, model)).S
-                for model in range(n_models)
-            ]
-        )
-        for truth in range(n_models)
-    ]
+def _alike(ours: Counts, theirs: Counts) -> Floats:
+    """Return S of each window of one set and each of another, shape (ours, theirs)."""
+    rows = Counts(*(part[:, None] for part in ours))
+    columns = Counts(*(part[None] for part in theirs))
+    return population_scores(rows, columns).S
 
 
-def _spread(values: Floats) -> float:
-    """Return the standard deviation over runs, the last axis, of all rows together."""
-    return float(np.sqrt(np.nanmean(np.nanvar(values, axis=-1))))
+def _apart(alike: Floats) -> Floats:
+    """Return a table of windows of one set without those of each with itself."""
+    return np.where(np.eye(len(alike), dtype=bool), np.nan, alike)
+
+
+def _mean(values: Floats, axis: int) -> Floats:
+    """Return the mean of what is not NaN; NaN where all is."""
+    known = ~np.isnan(values)
+    n = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
+    return np.asarray(np.where(n > 0, total / np.maximum(n, 1), np.nan))
+
+
+def _spread(rows: Sequence[Floats]) -> float:
+    """Return the standard deviation within rows, all rows together; NaN without any."""
+    found = [row[~np.isnan(row)] for row in rows]
+    found = [row for row in found if len(row)]
+    return math.sqrt(np.mean([row.var() for row in found])) if found else math.nan

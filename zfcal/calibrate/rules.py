@@ -3,10 +3,9 @@
 A model that fits a window best fits what happened in it by chance as well, and the most likely
 model is none where the law is wrong. Which of these faults is the larger one differs between
 recordings, and no window that a model was fitted to can tell. So each rule has a record: what its
-models scored on the first window that they had not seen, when they were simulated from where all
-were at its beginning. One rule is in charge until another one is
-surely better. The first is `NEAREST`: a window chooses among models of which most were made of
-others, so what fits a window by chance is not handed on for long.
+models scored on the first window that they had not seen, see ``judging``. One rule is in charge
+until another one is surely better. The first is `MEMORY`: where the law is right nothing else is as
+steady, and where it is wrong the others show it within a few windows.
 """
 
 from __future__ import annotations
@@ -187,7 +186,7 @@ class Choice:
     rule: str
     because: str
     lead: Lead | None = None
-    in_charge: str = NEAREST
+    in_charge: str = MEMORY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,7 +204,7 @@ class Record:
     in_use
         The model that was handed on last; None before the first round.
     in_charge
-        The rule that published last, `NEAREST` before rules were judged.
+        The rule that publishes, `MEMORY` before rules were judged.
     lead_noise
         Standard deviation between windows of what one model scores above another; NaN as long as
         no window has told.
@@ -215,7 +214,7 @@ class Record:
     models: tuple[Candidate, ...] = ()
     n_rounds: int = 0
     in_use: Candidate | None = None
-    in_charge: str = NEAREST
+    in_charge: str = MEMORY
     lead_noise: float = math.nan
 
     def due(self, end_s: int) -> tuple[Candidate, ...]:
@@ -321,8 +320,13 @@ class Record:
         noise = noise if math.isnan(self.lead_noise) else self.lead_noise
         if self.n_rounds < FIRST_ROUNDS:
             first = LIKELIHOOD if LIKELIHOOD in made else SCORE
-            return Choice(rule=first, because="no window has followed a model yet")
+            return Choice(
+                rule=first, because="no window has followed a model yet", in_charge=self.in_charge
+            )
         old = self.in_charge
+        if old not in {*made, KEEP} and all(row.rule != old for row in self.rows):
+            # Such as without tracks, from which alone estimates are made.
+            old = NEAREST
         # Rules may lack a model in some minutes: each is held against the one in charge on the
         # minutes that both have.
         rules = [rule for rule in RULES if rule != old and (rule in made or rule == KEEP)]

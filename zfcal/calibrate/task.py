@@ -37,7 +37,7 @@ _WORDS = {
 _RULES_SIMULATED = 5
 """Models that a round simulates for the rules: four made, and the one that is handed on."""
 
-FOLLOWED_RUNS, NEAREST_RUNS = 60, 30
+FOLLOWED_RUNS, NEAREST_RUNS = 40, 20
 """Simulated windows of each model that a window follows, and of each that may be nearest to it."""
 
 _FOLLOWED = 6
