@@ -110,7 +110,9 @@ def test_times_that_waver_are_counted_from_one_to_the_next(make, read):
     def fill(file, animal, series):
         times_s = np.arange(n) / 15.2
         series(animal(file, "a"), swim_px, time_s=times_s)
-        series(animal(file, "b"), np.delete(swim_px, [7, 8], axis=0), time_s=np.delete(times_s, [7, 8]))
+        series(
+            animal(file, "b"), np.delete(swim_px, [7, 8], axis=0), time_s=np.delete(times_s, [7, 8])
+        )
 
     found = read(make(fill), "nwb", m_per_px=PX)
 

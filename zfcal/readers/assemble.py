@@ -146,7 +146,8 @@ def _check_one_each(path: Path, known: Iterable[int], rows: Rows, options: Impor
     for name in options.robots:
         if named[name] > 1:
             raise InputError(
-                f"{path}: {named[name]} agents are called {name!r}, expected the name of one robot.",
+                f"{path}: {named[name]} agents are called {name!r}, expected the name of one "
+                "robot.",
                 hint="Give each its own name in the program that made the file.",
             )
 

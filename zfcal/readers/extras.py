@@ -91,9 +91,7 @@ def whole(path: Path, kind: str) -> Iterator[None]:
 
 
 @contextmanager
-def open_hdf5(
-    path: Path, *, under: str | None = "/", kind: str = "HDF5"
-) -> Iterator[Any]:
+def open_hdf5(path: Path, *, under: str | None = "/", kind: str = "HDF5") -> Iterator[Any]:
     """Open an HDF5 file for reading; whatever is damaged in it is an `InputError`.
 
     Parameters
@@ -124,11 +122,11 @@ def _check_links(path: Path, file: Any, under: str) -> None:
         if isinstance(link, h5py.ExternalLink):
             raise _elsewhere(path, name, Path(link.filename).name)
         if isinstance(link, h5py.SoftLink) and (node := file.get(name)) is not None:
-            _check_home(path, name, node, file)
+            _check_home(path, name, node)
 
 
-def _check_home(path: Path, name: str, node: Any, file: Any) -> None:
-    if node.file.filename != file.file.filename:
+def _check_home(path: Path, name: str, node: Any) -> None:
+    if node.file.filename != str(path):
         raise _elsewhere(path, name, Path(node.file.filename).name)
 
 
@@ -170,7 +168,7 @@ def dataset(file: Any, name: str, path: Path) -> NDArray[Any]:
         there = ", ".join(sorted(file)) or "an empty file"
         raise InputError(f"{path}: expected a data set {name!r}, got {there}.")
     node = file[name]
-    _check_home(path, name, node, file)
+    _check_home(path, name, node)
     _check_stored(path, name, node)
     return np.asarray(node[()])
 

@@ -194,7 +194,12 @@ def _number(
 def _clock(path: Path, node: Any, where: str, n_samples: int, *, by_sleap: bool) -> Clock:
     """Return the times of the samples, or their rate where that is what the file has."""
     clock = Clock(
-        where=where, start_s=np.nan, n_samples=n_samples, time_s=None, rate_hz=None, by_sleap=by_sleap
+        where=where,
+        start_s=np.nan,
+        n_samples=n_samples,
+        time_s=None,
+        rate_hz=None,
+        by_sleap=by_sleap,
     )
     if not n_samples:
         return clock

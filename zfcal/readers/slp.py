@@ -95,10 +95,11 @@ def _replaced(frames: Mapping[int, Sequence[Any]], agents: Sequence[Any]) -> tup
         n_frames += bool(ours) and any(all(p is not c for c in corrected) for p in theirs)
     if not n_frames or agents != [None]:
         return ()
-    return (
+    warning = (
         f"In {n_frames} frames a person's instance stands for a prediction that the file does not "
-        "say it corrects. If these are two animals, let SLEAP follow them first.",
+        "say it corrects. If these are two animals, let SLEAP follow them first."
     )
+    return (warning,)
 
 
 def _chosen(
