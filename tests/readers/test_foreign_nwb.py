@@ -120,6 +120,18 @@ def test_times_that_waver_are_counted_from_one_to_the_next(make, read):
     assert found.tracks.frame.max() == n - 1
 
 
+def test_times_that_differ_by_less_than_a_video_shows_are_of_one_frame(make, read):
+    """Half a millisecond between two animals."""
+
+    def fill(file, animal, series):
+        series(animal(file, "a"), LINE_PX, time_s=np.arange(5) / 15)
+        series(animal(file, "b"), LINE_PX, time_s=np.arange(5) / 15 + 0.0005)
+
+    assert read(make(fill), "nwb", m_per_px=PX).tracks.frame.tolist() == [
+        *(0, 0, 1, 1, 2, 2, 3, 3, 4, 4)
+    ]
+
+
 def test_a_note_for_every_series_is_kept(make, read):
     """Of the rate and of the start; the same one once."""
 
@@ -141,11 +153,11 @@ def test_a_track_that_was_hardly_seen_does_not_spoil_the_file(make, read):
         series(animal(file, "twice"), LINE_PX[:2], rate_hz=2.0, time_s=0.2)
         series(animal(file, "never"), LINE_PX[:0], time_s=np.empty(0))
         series(animal(file, "once"), LINE_PX[:1], time_s=np.array([0.2]))
-        series(animal(file, "thrice"), LINE_PX[:3], time_s=np.array([0, 3, 4]) / 15)
+        series(animal(file, "thrice"), LINE_PX[:3], time_s=np.array([0, 3, 5]) / 15)
 
     found = read(make(fill), "nwb", m_per_px=PX)
 
-    numbered = {"a": [0, 1, 2, 3, 4], "once": [3], "thrice": [0, 3, 4]}
+    numbered = {"a": [0, 1, 2, 3, 4], "once": [3], "thrice": [0, 3, 5]}
     assert "Agents are numbered: a = 0, never = 1, once = 2, thrice = 3, twice = 4." in found.notes
     for agent, frames in zip((0, 2, 3), numbered.values(), strict=True):
         assert found.tracks.frame[found.tracks.agent == agent].tolist() == frames
@@ -207,6 +219,11 @@ def _other_times(file, animal, series):
 
 def _every_fifteenth_second(file, animal, series):
     series(animal(file, "a"), LINE_PX, time_s=15.0 * np.array([0, 1, 2, 4, 5]))
+
+
+def _seconds_beside_no_rate(file, animal, series):
+    series(animal(file, "a"), LINE_PX[:3], time_s=15.0 * np.arange(3))
+    series(animal(file, "b"), LINE_PX[:2], rate_hz=0.0, time_s=30.0)
 
 
 def _no_rate(file, animal, series):
@@ -345,6 +362,7 @@ def _little_confidence(file, animal, series):
         (_other_rate, "the file states 30 frames per second, expected fps = 15"),
         (_other_times, "the times advance at 30 Hz, expected fps = 15 Hz"),
         (_every_fifteenth_second, "the times advance at 0.06667 Hz, expected fps = 15 Hz"),
+        (_seconds_beside_no_rate, "the times advance at 0.06667 Hz, expected fps = 15 Hz"),
         (_no_rate, "a/body: expected a starting_time with a positive rate, got 0 and 0"),
         (_infinite_rate, "a/body: expected a number as rate, got inf"),
         (_every_second_frame, "the file states 7 frames per second, expected fps = 15"),

@@ -123,16 +123,16 @@ def _count_frames(clocks: Sequence[Clock], fps: float) -> bool:
         return False
     if any(clock.rate_hz not in {None, 0.0, 1.0} for clock in clocks):
         return False
-    time_s = _instants(clocks, 1.0)
+    time_s = _seconds(clocks)
     steps_s = np.diff(time_s)
     whole = time_s[0] >= 0 and (time_s == np.rint(time_s)).all()
     return bool(whole and steps_s.size and steps_s.min() == 1)
 
 
-def _instants(clocks: Sequence[Clock], fps: float) -> Floats:
-    """Return all times, ascending, of series with a rate as if that were ``fps``."""
+def _seconds(clocks: Sequence[Clock]) -> Floats:
+    """Return all times, ascending; of a series whose rate is nothing, that of its start."""
     times = [
-        clock.start_s + np.arange(clock.n_samples if clock.rate_hz else 1) / fps
+        clock.start_s + np.arange(clock.n_samples if clock.rate_hz else 1)
         if clock.time_s is None
         else clock.time_s
         for clock in clocks
