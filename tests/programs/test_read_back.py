@@ -76,6 +76,58 @@ def test_one_animal_needs_no_track(files, imported):
     assert tracks.x_m == pytest.approx([0.102, 0.108, 0.104, 0.109])
 
 
+REPLACED = "In 1 frames a person's instance stands for a prediction that the file does not say"
+
+
+def test_a_prediction_that_gives_way_is_told_unless_it_was_corrected(files, imported):
+    """Without tracks it may be another animal."""
+    done, _ = imported(files / "alone.slp", *SCALE, *HEAD)
+    assert f"warning: {files / 'alone.slp'}: {REPLACED}" in done.stderr
+
+
+def test_a_correction_of_a_prediction_is_no_warning(files, imported):
+    """The file says which one it corrects."""
+    done, tracks = imported(files / "corrected.slp", *SCALE, *HEAD)
+
+    assert done.returncode == 0, done.stderr
+    assert "stands for a prediction" not in done.stderr
+    assert tracks.x_m == pytest.approx([0.102, 0.108, 0.104, 0.109])
+
+
+def test_the_rate_is_that_of_the_video_with_the_animals(files, imported):
+    """Another video of the file may have another rate."""
+    done, tracks = imported(files / "rates.slp", *SCALE, *HEAD)
+
+    assert done.returncode == 0, done.stderr
+    assert tracks.time_s == pytest.approx([0.4, 0.6])
+
+
+def test_a_rate_that_is_text_is_told_and_not_used(files, imported):
+    """No number, no comparison."""
+    done, tracks = imported(files / "words.slp", *SCALE, *HEAD)
+
+    assert done.returncode == 0, done.stderr
+    assert "The file states no usable frame rate ('5')." in done.stderr
+    assert tracks.time_s == pytest.approx([0.4])
+
+
+def test_an_ending_in_capitals_is_known(files, imported):
+    """The same tracks."""
+    done, tracks = imported(files / "CAPITALS.SLP", *SCALE, *HEAD)
+
+    assert done.returncode == 0, done.stderr
+    assert tracks.frame.tolist() == [2, 2, 3, 3, 4, 9, 9]
+
+
+def test_a_robot_is_not_named_by_what_two_tracks_are_called(files, imported):
+    """One of them is a fish."""
+    done, tracks = imported(files / "namesakes.slp", *SCALE, *HEAD, "--robots", "fish_0")
+
+    assert done.returncode == 1
+    assert "2 agents are called 'fish_0', expected the name of one robot" in done.stderr
+    assert tracks is None
+
+
 def test_an_export_comes_back_through_sleap_io(python, trial, imported, tmp_path):
     """Exported, opened and saved as labels by sleap-io, imported: the same tracks but headings."""
     export(trial, ExportOptions(formats=("sleap",)), say_nothing)
@@ -118,6 +170,9 @@ def test_nwb_of_sleap_io_is_read_without_it(files):
         ("empty", "expected instances in frames of one video, got those of 0"),
         ("lost", "expected positions, got none: all 1 are missing"),
         ("cut", "expected a whole SLEAP file, got one that does not read"),
+        ("other", "the file states 30 frames per second, expected fps = 5"),
+        ("linked", "expected a file that holds its data itself, got /pred_points in points.h5"),
+        ("external", "expected a file that holds its data itself, got pred_points in points.bin"),
         ("text", "expected a whole SLEAP file, got one that does not read"),
     ],
 )

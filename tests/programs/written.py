@@ -7,6 +7,7 @@
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import sleap_io as sio
 from sleap_io import Instance, LabeledFrame, Labels, PredictedInstance, Skeleton, Track, Video
@@ -70,6 +71,43 @@ def videos():
     return Labels([frame for some in frames for frame in some.labeled_frames])
 
 
+def _video(name, rate):
+    return Video(name, open_backend=False, backend_metadata={"fps": rate})
+
+
+def rates():
+    """The animals are in a video of 5 Hz, and nobody in one of 30 Hz."""
+    own = _video("own.mp4", 5.0)
+    found = labels((2, [predicted(2, FISH)]), (3, [predicted(3, FISH)]), video=own)
+    return Labels(found.labeled_frames, videos=[_video("other.mp4", 30.0), own])
+
+
+def other():
+    """The other way round: the one without animals has the rate of the trial."""
+    own = _video("own.mp4", 30.0)
+    found = labels((2, [predicted(2, FISH)]), video=own)
+    return Labels(found.labeled_frames, videos=[_video("other.mp4", 5.0), own])
+
+
+def words():
+    """A rate that is stored as text."""
+    return labels((2, [predicted(2, FISH)]), video=_video("tank.mp4", "5"))
+
+
+def corrected():
+    """One animal without a track, and a person's correction of the prediction."""
+    found = alone()
+    (frame,) = [frame for frame in found.labeled_frames if frame.frame_idx == 3]
+    prediction, person = frame.instances
+    person.from_predicted = prediction
+    return found
+
+
+def namesakes():
+    """Two tracks of one name."""
+    return labels((2, [predicted(2, FISH), predicted(2, Track("fish_0"), 9.0)]))
+
+
 def empty():
     """Frames in which nobody is."""
     return labels((2, []))
@@ -83,15 +121,35 @@ def lost():
     return labels((2, [unseen]))
 
 
+def move_points(path, *, linked):
+    """Move the predicted points into another file, and leave a way to them."""
+    with h5py.File(path, "a") as file:
+        points = file["pred_points"][()]
+        del file["pred_points"]
+        if linked:
+            with h5py.File(path.with_name("points.h5"), "w") as other:
+                other["pred_points"] = points
+            file["pred_points"] = h5py.ExternalLink("points.h5", "/pred_points")
+        else:
+            away = [(str(path.with_name("points.bin")), 0, h5py.h5f.UNLIMITED)]
+            made = file.create_dataset("pred_points", points.shape, points.dtype, external=away)
+            made[...] = points
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     if sys.argv[2:]:
         sio.load_file(sys.argv[2]).save(str(folder / "again.slp"))
     else:
-        for write in (tank, alone, crowd, twice, videos, empty, lost):
+        writers = (tank, alone, crowd, twice, videos, empty, lost)
+        for write in (*writers, rates, other, words, corrected, namesakes):
             write().save(str(folder / f"{write.__name__}.slp"))
+        (folder / "CAPITALS.SLP").write_bytes((folder / "tank.slp").read_bytes())
         whole = (folder / "tank.slp").read_bytes()
         (folder / "cut.slp").write_bytes(whole[: len(whole) // 2])
+        for name in ("linked", "external"):
+            (folder / f"{name}.slp").write_bytes((folder / "tank.slp").read_bytes())
+            move_points(folder / f"{name}.slp", linked=name == "linked")
         (folder / "text.slp").write_text("frame,x,y\n")
         seen = labels(*((k, [predicted(k, FISH), predicted(k, ROBOT)]) for k in range(4)))
         sio.save_nwb(seen, folder / "tank.nwb", "predictions")

@@ -67,6 +67,16 @@ def test_all_positions_not_trusted_is_an_error():
         assemble(HERE, rows, _options(min_confidence=0.5))
 
 
+def test_a_robot_is_not_named_by_what_two_agents_are_called():
+    """One of them may be a fish; without --robots both are read."""
+    rows = _rows(agent=np.array([0, 1, 2]), names={0: "a", 1: "a", 2: "b"})
+
+    with pytest.raises(InputError, match="2 agents are called 'a', expected the name of one robot"):
+        assemble(HERE, rows, _options(robots=("a",)))
+    assert assemble(HERE, rows, _options(robots=("b", "0"))).tracks.kind.tolist() == [1, 0, 1]
+    assert len(assemble(HERE, rows, _options()).tracks) == 3
+
+
 def test_robots_are_named_by_name_or_by_number():
     """Both ways name the same agent."""
     rows = _rows(names={4: "lure"})

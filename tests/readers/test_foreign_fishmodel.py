@@ -98,6 +98,8 @@ def test_a_packed_file_is_unpacked(tmp_path, read):
         (TWO + TWO, "line 3: expected a later step than 1, got 0. Two runs in one file"),
         ("0.000000\t0.1 0.2 0\n0.333333\t0.1 0.2 0\n0.500000\t0.1 0.2 0\n", "line 3: expected a"),
         ("nan\t0.1 0.2 0\n", "line 1: expected a time that is a whole number of 1/15 s"),
+        ("1e30\t0.1 0.2 0\n", "line 1: expected a time of at most 143165576 s, got 1e30"),
+        (TWO + "1e19\t0.1 0.2 0\t0.3 0.4 0\n", "line 3: expected a time of at most"),
         ("-1.000000\t0.1 0.2 0\n", "line 1: expected a time that is a whole number of 1/15 s"),
         ("0.000000\tnan nan nan\n0.066667\t-nan -nan -nan\n", "expected positions, got none"),
         ("", "the file is empty"),

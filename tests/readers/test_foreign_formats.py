@@ -159,12 +159,82 @@ def test_a_file_looks_like_its_own_format(name, sample):
         ("a.txt", "something else\n", None),
         ("a.h5", "no HDF5", None),
         ("a.slp", "", "sleap"),
+        ("A.SLP", "", "sleap"),
+        ("A.NWB", "", "nwb"),
         ("a.csv", "", None),
     ],
 )
 def test_a_file_is_guessed_by_its_ending_or_its_first_line(name, text, expected, write):
     """Nothing else of it is read; what is like nothing is not guessed."""
     assert guess_format(write(name, text)) == expected
+
+
+HELD = {
+    "idtracker": "trajectories",
+    "sleap": "tracks",
+    "movement": "position",
+    "nwb": "processing/SLEAP_VIDEO_000_tank/track=0/body/data",
+    "robofish": "entities/0/positions",
+}
+"""Data sets of the samples."""
+
+
+def _moved(path, name, how):
+    """Move a data set into another file, and leave a way to it."""
+    h5py = pytest.importorskip("h5py")
+    raw = path.with_name("raw.h5")
+    with h5py.File(path, "a") as file, h5py.File(raw, "w") as other:
+        values, attributes = file[name][()], dict(file[name].attrs)
+        other["x"] = values
+        scales = [axis[0] if len(axis) else None for axis in file[name].dims]
+        del file[name]
+        if how == "linked":
+            other["x"].attrs.update({k: v for k, v in attributes.items() if "DIM" not in k})
+            file[name] = h5py.ExternalLink(raw.name, "/x")
+            return
+        if how == "soft":
+            file["away"] = h5py.ExternalLink(raw.name, "/x")
+            file[name] = h5py.SoftLink("/away")
+            return
+        if how == "virtual":
+            layout = h5py.VirtualLayout(shape=values.shape, dtype=values.dtype)
+            layout[...] = h5py.VirtualSource(other["x"])
+            made = file.create_virtual_dataset(name, layout)
+        else:
+            parts = [(str(path.with_name("raw.bin")), 0, h5py.h5f.UNLIMITED)]
+            made = file.create_dataset(name, values.shape, values.dtype, external=parts)
+            made[...] = values
+        made.attrs.update({k: v for k, v in attributes.items() if "DIM" not in k})
+        for axis, scale in zip(made.dims, scales, strict=True):
+            if scale is not None:
+                axis.attach_scale(scale)
+
+
+@pytest.mark.parametrize("how", ["linked", "soft", "virtual", "external"])
+@pytest.mark.parametrize("name", sorted(HELD))
+def test_data_in_another_file_are_refused(name, how, sample, refused):
+    """The lineage would name the file that leads there, and not the one that was read."""
+    path, options = sample(name)
+    _moved(path, HELD[name], how)
+
+    message = refused(path, name, **options)
+
+    assert "expected a file that holds its data itself, got" in message
+    assert ("raw.bin" if how == "external" else "raw.h5") in message
+
+
+def test_a_group_in_another_file_is_refused(sample, refused):
+    """Whether the other file is there or not."""
+    h5py = pytest.importorskip("h5py")
+    path, options = sample("robofish")
+    raw = path.with_name("raw.hdf5")
+    path.rename(raw)
+    for other in (raw.name, "gone.hdf5"):
+        with h5py.File(raw) as source, h5py.File(path, "w") as file:
+            file.attrs.update(source.attrs)
+            file["samplings"] = h5py.ExternalLink(other, "/samplings")
+            source.copy("entities", file)
+        assert f"got /samplings in {other}" in refused(path, "robofish", **options)
 
 
 def test_an_unknown_format_lists_the_known_ones_and_guesses(sample, refused):

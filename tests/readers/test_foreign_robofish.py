@@ -126,6 +126,28 @@ def test_one_sample_holds_for_the_whole_recording(make, read):
     assert tracks.heading_rad[tracks.kind == FISH] == pytest.approx([np.pi / 2] * 5)
 
 
+def test_a_robot_of_one_sample_is_told_by_name_and_such_a_fish_is_refused(make, read, refused):
+    """A robot is fixed in place; no fish stands still for a whole recording, lost it may be."""
+    still = [[3.0, 4.0]]
+    found = read(make(a=("fish", SWIM_CM, RIGHT), lure=("robot", still, None)), "robofish")
+    assert "One sample holds for all 5, as of robots: lure." in found.notes
+    fish = make(a=("fish", SWIM_CM, RIGHT), b=("organism", still, None))
+    assert "entities/b is a fish with one sample, expected 5" in refused(fish, "robofish")
+    lost = make(a=("fish", SWIM_CM, RIGHT), b=("fish", [[np.nan, np.nan]], None))
+    assert read(lost, "robofish").tracks.agent.tolist() == [0] * 5
+    assert len(read(make(a=("fish", still, None)), "robofish").tracks) == 1
+
+
+def test_entities_of_one_sampling_are_alike_whatever_its_rate(make, read):
+    """A rate that is no number says nothing, and is told."""
+    path = make(_stated("frequency_hz", np.nan, "samplings/15 hz"))
+
+    found = read(path, "robofish")
+
+    assert len(found.tracks) == 15
+    assert "The file states no usable frame rate (nan)." in found.notes
+
+
 def test_an_entity_that_ends_early_is_missing_afterwards(make, read):
     """Nothing is filled in; it is said."""
     path = make(a=("fish", SWIM_CM, RIGHT), b=("fish", SWIM_CM[:3], RIGHT[:3]))

@@ -1,5 +1,9 @@
 """From a file of another program to the segments of a trial."""
 
+import gzip
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -53,6 +57,25 @@ def test_an_import_makes_closed_segments(trial, csv, heard, wandering):
     rows = (wanted.time_s >= 60) & (wanted.time_s < 120)
     assert np.allclose(found.x_m, wanted.x_m[rows], atol=1e-5)
     assert np.array_equal(found.kind, wanted.kind[rows])
+
+
+def test_what_a_file_is_not_sure_of_is_a_warning_also_of_the_robots_file(tmp_path, heard):
+    """Poses of sleap-io that count frames as seconds, for fish and once more for robots."""
+    pytest.importorskip("h5py")
+    golden = Path(__file__).parents[1] / "readers" / "golden" / "sleap-io.nwb.gz"
+    fish, robots = tmp_path / "fish.nwb", tmp_path / "robots.nwb"
+    for path in (fish, robots):
+        path.write_bytes(gzip.decompress(golden.read_bytes()))
+    root = tmp_path / "trial"
+    create_trial(root, NewTrial(n_fish=1, n_robots=2, fps=5.0, side_m=1.0), say_nothing)
+    options = {"m_per_px": 0.001, "keypoint": "head"}
+    source = Source(path=fish, format="nwb", options=options, robot_tracks=robots)
+
+    import_tracks(root, replace(source, options={**options, "robots": ("robot_3",)}), heard.append)
+
+    warnings = [event.text for event in heard if isinstance(event, Note) and event.warning]
+    for path in (fish, robots):
+        assert any(f"{path}: Times are whole seconds" in text for text in warnings)
 
 
 def test_lineage_names_the_file_by_its_hash_and_not_its_place(trial, csv, heard):

@@ -5,6 +5,8 @@ Every reader ends here, so scale, axes and missing positions are handled once.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,10 +47,13 @@ class Imported:
         In metres, sorted by frame, then agent.
     notes
         A sentence each: columns left out, missing positions, agents renamed.
+    warnings
+        A sentence each: what was taken without the file being sure of it.
     """
 
     tracks: Tracks
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def assemble(path: Path, rows: Rows, options: ImportOptions) -> Imported:
@@ -127,11 +132,24 @@ def _kinds(
             f"{path}: no agent is called {unknown[0]!r}, expected one of "
             f"{', '.join(sorted(rows.names.get(agent, str(agent)) for agent in known)[:20])}."
         )
+    _check_one_each(path, known, rows, options)
     robots = [by_name[name] for name in options.robots]
     kind[np.isin(rows.agent, robots)] = ROBOT
     renamed = {agent: name for agent, name in rows.names.items() if name != str(agent)}
     listed = ", ".join(f"{name} = {agent}" for agent, name in sorted(renamed.items())[:20])
     return kind, (f"Agents are numbered: {listed}.",) if renamed else ()
+
+
+def _check_one_each(path: Path, known: Iterable[int], rows: Rows, options: ImportOptions) -> None:
+    """Refuse a name of a robot that several agents have."""
+    named = Counter(rows.names[agent] for agent in known if agent in rows.names)
+    for name in options.robots:
+        if named[name] > 1:
+            raise InputError(
+                f"{path}: {named[name]} agents are called {name!r}, expected the name of one "
+                "robot.",
+                hint="Give each its own name in the program that made the file.",
+            )
 
 
 def _present(path: Path, rows: Rows, options: ImportOptions) -> tuple[Bools, tuple[str, ...]]:

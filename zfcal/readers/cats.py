@@ -45,7 +45,7 @@ def read_cats(path: Path, options: ImportOptions) -> Imported:
     options
         Times are taken from the text; an XML file is played at ``fps``.
     """
-    rows = _xml_rows(path, options) if path.suffix == ".xml" else _text_rows(path, options)
+    rows = _xml_rows(path, options) if path.suffix.lower() == ".xml" else _text_rows(path, options)
     return assemble(path, rows, options)
 
 

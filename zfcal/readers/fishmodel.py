@@ -28,6 +28,9 @@ _STEPS_PER_S = 15.0
 _OFF = 0.1
 """By how much of a step a time may be rounded: six decimals now, six digits in older versions."""
 
+_LAST = 2**31 - 1
+"""The last step; four years of 15 a second."""
+
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|nan)"
 LINE = re.compile(rf"{_NUMBER}(?:\t{_NUMBER} {_NUMBER} {_NUMBER})+")
 """A line of the output."""
@@ -88,6 +91,13 @@ def _steps(path: Path, lines: list[tuple[int, str]], time_s: Floats) -> Ints:
         raise InputError(
             f"{path}, line {number}: expected a time that is a whole number of 1/15 s, as "
             f"FishModel counts steps, got {line.partition(chr(9))[0]}."
+        )
+    late = ~(exact <= _LAST)
+    if late.any():
+        number, line = lines[int(np.argmax(late))]
+        raise InputError(
+            f"{path}, line {number}: expected a time of at most {_LAST / _STEPS_PER_S:.0f} s, got "
+            f"{line.partition(chr(9))[0]}."
         )
     step = np.rint(exact).astype(np.int64)
     for (number, _), (before, after) in zip(lines[1:], pairwise(step.tolist()), strict=True):

@@ -43,12 +43,12 @@ def guess_format(path: Path) -> str | None:
     """
     if path.is_dir():
         return "trex" if any(path.glob("*_*[0-9].npz")) else None
-    ending = Path(path.name.removesuffix(".gz")).suffix
+    ending = Path(path.name.removesuffix(".gz")).suffix.lower()
     if ending in _ENDINGS:
         return _ENDINGS[ending]
     try:
         if ending in {".h5", ".hdf5"}:
-            with open_hdf5(path) as file:
+            with open_hdf5(path, under=None) as file:
                 return next((name for key, name in _KEYS if key in file), None)
         line = first_lines(path, 1)[0]
     except InputError:

@@ -26,7 +26,7 @@ from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
-from zfcal.readers.extras import open_hdf5, texts
+from zfcal.readers.extras import dataset, open_hdf5, texts
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.pickles import read_npy
 from zfcal.readers.raw import Grid, Rows
@@ -161,7 +161,7 @@ def _read_h5(path: Path) -> dict[str, Any]:
         found: dict[str, Any] = dict(file.attrs)
         for name in ("trajectories", "id_probabilities", "frames_per_second", "length_unit"):
             if name in file and hasattr(file[name], "shape"):
-                found[name] = file[name][()]
+                found[name] = dataset(file, name, path)
         if "identities_labels" in found:
             found["identities_labels"] = texts(found["identities_labels"])
         if "trajectories" not in found:

@@ -3,8 +3,7 @@
 Each module of ``processing`` may hold groups of type ``PoseEstimation``, one for each animal
 (sleap-io calls them ``track=NAME``), and these a ``PoseEstimationSeries`` for each body part: data
 (sample, xy) with a unit, ``confidence``, and ``timestamps`` or ``starting_time`` with its rate, in
-seconds. sleap-io leaves out samples in which a part was not seen, cuts the rate to whole hertz, and
-without a rate counts a frame as a second.
+seconds: see `zfcal.readers.nwb_clock`.
 
 The file is read as HDF5. sleap-io's own reader numbers frames anew where nobody was seen, and
 forgets who is who.
@@ -12,18 +11,18 @@ forgets who is who.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from zfcal.arrays import Floats, Ints
+from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.assemble import UNITS, Imported, assemble
-from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import dataset, open_hdf5, texts
+from zfcal.readers.nwb_clock import Clock, frames_from
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses, choose
 
@@ -32,18 +31,14 @@ _PREFIX = "track="
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Series:
-    """A body part of an animal: positions (sample, 2), confidence and times (sample,).
-
-    ``rate_hz`` is None where each sample has a time of its own.
-    """
+    """A body part of an animal: positions (sample, 2) and confidence (sample,)."""
 
     agent: str
     part: str
     unit: str
     xy: Floats
     confidence: Floats
-    time_s: Floats
-    rate_hz: float | None
+    clock: Clock
 
 
 def read_nwb(path: Path, options: ImportOptions) -> Imported:
@@ -57,19 +52,22 @@ def read_nwb(path: Path, options: ImportOptions) -> Imported:
         Needs ``m_per_px`` when the positions are in pixels, and ``keypoint`` when there are
         several body parts. Frames are played at ``fps``, with which times are compared.
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, under="processing") as file:
         series = list(_all_series(path, file))
     if len({(found.agent, found.part) for found in series}) < len(series):
         raise InputError(f"{path}: expected each animal once, got two of the same name.")
     units = sorted({found.unit for found in series})
     if len(units) != 1:
         raise InputError(f"{path}: expected positions in one unit, got {', '.join(units)}.")
-    frames, notes = _frames(path, series, options)
+    found_frames = frames_from(path, [found.clock for found in series], options.fps)
+    frames = [own for own in found_frames.of if own is not None]
     frame = np.unique(np.concatenate(frames))
     agents = tuple(dict.fromkeys(found.agent for found in series))
     parts = tuple(dict.fromkeys(found.part for found in series))
     cube = np.full((len(frame), len(agents), len(parts), 3), np.nan)
-    for found, own in zip(series, frames, strict=True):
+    for found, own in zip(series, found_frames.of, strict=True):
+        if own is None:
+            continue
         at = np.searchsorted(frame, own), agents.index(found.agent), parts.index(found.part)
         cube[at] = np.column_stack([found.xy, found.confidence])
     poses = Poses(
@@ -80,23 +78,23 @@ def read_nwb(path: Path, options: ImportOptions) -> Imported:
         agents=agents,
         keypoints=parts,
         unit=units[0],
-        notes=notes,
+        notes=found_frames.notes,
     )
-    return assemble(path, choose(path, poses, options).rows(), options)
+    imported = assemble(path, choose(path, poses, options).rows(), options)
+    return replace(imported, warnings=found_frames.warnings)
 
 
 def _all_series(path: Path, file: Any) -> Iterator[_Series]:
     modules = file.get("processing", {})
     held = {
-        f"{module}/{name}": modules[module][name] for module in modules for name in modules[module]
+        f"{module}/{name}": modules[module][name]
+        for module in modules
+        if hasattr(modules[module], "keys")
+        for name in modules[module]
     }
     animals = {name: node for name, node in held.items() if _type(node) == "PoseEstimation"}
-    videos = {
-        video
-        for node in animals.values()
-        if "original_videos" in node
-        for video in texts(dataset(node, "original_videos", path))
-    }
+    told = [_videos(path, node) for node in animals.values()]
+    videos = set().union(*told)
     if not animals or len(videos) > 1:
         kinds = ", ".join(sorted({_type(node) for node in held.values()} - {""}))
         got = f"poses in {len(videos)} videos" if animals else kinds or "nothing in 'processing'"
@@ -104,12 +102,36 @@ def _all_series(path: Path, file: Any) -> Iterator[_Series]:
             f"{path}: expected an NWB file with PoseEstimation of one video, got {got}.",
             hint="Training data (PoseTraining) are no tracks." if "PoseTraining" in kinds else "",
         )
+    places = sorted({name.partition("/")[0] for name in animals})
+    if len(places) > 1 and not all(told):
+        raise InputError(
+            f"{path}: expected PoseEstimation of one video, got those of {', '.join(places)}, and "
+            "not for all of them the video.",
+            hint="They may be of several cameras: keep one of them in the file.",
+        )
     for name, node in animals.items():
-        found = [part for part in node if _type(node[part]) == "PoseEstimationSeries"]
+        found = [part for part in node if _is_series(node, part)]
         if not found:
             raise InputError(f"{path}: {name} holds no PoseEstimationSeries, expected some.")
         agent = name.partition("/")[2].removeprefix(_PREFIX)
-        yield from (_series(path, node[part], agent, part) for part in found)
+        by_sleap = name.partition("/")[2].startswith(_PREFIX) or _software(path, node) == "SLEAP"
+        yield from (_series(path, node[part], (agent, part), by_sleap=by_sleap) for part in found)
+
+
+def _videos(path: Path, node: Any) -> set[str]:
+    """Return what the file has for the video of an animal."""
+    if "original_videos" in node:
+        return set(texts(dataset(node, "original_videos", path)))
+    return {str(node["source_video"].name)} if "source_video" in node else set()
+
+
+def _software(path: Path, node: Any) -> str:
+    return texts(dataset(node, "source_software", path))[0] if "source_software" in node else ""
+
+
+def _is_series(node: Any, part: str) -> bool:
+    # A link that leads nowhere, as to a skeleton that was left out, is no series.
+    return part in node and _type(node[part]) == "PoseEstimationSeries"
 
 
 def _type(node: Any) -> str:
@@ -117,10 +139,13 @@ def _type(node: Any) -> str:
     return texts(np.asarray(stored))[0]
 
 
-def _series(path: Path, node: Any, agent: str, part: str) -> _Series:
-    where = f"{agent}/{part}"
+def _series(path: Path, node: Any, name: tuple[str, str], *, by_sleap: bool) -> _Series:
+    where = "/".join(name)
     xy = dataset(node, "data", path)
-    if xy.ndim != 2 or xy.shape[1] != 2 or xy.dtype.kind not in "iuf" or not len(xy):
+    if xy.ndim and not len(xy):
+        # sleap-io writes so a part that was never seen.
+        xy = np.empty((0, 2))
+    if xy.ndim != 2 or xy.shape[1] != 2 or xy.dtype.kind not in "iuf":
         raise InputError(
             f"{path}: {where}: expected positions of shape (samples, 2), got {xy.dtype} of "
             f"{xy.shape}."
@@ -132,78 +157,66 @@ def _series(path: Path, node: Any, agent: str, part: str) -> _Series:
             f"{path}: {where}: positions are in {unit!r}, expected one of {', '.join(UNITS)}."
         )
     confidence = np.full(len(xy), np.nan)
-    if "confidence" in node:
+    if "confidence" in node and len(xy):
         confidence = dataset(node, "confidence", path)
-    time_s, rate_hz = _times(path, node, where, len(xy))
-    if confidence.shape != time_s.shape or confidence.dtype.kind not in "iuf":
+    clock = _clock(path, node, where, len(xy), by_sleap=by_sleap)
+    if confidence.shape != (len(xy),) or confidence.dtype.kind not in "iuf":
         raise InputError(
             f"{path}: {where}: expected {len(xy)} numbers of confidence, got {confidence.dtype} "
             f"of {confidence.shape}."
         )
-    scale = float(attributes.get("conversion", 1.0))
+    scale = _number(path, where, attributes, "conversion", 1.0)
+    if not scale > 0:
+        raise InputError(f"{path}: {where}: expected a positive conversion, got {scale:g}.")
+    agent, part = name
     return _Series(
         agent=agent,
         part=part,
         unit=UNITS[unit],
-        xy=xy * scale + float(attributes.get("offset", 0.0)),
+        xy=xy * scale + _number(path, where, attributes, "offset", 0.0),
         confidence=confidence,
-        time_s=time_s,
-        rate_hz=rate_hz,
+        clock=clock,
     )
 
 
-def _times(path: Path, node: Any, where: str, n_samples: int) -> tuple[Floats, float | None]:
-    """Return the times of the samples, and the rate where that is what the file has."""
+def _number(
+    path: Path, where: str, attributes: Mapping[str, Any], name: str, default: float
+) -> float:
+    """Return a finite number that an attribute holds, or the default."""
+    stored = attributes.get(name, default)
+    # An attribute without a value, as HDF5 may have it, is no array of numbers either.
+    found = np.asarray(stored)
+    if found.shape != () or found.dtype.kind not in "iuf" or not np.isfinite(found):
+        raise InputError(f"{path}: {where}: expected a number as {name}, got {stored}.")
+    return float(found)
+
+
+def _clock(path: Path, node: Any, where: str, n_samples: int, *, by_sleap: bool) -> Clock:
+    """Return the times of the samples, or their rate where that is what the file has."""
+    clock = Clock(
+        where=where,
+        start_s=np.nan,
+        n_samples=n_samples,
+        time_s=None,
+        rate_hz=None,
+        by_sleap=by_sleap,
+    )
+    if not n_samples:
+        return clock
     if "timestamps" in node:
         time_s = dataset(node, "timestamps", path)
         numeric = time_s.dtype.kind in "iuf" and time_s.shape == (n_samples,)
+        # Differences of whole numbers without sign would always be positive.
+        time_s = time_s.astype(np.float64) if numeric else time_s
         if not (numeric and np.isfinite(time_s).all() and (np.diff(time_s) > 0).all()):
             raise InputError(f"{path}: {where}: expected {n_samples} timestamps that advance.")
-        return time_s.astype(np.float64), None
+        return replace(clock, start_s=float(time_s[0]), time_s=time_s)
     start = dataset(node, "starting_time", path)
-    rate_hz = float(node["starting_time"].attrs.get("rate", 0.0))
-    if start.shape != () or not np.isfinite(start) or not 0 < rate_hz < np.inf:
+    rate_hz = _number(path, where, node["starting_time"].attrs, "rate", 0.0)
+    startable = start.shape == () and start.dtype.kind in "iuf" and np.isfinite(start)
+    if not (startable and (rate_hz > 0 or (rate_hz == 0 and by_sleap))):
         raise InputError(
             f"{path}: {where}: expected a starting_time with a positive rate, got {start} and "
             f"{rate_hz:g}."
         )
-    return float(start) + np.arange(n_samples) / rate_hz, rate_hz
-
-
-def _count_frames(time_s: Floats) -> bool:
-    """Whether all times are whole seconds, in steps of one."""
-    steps_s = np.diff(time_s)
-    whole = time_s[0] >= 0 and (time_s == np.rint(time_s)).all()
-    return bool(whole and (not steps_s.size or steps_s.min() == 1))
-
-
-def _frames(
-    path: Path, series: Sequence[_Series], options: ImportOptions
-) -> tuple[list[Ints], tuple[str, ...]]:
-    """Return for each series the frames of its samples, and what a person should know."""
-    if _count_frames(np.unique(np.concatenate([found.time_s for found in series]))):
-        note = (
-            f"Times are whole seconds: each is taken as the number of a frame, at {options.fps:g} "
-            "frames per second, as sleap-io has it when it is not told a rate."
-        )
-        return [found.time_s.astype(np.int64) for found in series], (note,)
-    notes: tuple[str, ...] = ()
-    start_s = min(float(found.time_s[0]) for found in series)
-    frames = []
-    for found in series:
-        first = np.rint((found.time_s[0] - start_s) * options.fps)
-        if found.rate_hz is None:
-            check_rate(path, found.time_s, fps=options.fps)
-            own = np.rint((found.time_s - start_s) * options.fps)
-        else:
-            notes = check_declared(path, found.rate_hz, options.fps)
-            own = first + np.arange(len(found.time_s))
-        if not (np.diff(own) > 0).all():
-            raise InputError(
-                f"{path}: {found.agent}/{found.part} has two samples in a frame, at "
-                f"{options.fps:g} frames per second; expected one."
-            )
-        frames.append(own.astype(np.int64))
-    if start_s:
-        notes = (*notes, f"Times are counted from the first sample, {start_s:g} s in the file.")
-    return frames, notes
+    return replace(clock, start_s=float(start), rate_hz=rate_hz)

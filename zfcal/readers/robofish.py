@@ -4,7 +4,8 @@ Documentation of robofish-io, and the RoboFish Track Format 1.0: the root has th
 ``format_version`` ([1, 0]) and ``world_size_cm`` (width, height). Each group of ``entities`` has an
 attribute ``category`` (organism, robot or obstacle; fish in older files) and data sets
 ``positions`` (sample, 2), in centimetres about the centre of the world, and ``orientations``
-(sample, 2), unit vectors; NaN where it was lost. One sample alone holds for the whole recording.
+(sample, 2), unit vectors; NaN where it was lost. One sample alone holds for the whole recording,
+which is believed of robots and obstacles, not of fish.
 ``samplings`` has a group for each clock, with the attribute ``frequency_hz`` or a data set
 ``monotonic_time_points_us``; ``default`` names the one of all entities whose attribute ``sampling``
 names no other. No file of robofish-io was at hand to confirm ``default``, ``sampling`` and the
@@ -51,6 +52,8 @@ class _Sampling:
     def is_like(self, other: _Sampling) -> bool:
         """Whether samples of the same number are of the same time."""
         ours, theirs = self.time_s, other.time_s
+        if self.name == other.name:
+            return True
         if ours is None or theirs is None:
             return ours is theirs and self.frequency_hz == other.frequency_hz
         return np.array_equal(ours, theirs)
@@ -84,6 +87,7 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
         unused = sorted(set(file["samplings"]) - {entity.sampling.name for entity in entities})
     sampling = _one_sampling(path, entities)
     n_samples = _length(path, entities, sampling)
+    _check_swim(path, entities, n_samples)
     frame = np.arange(n_samples)
     time_s = frame / options.fps
     notes = [_axes_note(world_cm, options)]
@@ -100,6 +104,9 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
     ended = [f"{e.name} ({len(e.xy)})" for e in entities if 1 < len(e.xy) < n_samples]
     if ended:
         notes.append(f"Some end before the last of {n_samples} samples: {', '.join(ended)}.")
+    fixed = [e.name for e in entities if len(e.xy) == 1 < n_samples and e.kind == ROBOT]
+    if fixed:
+        notes.append(f"One sample holds for all {n_samples}, as of robots: {', '.join(fixed)}.")
     grid = Grid(
         xy=np.stack([_filled(entity.xy, n_samples) for entity in entities], axis=1),
         frame=frame,
@@ -246,6 +253,18 @@ def _length(path: Path, entities: Sequence[_Entity], sampling: _Sampling) -> int
             f"the {len(sampling.time_s)} of sampling {sampling.name!r}."
         )
     return len(sampling.time_s)
+
+
+def _check_swim(path: Path, entities: Sequence[_Entity], n_samples: int) -> None:
+    """Refuse a fish that would stand still throughout."""
+    for entity in entities:
+        seen = np.isfinite(entity.xy).all()
+        if entity.kind == FISH and len(entity.xy) == 1 < n_samples and seen:
+            raise InputError(
+                f"{path}: entities/{entity.name} is a fish with one sample, expected {n_samples}.",
+                hint="One sample holds for the whole recording, and no fish stands still that "
+                "long: leave it out of the file, or give it the category robot.",
+            )
 
 
 def _filled(values: Floats, n_samples: int) -> Floats:

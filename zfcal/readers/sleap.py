@@ -13,6 +13,7 @@ count from the start of the video, unless the file was written without all frame
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,12 @@ def read_sleap(path: Path, options: ImportOptions) -> Imported:
     options
         Needs ``m_per_px``, and ``keypoint`` when there are several nodes.
     """
-    poses = labelled(path, options) if path.suffix == ".slp" else _analysed(path, options)
-    return assemble(path, choose(path, poses, options).rows(), options)
+    if path.suffix.lower() == ".slp":
+        poses, warnings = labelled(path, options)
+    else:
+        poses, warnings = _analysed(path, options), ()
+    imported = assemble(path, choose(path, poses, options).rows(), options)
+    return replace(imported, warnings=warnings)
 
 
 def _analysed(path: Path, options: ImportOptions) -> Poses:

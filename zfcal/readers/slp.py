@@ -2,7 +2,9 @@
 
 Frames hold instances, each with a skeleton and, once animals were followed, a track. Instances that
 a person set have precedence over those that were predicted, as in SLEAP itself. Where there are
-tracks, what has none is nobody; without tracks there may be one animal. Videos are not opened.
+tracks, what has none is nobody; without tracks there may be one animal: a person's instance then
+stands for the prediction of its frame, also where the file does not say that it corrects it. Videos
+are not opened.
 """
 
 from __future__ import annotations
@@ -16,13 +18,13 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.readers.clock import check_declared
-from zfcal.readers.extras import require, whole
+from zfcal.readers.extras import alone, require, whole
 from zfcal.readers.options import ImportOptions
 from zfcal.readers.poses import Poses
 
 
-def labelled(path: Path, options: ImportOptions) -> Poses:
-    """Return the body parts of all tracks, in pixels.
+def labelled(path: Path, options: ImportOptions) -> tuple[Poses, tuple[str, ...]]:
+    """Return the body parts of all tracks, in pixels, and warnings.
 
     Parameters
     ----------
@@ -38,9 +40,10 @@ def labelled(path: Path, options: ImportOptions) -> Poses:
         videos, several animals without tracks, or a track twice in a frame.
     """
     sleap_io = require("sleap_io", path, extra="sleap")
+    alone(path, "SLEAP")
     with whole(path, "SLEAP"):
         labels = sleap_io.load_slp(str(path), open_videos=False)
-        frames = _frames(path, labels)
+        frames, rate_hz = _frames(path, labels)
     everybody = [found for some in frames.values() for found in some]
     used = {found.track for found in everybody}
     agents = [track for track in labels.tracks if track in used] or [None]
@@ -52,10 +55,10 @@ def labelled(path: Path, options: ImportOptions) -> Poses:
         for agent, instance in _chosen(path, number, frames[number], agents).items():
             columns = [nodes.index(name) for name in instance.skeleton.node_names]
             cube[row, agents.index(agent), columns] = _points(instance)
-    notes = _rate(path, labels, options)
+    notes = _rate(path, rate_hz, options)
     if nobody:
         notes = (*notes, f"{nobody} instances without a track are passed over.")
-    return Poses(
+    poses = Poses(
         position=cube[..., :2],
         score=cube[..., 2],
         frame=frame,
@@ -64,10 +67,11 @@ def labelled(path: Path, options: ImportOptions) -> Poses:
         keypoints=nodes,
         notes=notes,
     )
+    return poses, _replaced(frames, agents)
 
 
-def _frames(path: Path, labels: Any) -> dict[int, list[Any]]:
-    """Return the instances by frame, of one video."""
+def _frames(path: Path, labels: Any) -> tuple[dict[int, list[Any]], Any]:
+    """Return the instances by frame, of one video, and what the file has for its rate."""
     labelled_frames = [frame for frame in labels.labeled_frames if frame.instances]
     videos = {id(frame.video) for frame in labelled_frames}
     if len(videos) != 1:
@@ -78,7 +82,24 @@ def _frames(path: Path, labels: Any) -> dict[int, list[Any]]:
     frames: dict[int, list[Any]] = {}
     for frame in labelled_frames:
         frames.setdefault(int(frame.frame_idx), []).extend(frame.instances)
-    return frames
+    return frames, labelled_frames[0].video.fps
+
+
+def _replaced(frames: Mapping[int, Sequence[Any]], agents: Sequence[Any]) -> tuple[str, ...]:
+    """Tell of predictions without a track that gave way, unless a person corrected them."""
+    n_frames = 0
+    for some in frames.values():
+        ours = [found for found in some if found.track is None and not _is_predicted(found)]
+        theirs = [found for found in some if found.track is None and _is_predicted(found)]
+        corrected = [found.from_predicted for found in ours]
+        n_frames += bool(ours) and any(all(p is not c for c in corrected) for p in theirs)
+    if not n_frames or agents != [None]:
+        return ()
+    warning = (
+        f"In {n_frames} frames a person's instance stands for a prediction that the file does not "
+        "say it corrects. If these are two animals, let SLEAP follow them first."
+    )
+    return (warning,)
 
 
 def _chosen(
@@ -118,7 +139,10 @@ def _points(instance: Any) -> Floats:
     return points
 
 
-def _rate(path: Path, labels: Any, options: ImportOptions) -> tuple[str, ...]:
+def _rate(path: Path, stated: Any, options: ImportOptions) -> tuple[str, ...]:
     """Compare the rate of the video, where the file states one."""
-    rates = {video.fps for video in labels.videos if video.fps}
-    return check_declared(path, rates.pop(), options.fps) if len(rates) == 1 else ()
+    if stated is None or stated == 0:
+        return ()
+    if isinstance(stated, bool) or not isinstance(stated, int | float | np.number):
+        return (f"The file states no usable frame rate ({stated!r}).",)
+    return check_declared(path, float(stated), options.fps)

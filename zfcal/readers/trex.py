@@ -96,7 +96,7 @@ def _match(file: Path) -> re.Match[str]:
 
 
 def _read(path: Path, mark: str, place: int) -> _Individual:
-    columns, unit = _read_npz(path) if path.suffix == ".npz" else _read_csv(path, mark)
+    columns, unit = _read_npz(path) if path.suffix.lower() == ".npz" else _read_csv(path, mark)
     numbered = _NUMBERED.fullmatch(path.name)
     number = int(numbered["number"]) if numbered else place
     if "id" in columns and columns["id"].size == 1:

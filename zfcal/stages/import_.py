@@ -12,7 +12,7 @@ import numpy as np
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.readers import ImportOptions, guess_format, import_foreign
+from zfcal.readers import Imported, ImportOptions, guess_format, import_foreign
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_of_recording
 from zfcal.stages.stage import Item, OneThing, Run, run
@@ -141,11 +141,14 @@ def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Trac
     found = import_foreign(source.path, name, options)
     for note in found.notes:
         tell(Note(text=f"{source.path}: {note}"))
+    _tell_warnings(source.path, found, tell)
     if source.robot_tracks is None:
         return found.tracks
     # Everybody in that file is a robot, whatever the file calls it.
     alone = dataclasses.replace(options, n_fish=options.n_robots, robots=())
-    robots = import_foreign(source.robot_tracks, name, alone).tracks
+    others = import_foreign(source.robot_tracks, name, alone)
+    _tell_warnings(source.robot_tracks, others, tell)
+    robots = others.tracks
     shift = int(found.tracks.agent.max()) + 1 - int(robots.agent.min())
     robots = dataclasses.replace(
         robots,
@@ -153,6 +156,11 @@ def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Trac
         kind=np.full(len(robots), ROBOT, dtype=np.int8),
     )
     return concatenate([found.tracks, robots])
+
+
+def _tell_warnings(path: Path, found: Imported, tell: Tell) -> None:
+    for warning in found.warnings:
+        tell(Note(text=f"{path}: {warning}", warning=True))
 
 
 def _tell_missing(opened: OpenTrial, tracks: Tracks, tell: Tell) -> None:
