@@ -30,7 +30,8 @@ from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.simulate import SimulateOptions, simulate
 from zfcal.stages.trial_context import Task
 
-_ROUNDS_BEFORE = 3
+_ROUNDS_BEFORE = 15
+"""Of which each leaves four models that may be the nearest: as many as are kept."""
 
 _PARTS = {
     "estimate over all minutes": (stage, "remembered"),
