@@ -1,7 +1,10 @@
 """Who hears what happens: whoever is given, or warnings and the log."""
 
 import logging
+import subprocess
+import sys
 import warnings
+from pathlib import Path
 
 import pytest
 
@@ -19,9 +22,38 @@ def damaged(here):
 
 def test_what_is_left_out_is_a_warning(damaged):
     """With the file and what to do; the rest is made."""
-    with pytest.warns(UserWarning, match=damaged) as caught:
+    with pytest.warns(zfcal.ZfcalWarning, match=damaged) as caught:
         zfcal.analyse("trial", force=True)
     assert len(caught) >= 1
+
+
+def test_each_call_warns_once_where_it_stands(damaged):
+    """With Python's usual filters: the second call as the first, of each file one line."""
+    code = (
+        "import zfcal\n"
+        "for _ in range(2):\n"
+        "    zfcal.analyse('trial', force=True)\n"
+        "zfcal.report('trial')\n"
+    )
+    Path("script.py").write_text(code)
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, check=True)
+    lines = [line for line in done.stderr.splitlines() if "ZfcalWarning" in line]
+    of_file = [line for line in lines if damaged in line]
+    places = [line.partition(": ZfcalWarning")[0].rpartition("/")[2] for line in of_file]
+    assert places == ["script.py:3", "script.py:3", "script.py:4"]
+    assert len(lines) == len(of_file)
+
+
+@pytest.mark.parametrize("call", [zfcal.analyse, zfcal.report])
+def test_warnings_can_be_refused_or_hidden_by_their_kind(damaged, call):
+    """Also of a function that is a package; a filter of one's own comes first."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", zfcal.ZfcalWarning)
+        call("trial", force=True)
+        warnings.simplefilter("error", zfcal.ZfcalWarning)
+        with pytest.raises(zfcal.ZfcalWarning, match=damaged):
+            call("trial", force=True)
 
 
 def test_who_hears_of_it_needs_no_warning(damaged):
