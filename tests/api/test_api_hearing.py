@@ -1,10 +1,7 @@
 """Who hears what happens: whoever is given, or warnings and the log."""
 
 import logging
-import subprocess
-import sys
 import warnings
-from pathlib import Path
 
 import pytest
 
@@ -27,33 +24,31 @@ def test_what_is_left_out_is_a_warning(damaged):
     assert len(caught) >= 1
 
 
-def test_each_call_warns_once_where_it_stands(damaged):
-    """With Python's usual filters: the second call as the first, of each file one line."""
-    code = (
-        "import zfcal\n"
-        "for _ in range(2):\n"
-        "    zfcal.analyse('trial', force=True)\n"
-        "zfcal.report('trial')\n"
-    )
-    Path("script.py").write_text(code)
-    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, check=True)
-    lines = [line for line in done.stderr.splitlines() if "ZfcalWarning" in line]
-    of_file = [line for line in lines if damaged in line]
-    places = [line.partition(": ZfcalWarning")[0].rpartition("/")[2] for line in of_file]
-    assert places == ["script.py:3", "script.py:3", "script.py:4"]
-    assert len(lines) == len(of_file)
+@pytest.mark.parametrize("function", [zfcal.analyse, zfcal.diagnose])
+def test_each_call_warns_where_it_stands(damaged, function):
+    """The second call as the first, each text once in a call; also of a package."""
+    found = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        for _ in range(2):
+            function("trial", dry_run=True)
+            found.append([(str(each.message), each.category, each.filename) for each in caught])
+            caught.clear()
+    assert found[0] == found[1]
+    assert len(set(found[0])) == len(found[0]) >= 1
+    assert {(kind, file) for _, kind, file in found[0]} == {(zfcal.ZfcalWarning, __file__)}
+    assert any(damaged in text for text, _, _ in found[0])
 
 
-@pytest.mark.parametrize("call", [zfcal.analyse, zfcal.report])
-def test_warnings_can_be_refused_or_hidden_by_their_kind(damaged, call):
-    """Also of a function that is a package; a filter of one's own comes first."""
+def test_warnings_can_be_refused_or_hidden_by_their_kind(damaged):
+    """A filter of one's own comes first."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", zfcal.ZfcalWarning)
-        call("trial", force=True)
+        zfcal.analyse("trial", dry_run=True)
         warnings.simplefilter("error", zfcal.ZfcalWarning)
         with pytest.raises(zfcal.ZfcalWarning, match=damaged):
-            call("trial", force=True)
+            zfcal.analyse("trial", dry_run=True)
 
 
 def test_who_hears_of_it_needs_no_warning(damaged):

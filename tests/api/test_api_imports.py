@@ -154,6 +154,8 @@ def test_mypy_types_the_functions(tmp_path):
         'reveal_type(zfcal.simulate("new", model="m.toml", duration="2min"))\n'
         'reveal_type(zfcal.compare("a", against=["b"], out="c", dry_run=bool(PAGE)))\n'
         'reveal_type(zfcal.diagnose("trial", dry_run=bool(PAGE)))\n'
+        "from zfcal.calibrate.task import Settings\n"
+        "reveal_type(Settings.__name__)\n"
         'zfcal.calibrate("trial", generatons=3)\n'
         'zfcal.diagnose("trial", null_replicates=40)\n'
     )
@@ -174,9 +176,10 @@ def test_mypy_types_the_functions(tmp_path):
         "zfcal.frames.TrialTables",
         "pandas.core.frame.DataFrame | None",
         "zfcal.frames.TrialTables | None",
+        "str",
     ]
     errors = [line for line in lines if " error: " in line]
-    assert [line.partition(":")[0] for line in errors] == ["11", "12"], done.stdout
+    assert [line.partition(":")[0] for line in errors] == ["13", "14"], done.stdout
 
 
 EXAMPLES = [

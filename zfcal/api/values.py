@@ -91,7 +91,7 @@ def names(value: Names) -> tuple[str, ...]:
     """
     parts = value.split(",") if isinstance(value, str) else value
     if not isinstance(parts, Iterable):
-        raise OptionError(f"{shown(value)} is no name; give them as D,W,O,T.")
+        raise OptionError(f"{shown(value)} is neither a name nor a list of names.")
     found = tuple(map(_stripped, parts))
     if not all(found):
         raise OptionError(f"{shown(value)} holds an empty name; give them as D,W,O,T.")
