@@ -178,3 +178,15 @@ def test_a_dry_run_returns_no_findings_of_other_options(here):
     folder.mkdir()
     (folder / "findings.json").write_text("{}")
     assert zfcal.diagnose("trial", quick=True, seed=1, dry_run=True) is None
+
+
+@SLOW
+def test_tables_make_the_files_that_their_path_makes(here, tmp_path, monkeypatch, read_all):
+    """Byte by byte, though their paths are absolute: of a page, and of findings."""
+    twin = shutil.copytree(here, tmp_path / "twin")
+    for folder, given in ((here, str), (twin, zfcal.open)):
+        monkeypatch.chdir(folder)
+        zfcal.diagnose(given("trial"), quick=True, seed=1)
+        zfcal.report(given("trial"))
+        zfcal.report([given("trial"), given("alone")], out="both")
+    assert read_all(twin) == read_all(here)
