@@ -196,3 +196,31 @@ def test_every_table_knows_its_files(trial, table):
     """All of them are there, in the trial."""
     assert all(path.is_file() for path in trial.files(table))
     assert bool(trial.files(table)) == (table != "findings")
+
+
+def test_tables_stay_those_of_their_trial_in_another_folder(trial, tmp_path, monkeypatch):
+    """Where another trial has the same name: of all tables, in what is told, and in a function."""
+    first = shutil.copytree(trial.root, tmp_path / "first" / "trial")
+    second = shutil.copytree(SAMPLE, tmp_path / "second" / "trial")
+    min((second / "tracks").glob("*.parquet")).unlink()
+    (first / "found.json").write_text(json.dumps(findings_of([])))
+    monkeypatch.chdir(first.parent)
+    tables = frames.TrialTables("trial", findings="trial/found.json")
+    monkeypatch.chdir(second.parent)
+
+    assert tables.root == tables.trial.root == first
+    assert len(tables.tracks()) == len(trial.tracks())
+    assert tables.findings().attrs["verdict"] == "tie"
+    assert repr(tables) == f"zfcal.open({str(first)!r})"
+    heard = []
+    zfcal.analyse(tables, dry_run=True, force=True, tell=heard.append)
+    planned = [event.path for event in heard if hasattr(event, "path")]
+    assert planned
+    assert all(path.is_relative_to(first) for path in planned)
+
+
+@pytest.mark.parametrize("value", [None, 5, b"trial", ["trial"]])
+def test_what_is_no_path_is_told(value):
+    """With what was given."""
+    with pytest.raises(zfcal.ZfcalError, match="is no path of a trial"):
+        zfcal.open(value)

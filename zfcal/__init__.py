@@ -7,7 +7,7 @@ the same names: the same options, the same files.
 import sys
 from importlib import import_module
 from importlib.metadata import version
-from inspect import Signature, signature
+from inspect import Parameter, Signature, signature
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from zfcal.api.extending import extend
     from zfcal.api.reporting import report
     from zfcal.api.simulating import simulate
-    from zfcal.errors import ZfcalError
+    from zfcal.errors import ZfcalError, ZfcalWarning
     from zfcal.frames import TrialTables
     from zfcal.frames import TrialTables as open  # noqa: A004, N813
 
@@ -28,6 +28,7 @@ __version__ = version("zfcal")
 _LAZY = {
     "TrialTables": ("zfcal.frames", "TrialTables"),
     "ZfcalError": ("zfcal.errors", "ZfcalError"),
+    "ZfcalWarning": ("zfcal.errors", "ZfcalWarning"),
     "analyse": ("zfcal.api.analysing", "analyse"),
     "calibrate": ("zfcal.api.calibrating", "calibrate"),
     "compare": ("zfcal.api.comparing", "compare"),
@@ -39,12 +40,15 @@ _LAZY = {
 }
 """What it exports, by the module that has it: it is loaded when it is asked for."""
 
+_BY_NAME = Parameter.KEYWORD_ONLY
+
 _PACKAGES = ("calibrate", "diagnose", "report")
 """Of these the ones that are packages as well; each is both, whatever was imported before."""
 
 __all__ = [
     "TrialTables",
     "ZfcalError",
+    "ZfcalWarning",
     "analyse",
     "calibrate",
     "compare",
@@ -73,6 +77,15 @@ def _exported(name: str) -> Any:
     return getattr(import_module(module), own)
 
 
+def _call(function: Any) -> str:
+    """Return how a function is called, an argument on a line, indented as in its docstring."""
+    found = signature(function)
+    lines = [f"        {each}," for each in map(str, found.parameters.values())]
+    first = next(i for i, each in enumerate(found.parameters.values()) if each.kind is _BY_NAME)
+    lines.insert(first, "        *,")
+    return "\n".join([f"    {function.__name__}(", *lines, f"    ) -> {found.return_annotation}"])
+
+
 class _CallablePackage(ModuleType):
     """A package that can be called, as the function of `zfcal` that has its name."""
 
@@ -84,7 +97,9 @@ class _CallablePackage(ModuleType):
 
     @property
     def __doc__(self) -> str | None:  # type: ignore[override]
-        return self._function.__doc__
+        # What `help` shows of a package has no other place for how it is called.
+        first, _, rest = (self._function.__doc__ or "").partition("\n\n")
+        return f"{first}\n\n{_call(self._function)}\n\n{rest}"
 
     @property
     def _function(self) -> Any:

@@ -14,11 +14,15 @@
 
 A message says what, where, expected and got; the hint says what to do. The
 command line alone turns these into text. Anything else that escapes is a bug.
+
+`ZfcalWarning` is no error: the work goes on.
 """
 
 from __future__ import annotations
 
+import copyreg
 from pathlib import Path
+from typing import Any
 
 
 class ZfcalError(Exception):
@@ -36,10 +40,25 @@ class ZfcalError(Exception):
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
+        self._hint = ""
         self.hint = hint
-        if hint:
-            # Who calls zfcal from Python sees it below the message.
-            self.add_note(f"hint: {hint}")
+
+    @property
+    def hint(self) -> str:
+        """What to do about it; empty where nobody knows. A reader may know more later."""
+        return self._hint
+
+    @hint.setter
+    def hint(self, hint: str) -> None:
+        # Who calls zfcal from Python sees it below the message, as a note.
+        last = f"hint: {self._hint}"
+        notes = [note for note in getattr(self, "__notes__", []) if note != last]
+        self._hint = hint
+        self.__notes__ = [*notes, f"hint: {hint}"] if hint else notes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes it again in another process: not all take a message alone."""
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
 class InputError(ZfcalError):
@@ -87,3 +106,7 @@ class LockedError(ZfcalError):
     """The same command is already at work on the same trial."""
 
     exit_code = 75
+
+
+class ZfcalWarning(UserWarning):
+    """Something was left out and the rest went on, or a result is to be read with care."""

@@ -6,6 +6,7 @@ one table. Nothing is computed or written here.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import find_trial, read_trial
 from zfcal.artifacts.tables import FOLLOWING, RULES, SCORES, STATS, TRACKS, read_table
 from zfcal.artifacts.validation import check, read_json
-from zfcal.errors import DamagedError, InputError, SchemaError
+from zfcal.errors import DamagedError, InputError, OptionError, SchemaError
 from zfcal.parameters import Parameters
 from zfcal.trial import Trial, second_of
 
@@ -72,6 +73,8 @@ class TrialTables:
     ------
     InputError
         There is no trial, or its settings are wrong.
+    OptionError
+        `trial` is no path.
 
     Examples
     --------
@@ -89,10 +92,13 @@ class TrialTables:
         on_damage: Damage | None = None,
         findings: str | Path | None = None,
     ) -> None:
-        self._trial = read_trial(find_trial(Path(trial)))
+        if not isinstance(trial, str | os.PathLike):
+            raise OptionError(f"{trial!r} is no path of a trial.")
+        # Absolute: a script may go to another folder, in which another trial has that name.
+        self._trial = read_trial(find_trial(Path(trial)).absolute())
         self._on_damage = on_damage
         usual = self.root / "diagnosis" / "findings.json"
-        self._findings = usual if findings is None else Path(findings)
+        self._findings = usual if findings is None else Path(findings).absolute()
 
     @property
     def trial(self) -> Trial:
@@ -101,7 +107,7 @@ class TrialTables:
 
     @property
     def root(self) -> Path:
-        """Its directory."""
+        """Its directory, absolute."""
         return self._trial.root
 
     def files(self, table: str) -> list[Path]:

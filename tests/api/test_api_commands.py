@@ -166,8 +166,27 @@ def test_a_comparison_is_a_table_of_its_document(here):
 def test_findings_are_those_that_were_asked_for(here):
     """In a folder of their own, or where there are none yet the usual message."""
     found = zfcal.diagnose("trial", quick=True, seed=1, out="elsewhere")
-    assert found.files("findings") == [here.__class__("elsewhere/findings.json")]
+    assert found.files("findings") == [here / "elsewhere" / "findings.json"]
     assert found.findings().attrs["verdict"] == "untestable"
-    planned = zfcal.diagnose("trial", quick=True, seed=1, dry_run=True)
-    with pytest.raises(zfcal.ZfcalError, match="nothing to read"):
-        planned.findings()
+    again = zfcal.diagnose("trial", quick=True, seed=1, out="elsewhere", dry_run=True)
+    assert again.files("findings") == found.files("findings")
+
+
+def test_a_dry_run_returns_no_findings_of_other_options(here):
+    """Those that are there answer to something else; a dry run that would make none has them."""
+    folder = here / "trial" / "diagnosis"
+    folder.mkdir()
+    (folder / "findings.json").write_text("{}")
+    assert zfcal.diagnose("trial", quick=True, seed=1, dry_run=True) is None
+
+
+@SLOW
+def test_tables_make_the_files_that_their_path_makes(here, tmp_path, monkeypatch, read_all):
+    """Byte by byte, though their paths are absolute: of a page, and of findings."""
+    twin = shutil.copytree(here, tmp_path / "twin")
+    for folder, given in ((here, str), (twin, zfcal.open)):
+        monkeypatch.chdir(folder)
+        zfcal.diagnose(given("trial"), quick=True, seed=1)
+        zfcal.report(given("trial"))
+        zfcal.report([given("trial"), given("alone")], out="both")
+    assert read_all(twin) == read_all(here)

@@ -19,9 +19,36 @@ def damaged(here):
 
 def test_what_is_left_out_is_a_warning(damaged):
     """With the file and what to do; the rest is made."""
-    with pytest.warns(UserWarning, match=damaged) as caught:
+    with pytest.warns(zfcal.ZfcalWarning, match=damaged) as caught:
         zfcal.analyse("trial", force=True)
     assert len(caught) >= 1
+
+
+@pytest.mark.parametrize("function", [zfcal.analyse, zfcal.diagnose])
+def test_each_call_warns_where_it_stands(damaged, function):
+    """The second call as the first, each text once in a call; also of a package."""
+    found = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        for _ in range(2):
+            function("trial", dry_run=True)
+            found.append([(str(each.message), each.category, each.filename) for each in caught])
+            caught.clear()
+    assert found[0] == found[1]
+    assert len(set(found[0])) == len(found[0]) >= 1
+    assert {(kind, file) for _, kind, file in found[0]} == {(zfcal.ZfcalWarning, __file__)}
+    assert any(damaged in text for text, _, _ in found[0])
+
+
+def test_warnings_can_be_refused_or_hidden_by_their_kind(damaged):
+    """A filter of one's own comes first."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", zfcal.ZfcalWarning)
+        zfcal.analyse("trial", dry_run=True)
+        warnings.simplefilter("error", zfcal.ZfcalWarning)
+        with pytest.raises(zfcal.ZfcalWarning, match=damaged):
+            zfcal.analyse("trial", dry_run=True)
 
 
 def test_who_hears_of_it_needs_no_warning(damaged):

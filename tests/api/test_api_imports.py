@@ -6,6 +6,7 @@ import importlib
 import inspect
 import os
 import pickle
+import pydoc
 import subprocess
 import sys
 from pathlib import Path
@@ -61,9 +62,39 @@ def test_a_package_that_is_called_is_the_function(here):
         package = getattr(zfcal, name)
         assert inspect.ismodule(package)
         assert inspect.signature(package) == inspect.signature(function)
-        assert inspect.getdoc(package) == inspect.getdoc(function)
+        first, _, rest = inspect.getdoc(function).partition("\n\n")
+        assert inspect.getdoc(package).startswith(f"{first}\n\n{name}(\n")
+        assert inspect.getdoc(package).endswith(rest)
         with pytest.raises(TypeError, match=rf"{name}\(\) got an unexpected keyword"):
             package("trial", generatons=3)
+
+
+@pytest.mark.parametrize("name", ["calibrate", "diagnose", "report"])
+def test_help_of_a_package_shows_how_it_is_called(name):
+    """Every argument with its default; its synopsis stays the first line."""
+    text = pydoc.render_doc(getattr(zfcal, name), renderer=pydoc.plaintext)
+    for argument in inspect.signature(getattr(zfcal, name)).parameters.values():
+        assert f"        {argument},\n" in text
+    first = inspect.getdoc(getattr(zfcal, name)).splitlines()[0]
+    assert f"zfcal.{name} - {first}" in text
+
+
+HINTS = """
+import sys, typing
+from importlib import import_module
+from zfcal import _LAZY
+for name in %r:
+    module, own = _LAZY[name]
+    typing.get_type_hints(getattr(import_module(module), own))
+    print(name)
+"""
+
+
+def test_types_are_known_while_a_program_runs():
+    """Frameworks ask for them, in a process that has loaded nothing else."""
+    code = HINTS % (FUNCTIONS,)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout.split(), done.stderr) == (list(FUNCTIONS), "")
 
 
 def test_every_function_that_is_a_package_is_known():
@@ -82,7 +113,9 @@ def test_functions_go_to_other_processes():
 
 def test_the_package_exports_these_alone():
     """And loads nothing that is heavy."""
-    assert sorted([*FUNCTIONS, "TrialTables", "ZfcalError", "open"]) == sorted(zfcal.__all__)
+    assert sorted([*FUNCTIONS, "TrialTables", "ZfcalError", "ZfcalWarning", "open"]) == sorted(
+        zfcal.__all__
+    )
     code = (
         "import sys, time; began = time.perf_counter(); import zfcal; dir(zfcal); "
         "took = time.perf_counter() - began; "
@@ -120,6 +153,9 @@ def test_mypy_types_the_functions(tmp_path):
         'reveal_type(zfcal.diagnose(zfcal.open("trial"), quick=True).findings())\n'
         'reveal_type(zfcal.simulate("new", model="m.toml", duration="2min"))\n'
         'reveal_type(zfcal.compare("a", against=["b"], out="c", dry_run=bool(PAGE)))\n'
+        'reveal_type(zfcal.diagnose("trial", dry_run=bool(PAGE)))\n'
+        "from zfcal.calibrate.task import Settings\n"
+        "reveal_type(Settings.__name__)\n"
         'zfcal.calibrate("trial", generatons=3)\n'
         'zfcal.diagnose("trial", null_replicates=40)\n'
     )
@@ -139,9 +175,11 @@ def test_mypy_types_the_functions(tmp_path):
         "pandas.core.frame.DataFrame",
         "zfcal.frames.TrialTables",
         "pandas.core.frame.DataFrame | None",
+        "zfcal.frames.TrialTables | None",
+        "str",
     ]
     errors = [line for line in lines if " error: " in line]
-    assert [line.partition(":")[0] for line in errors] == ["10", "11"], done.stdout
+    assert [line.partition(":")[0] for line in errors] == ["13", "14"], done.stdout
 
 
 EXAMPLES = [

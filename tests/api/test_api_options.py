@@ -9,7 +9,6 @@ import typing
 
 import click
 import numpy as np
-import pandas as pd
 import pytest
 
 import zfcal
@@ -19,7 +18,6 @@ from zfcal.api.diagnosing import diagnosis_of
 from zfcal.api.extending import extension_of
 from zfcal.api.simulating import simulation_of
 from zfcal.errors import OptionError
-from zfcal.frames import TrialTables
 from zfcal.stages.events import say_nothing
 from zfcal_cli.main import group
 
@@ -100,7 +98,7 @@ def test_the_words_of_an_option_are_those_of_the_argument(name):
     function = getattr(zfcal, name)
     module, own = zfcal._LAZY[name]
     function = getattr(importlib.import_module(module), own)
-    hints = typing.get_type_hints(function, localns={"TrialTables": TrialTables, "pd": pd})
+    hints = typing.get_type_hints(function)
     for key, option in options_of(group.get_command(None, name)).items():
         words = literals(hints[key])
         if isinstance(option.type, click.Choice):
@@ -273,7 +271,7 @@ def literals(hint):
         ("simulate", {**MODEL, "duration": 0}, "--duration: 0 is no positive time"),
         ("simulate", {**MODEL, "model": "nowhere.toml"}, "does not exist"),
         ("simulate", {**MODEL, "look": "hard"}, "--look is about images"),
-        ("simulate", {**MODEL, "video": True, "draw": "noise_grey=x"}, "--draw takes NAME=VALUE"),
+        ("simulate", {**MODEL, "video": True, "draw": "noise_grey=x"}, "takes NAME=VALUE"),
         ("simulate", {**MODEL, "robot": True, "robots": 2}, "--robot means one robot"),
         ("simulate", {**MODEL, "fps": 0}, "--fps: 0 is not above 0"),
         ("compare", {"against": "alone", "force": True}, "--force is about the files of --out"),
@@ -332,3 +330,168 @@ def test_calls_in_the_documentation_are_possible(repository):
         given = {keyword.arg: None for keyword in call.keywords}
         inspect.signature(function).bind(*call.args, **given)
     assert len(calls) >= 8
+
+
+FLAGS = {
+    "analyse": ("dry_run", "force"),
+    "calibrate": (
+        *("seed_likelihood", "as_published", "renewal", "baselines"),
+        *("dry_run", "force"),
+    ),
+    "diagnose": ("quick", "dry_run", "force"),
+    "extend": ("dry_run", "force"),
+    "simulate": ("robot", "video", "dry_run", "force"),
+    "report": ("dry_run", "force"),
+    "compare": ("dry_run", "force"),
+}
+"""Of each function what is yes or no."""
+
+FOR_NEEDED = {"simulate": MODEL, "compare": {"against": "alone"}}
+
+
+def test_every_option_that_is_yes_or_no_is_known():
+    """As the types of the arguments say."""
+    for name in FUNCTIONS:
+        function = getattr(importlib.import_module(zfcal._LAZY[name][0]), name)
+        hints = typing.get_type_hints(function)
+        assert {key for key, hint in hints.items() if hint in {bool, bool | None}} == {*FLAGS[name]}
+
+
+@pytest.mark.parametrize("value", ["no", "", 0, 1, [], np.int64(1)])
+@pytest.mark.parametrize(("name", "flag"), [(name, key) for name in FLAGS for key in FLAGS[name]])
+def test_what_is_neither_yes_nor_no_is_refused(name, flag, value, here, read_all):
+    """A text counts as yes in Python, also ``no``."""
+    before = read_all(here)
+    with pytest.raises(OptionError, match="is neither True nor False") as caught:
+        getattr(zfcal, name)("trial", **{**FOR_NEEDED.get(name, {}), flag: value})
+    assert str(caught.value).startswith(f"--{flag.replace('_', '-')}: {value!r}")
+    assert read_all(here) == before
+
+
+def test_yes_and_no_of_numpy_are_yes_and_no(here):
+    """As the plain ones, not as objects that happen to be true."""
+    options, _ = chosen("calibrate", renewal=np.False_, baselines=np.True_)
+    assert options.settings.renews is False
+    assert options.baselines is True
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        *(("calibrate", {key: True}) for key in ("budget", "generations", "seed", "workers")),
+        ("calibrate", {"window": (False, True), "out": "x"}),
+        ("diagnose", {"noise_mm": True}),
+        ("simulate", {**MODEL, "duration": np.True_}),
+    ],
+)
+def test_yes_is_no_number(name, options, here):
+    """Though it counts as one in Python."""
+    with pytest.raises(OptionError, match=r"True_?\)? is no |is no stretch"):
+        getattr(zfcal, name)("trial", **options)
+
+
+@pytest.mark.parametrize(
+    "window",
+    [
+        (np.int64(0), np.int32(120)),
+        [0, 120],
+        np.array([0, 120]),
+        np.array([0.0, 120.0]),
+        (np.float64(0), 120.0),
+    ],
+)
+def test_a_stretch_may_be_of_numbers_of_numpy(window, here):
+    """They stand in lineage as plain ones."""
+    _, span = chosen("calibrate", window=window, out="x.toml")
+    assert span.train_s == (0, 120)
+    assert [type(second) for second in span.train_s] == [int, int]
+
+
+WRONG = [
+    *(("analyse", {"control": value}, "--control") for value in (None, 5, [5])),
+    *(("analyse", {"features": value}, "--features") for value in (5, ["residence", 3])),
+    *(("analyse", {"scoring": value}, "--scoring") for value in (None, 3)),
+    *(("calibrate", {"window": value, "out": "x"}, "--window") for value in (120, (None, 120))),
+    *(("calibrate", {"window": "0:9", "out": value}, "--out") for value in (5, b"x")),
+    *(
+        ("calibrate", {"budget": value}, "--budget")
+        for value in ([50], np.timedelta64(50, "ms"), np.array([50, 60]), 10**400)
+    ),
+    *(
+        ("calibrate", {key: None}, f"--{key}")
+        for key in ("population", "runs", "steps", "sampler", "features")
+    ),
+    ("calibrate", {"model": 5}, "--model"),
+    ("calibrate", {"cluster": 5}, "--cluster"),
+    ("calibrate", {"features": 5}, "--features"),
+    ("diagnose", {"noise_mm": [1]}, "--noise-mm"),
+    ("diagnose", {"quick": None}, "--quick"),
+    ("diagnose", {"out": 5}, "--out"),
+    *(("extend", {"effect": value}, "--effect") for value in (None, 3, [3])),
+    ("extend", {"findings": 3}, "--findings"),
+    *(("simulate", {**MODEL, "duration": value}, "--duration") for value in (None, [60])),
+    *(("simulate", {**MODEL, "model": value}, "--model") for value in (None, 5)),
+    *(
+        ("simulate", {**MODEL, "draw": value, "video": True}, "--draw")
+        for value in (None, 5, [("noise_grey", 4)])
+    ),
+    ("simulate", {**MODEL, "arena": ["ring"]}, "--arena"),
+    ("simulate", {**MODEL, "video_file": 5}, "--video-file"),
+    ("report", {"out": 3}, "--out"),
+    ("compare", {"against": "alone", "out": 3}, "--out"),
+    *((name, {**FOR_NEEDED.get(name, {}), "tell": 5}, "tell: 5") for name in FUNCTIONS),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "says"), WRONG)
+def test_a_value_of_another_type_is_refused_by_its_name(name, options, says, here, read_all):
+    """On one line, with what it got; Python's own errors would say neither."""
+    before = read_all(here)
+    with pytest.raises(OptionError, match=says) as caught:
+        getattr(zfcal, name)("trial", **options)
+    assert "\n" not in str(caught.value)
+    assert read_all(here) == before
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("trial", [None, 5, b"trial", ["trial", 5]])
+def test_what_cannot_be_a_trial_is_refused(name, trial, here):
+    """What is given is named; of several for a function that takes one as well."""
+    with pytest.raises(OptionError, match="neither the path of a trial nor its tables") as caught:
+        getattr(zfcal, name)(trial, **FOR_NEEDED.get(name, {}))
+    assert repr(trial) in str(caught.value) or "5 is neither" in str(caught.value)
+
+
+def test_several_trials_are_too_many_for_most(here):
+    """The message says what was given, the hint what to do."""
+    with pytest.raises(OptionError, match=r"\['trial', 'alone'\] is neither") as caught:
+        zfcal.analyse(["trial", "alone"])
+    assert "loop" in caught.value.hint
+
+
+def test_a_long_value_is_cut_in_the_message(here):
+    """A table given by mistake does not fill the screen."""
+    with pytest.raises(OptionError) as caught:
+        zfcal.analyse(zfcal.open("trial").tracks())
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 150
+
+
+def test_effects_may_stand_in_one_text(here):
+    """With commas, as other lists of names; each once."""
+    assert chosen("extend", effect="alignment, turning-bias").names == (
+        "alignment",
+        "turning-bias",
+    )
+    assert chosen("extend", effect=["alignment", "alignment"]).names == ("alignment",)
+
+
+def test_a_trial_that_is_named_twice_counts_once(here):
+    """However it is spelt; on both sides of a comparison it is refused."""
+    (here / "link").symlink_to(here / "trial")
+    spelt = ["trial", "./trial", here / "trial", zfcal.open("trial"), "link", "trial/tracks"]
+    assert str(zfcal.report(spelt, dry_run=True)) == "trial/report/index.html"
+    found = zfcal.compare(spelt, against=["alone", "./alone"])
+    assert found[["n_a", "n_b"]].max().tolist() == [1, 1]
+    with pytest.raises(zfcal.ZfcalError, match="is in both sets"):
+        zfcal.compare("trial", against=here / "trial")

@@ -42,7 +42,7 @@ def test_the_notebook_finds_what_was_hidden(notebook, tmp_path, monkeypatch, chi
     assert said.splitlines()[0] == "named"
     assert "alignment" in said
     gap = text_of(notebook, "zfcal.extend(")
-    assert gap.splitlines()[0] == "recording/models/extended.toml"
+    assert gap.splitlines()[0] == str(tmp_path / "recording" / "models" / "extended.toml")
     (row,) = [line.split() for line in gap.splitlines() if line.startswith("nats_per_step")]
     before_nats, after_nats = float(row[1]), float(row[2])
     assert after_nats > before_nats

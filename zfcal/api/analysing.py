@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+from zfcal.api import tables
 from zfcal.api.trials import TrialPath, heard_by, paths_of, tables_of, task_of, work_of
 from zfcal.api.values import Names, existing, names, one_of, taken
 from zfcal.errors import OptionError
@@ -15,9 +16,6 @@ from zfcal.stages.analyse.analyse import analyse as analyse_trial
 from zfcal.stages.events import Tell
 from zfcal.stages.segments import Segments
 from zfcal.stages.streams import Work
-
-if TYPE_CHECKING:
-    from zfcal.frames import TrialTables
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,9 +55,8 @@ def analysis_of(options: Mapping[str, Any]) -> Analysis:
     OptionError
         One has another form, or could not take effect.
     """
-    asked = taken(
-        options, {"control": _controls, "scoring": one_of("paper", "legacy"), "features": names}
-    )
+    needed = {"control": _controls, "scoring": one_of("paper", "legacy")}
+    asked = taken(options, {"features": names}, needed=needed)
     features = asked["features"]
     chosen = AnalyseOptions(
         scoring=asked["scoring"], control=asked["control"], features=features or ()
@@ -82,7 +79,7 @@ def analyse(
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables:
+) -> tables.TrialTables:
     """Make statistics and scores of each window of 120 s, every 60 s: ``zfcal analyse``.
 
     Writes ``stats/E.parquet``, ``stats/E-following.parquet`` and ``scores/E.parquet`` for each

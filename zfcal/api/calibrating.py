@@ -6,20 +6,17 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+from zfcal.api import tables
 from zfcal.api.rounds import round_options
 from zfcal.api.trials import TrialPath, heard_by, tables_of, task_of, work_of
-from zfcal.api.values import Names, PathLike, Stretch, Time, span, taken
+from zfcal.api.values import Names, PathLike, Stretch, Time, place, span, taken, text
 from zfcal.stages.calibrate.calibrate import calibrate as calibrate_trial
 from zfcal.stages.calibrate.holdout import Span, calibrate_span
 from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.streams import Work
-
-if TYPE_CHECKING:
-    from zfcal.frames import TrialTables
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +65,8 @@ def calibration_of(options: Mapping[str, Any], tell: Tell) -> Iterator[Calibrati
     InputError
         There is no cluster at the address.
     """
-    asked = taken(options, {"window": span, "held_out": span, "out": Path})
+    how = {"window": span, "held_out": span, "out": place, "cluster": text}
+    asked = taken(options, how)
     chosen, pooled = round_options(asked), None
     if asked["window"] is not None:
         pooled = Span(train_s=asked["window"], held_out_s=asked["held_out"], output=asked["out"])
@@ -112,7 +110,7 @@ def calibrate(
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables:
+) -> tables.TrialTables:
     """Find the model that comes nearest to each window of a trial: ``zfcal calibrate``.
 
     Writes ``models/E.toml``, ``models/E.parquet``, ``scores/E-model.parquet`` and

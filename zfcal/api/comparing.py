@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import Any, Literal, TypeAlias, overload
 
-from zfcal.api.reporting import tell_damage
+from zfcal.api import tables
+from zfcal.api.reporting import each_once, tell_damage
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
-from zfcal.api.values import PathLike, one_of, taken
+from zfcal.api.values import PathLike, one_of, place, taken
 from zfcal.errors import OptionError
 from zfcal.report.comparison.compare import (
     DOCUMENT,
@@ -23,9 +24,6 @@ from zfcal.report.comparison.table import missing_lines, statements
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
 from zfcal.stages.trial_context import at_work
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Trials: TypeAlias = TrialPath | Iterable[TrialPath]
 
@@ -46,7 +44,7 @@ def comparison_of(options: Mapping[str, Any]) -> dict[str, Any]:
     OptionError
         One has another form, or is about files where none is written.
     """
-    asked = taken(options, {"out": Path, "format": one_of("png", "svg")})
+    asked = taken(options, {"out": place, "format": one_of("png", "svg")})
     for name in _OF_FILES:
         if asked[name] and asked["out"] is None:
             word = name.replace("_", "-")
@@ -73,7 +71,7 @@ def compare_sets(
     dict or None
         Fits ``schemas/compare.schema.json``; None in a dry run that would make it.
     """
-    sets = Sets(a=roots[0], b=roots[1])
+    sets = Sets(a=each_once(roots[0]), b=each_once(roots[1]))
     if asked["out"] is None:
         return settled(lambda: compare_trials(sets, tell_damage(tell)), tell)
     with at_work(roots[0][0], "compare", task_of(asked)):
@@ -116,7 +114,7 @@ def compare(
     dry_run: Literal[False] = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> pd.DataFrame: ...
+) -> tables.DataFrame: ...
 @overload
 def compare(
     trials: Trials,
@@ -127,7 +125,7 @@ def compare(
     dry_run: bool,
     force: bool = False,
     tell: Tell | None = None,
-) -> pd.DataFrame | None: ...
+) -> tables.DataFrame | None: ...
 def compare(
     trials: Trials,
     *,
@@ -137,7 +135,7 @@ def compare(
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> pd.DataFrame | None:
+) -> tables.DataFrame | None:
     """Compare two sets of trials: differences with intervals, and tests: ``zfcal compare``.
 
     A trial counts once, however long it is. With fewer than four trials on a side nothing is
@@ -146,7 +144,8 @@ def compare(
     Parameters
     ----------
     trials
-        Set A: one trial or several, directories or their tables.
+        Set A: one trial or several, directories or their tables. One that is named twice counts
+        once.
     against
         Set B.
     out
@@ -177,7 +176,7 @@ def compare(
     OptionError
         An option has another form, or is about files where none is written.
     InputError
-        A set is empty, one is no trial, or a trial would count twice.
+        A set is empty, one is no trial, or one is in both sets.
     StorageError
         The disk is full, or the place cannot be written.
     LockedError
@@ -200,7 +199,7 @@ def compare(
     return _table(document)
 
 
-def _table(document: dict[str, Any]) -> pd.DataFrame:
+def _table(document: dict[str, Any]) -> tables.DataFrame:
     import pandas as pd
 
     rows = [_columns(row) for row in document["statistics"]]

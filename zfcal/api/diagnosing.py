@@ -5,10 +5,22 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, overload
 
+from zfcal.api import tables
 from zfcal.api.trials import TrialPath, heard_by, tables_of, task_of, work_of
-from zfcal.api.values import PathLike, Stretch, existing, number, one_of, span, taken, whole
+from zfcal.api.values import (
+    PathLike,
+    Stretch,
+    existing,
+    flag,
+    number,
+    one_of,
+    place,
+    span,
+    taken,
+    whole,
+)
 from zfcal.diagnose.document import read_document
 from zfcal.errors import OptionError
 from zfcal.report.diagnosis.render_pool import RenderPool
@@ -18,9 +30,6 @@ from zfcal.stages.diagnose.diagnose import diagnose as diagnose_trial
 from zfcal.stages.diagnose.findings import FILE
 from zfcal.stages.events import Event, Note, Result, Tell
 
-if TYPE_CHECKING:
-    from zfcal.frames import TrialTables
-
 _FORMS = {
     "model": existing,
     "null_replicates": one_of(39, 199),
@@ -28,7 +37,7 @@ _FORMS = {
     "window": span,
     "seed": whole(0),
     "workers": whole(1),
-    "out": Path,
+    "out": place,
 }
 
 
@@ -45,7 +54,7 @@ def diagnosis_of(options: Mapping[str, Any]) -> DiagnoseOptions:
     OptionError
         One has another form, or could not take effect.
     """
-    asked = taken(options, _FORMS)
+    asked = taken(options, _FORMS, needed={"quick": flag})
     n_null, noise_mm = asked["null_replicates"], asked["noise_mm"]
     if asked["quick"] and n_null is not None:
         raise OptionError("--quick simulates no null: leave out --null-replicates, or --quick.")
@@ -86,6 +95,38 @@ def tell_findings(tell: Tell, root: Path, event: Event, *, in_words: bool = True
         tell(Note(text=f"{root}: {verdict_sentence(findings)}."))
 
 
+@overload
+def diagnose(
+    trial: TrialPath,
+    *,
+    model: PathLike | None = None,
+    null_replicates: Literal[39, 199] | None = None,
+    quick: bool = False,
+    noise_mm: float | None = None,
+    window: Stretch | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    out: PathLike | None = None,
+    dry_run: Literal[False] = False,
+    force: bool = False,
+    tell: Tell | None = None,
+) -> tables.TrialTables: ...
+@overload
+def diagnose(
+    trial: TrialPath,
+    *,
+    model: PathLike | None = None,
+    null_replicates: Literal[39, 199] | None = None,
+    quick: bool = False,
+    noise_mm: float | None = None,
+    window: Stretch | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    out: PathLike | None = None,
+    dry_run: bool,
+    force: bool = False,
+    tell: Tell | None = None,
+) -> tables.TrialTables | None: ...
 def diagnose(
     trial: TrialPath,
     *,
@@ -100,7 +141,7 @@ def diagnose(
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables:
+) -> tables.TrialTables | None:
     """Find the effect that a model misses: ``zfcal diagnose``.
 
     Writes ``diagnosis/findings.json`` with pictures and ``report.html``, unless they are up to
@@ -140,7 +181,8 @@ def diagnose(
     -------
     TrialTables
         Of the trial. ``findings()`` are those that were asked for: a row per effect and parameter,
-        none where no effect is missing; ``attrs["verdict"]`` is the verdict.
+        none where no effect is missing; ``attrs["verdict"]`` is the verdict. None in a dry run that
+        would make them: those that are there answer to something else.
 
     Raises
     ------
@@ -169,4 +211,6 @@ def diagnose(
     # Processes of its own would import the script that calls this once more.
     with RenderPool(ahead=False) as pool:
         made = diagnose_trial(root, chosen, hears, task=task, draw=pool)
+    if made is None and task.dry_run:
+        return None
     return tables_of(root, made or open_case(root, chosen).folder / FILE)

@@ -9,7 +9,7 @@ from typing import Any
 
 from zfcal.api.diagnosing import tell_findings
 from zfcal.api.trials import TrialPath, heard_by, task_of, work_of
-from zfcal.api.values import Names, PathLike, Time, existing, seconds, several, taken, whole
+from zfcal.api.values import Names, PathLike, Time, existing, place, seconds, several, taken, whole
 from zfcal.calibrate.task import Settings
 from zfcal.errors import OptionError
 from zfcal.report.diagnosis.render_pool import RenderPool
@@ -20,15 +20,14 @@ from zfcal.stages.extend.extend import extend as extend_trial
 from zfcal.stages.trial_context import Task
 
 _FORMS = {
-    "effect": several,
     "findings": existing,
     "generations": whole(0),
     "budget": seconds,
-    "population": whole(4),
     "seed": whole(0),
     "workers": whole(1),
-    "out": Path,
+    "out": place,
 }
+_NEEDED = {"effect": several, "population": whole(4)}
 
 
 def extension_of(options: Mapping[str, Any]) -> ExtendOptions:
@@ -44,7 +43,7 @@ def extension_of(options: Mapping[str, Any]) -> ExtendOptions:
     OptionError
         One has another form, or two contradict each other.
     """
-    asked = taken(options, _FORMS)
+    asked = taken(options, _FORMS, needed=_NEEDED)
     if asked["generations"] is not None and asked["budget"] is not None:
         raise OptionError("A calibration ends after --generations or with its --budget: give one.")
     calibration = CalibrateOptions(

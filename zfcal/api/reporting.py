@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
-from zfcal.api.values import PathLike
+from zfcal.api.values import PathLike, place, taken
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
@@ -43,6 +43,7 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
     """
     if not roots:
         raise InputError("A report needs at least one trial.")
+    roots = each_once(roots)
     folder = _TOGETHER if out is None and len(roots) > 1 else out
 
     def work() -> None:
@@ -61,6 +62,11 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
     with at_work(roots[0], "report", task):
         settled(work, tell)
     return (folder or roots[0] / "report") / PAGE
+
+
+def each_once(roots: Sequence[Path]) -> list[Path]:
+    """Return the directories of trials, each once, however it is spelt."""
+    return list({root.resolve(): root for root in reversed(roots)}.values())[::-1]
 
 
 def tell_damage(tell: Tell) -> Callable[[DamagedError], None]:
@@ -84,7 +90,7 @@ def report(
     Parameters
     ----------
     trials
-        One trial or several: directories, or their tables.
+        One trial or several: directories, or their tables. One that is named twice counts once.
     out
         Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``.
     dry_run
@@ -102,8 +108,10 @@ def report(
 
     Raises
     ------
+    OptionError
+        An option has another form.
     InputError
-        One is no trial, a trial is named twice, or their arenas have other zones.
+        There is none, one is no trial, or their arenas have other zones.
     StorageError
         The disk is full, or the place cannot be written.
     LockedError
@@ -115,5 +123,5 @@ def report(
     >>> print(zfcal.report("trial"))
     trial/report/index.html
     """
-    folder = None if out is None else Path(out)
-    return write_page(roots_of(trials), folder, heard_by(tell), task=task_of(locals()))
+    asked, hears = taken(locals(), {"out": place}), heard_by(tell)
+    return write_page(roots_of(trials), asked["out"], hears, task=task_of(asked))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from zfcal.api.values import existing, names, one_of, seconds, taken, whole
+from zfcal.api.values import existing, flag, names, one_of, seconds, taken, whole
 from zfcal.behaviour.features.registry import SCORED, further
 from zfcal.calibrate.task import Settings
 from zfcal.errors import OptionError
@@ -22,17 +22,23 @@ CHAMPIONS: dict[str, Any] = {
 _FORMS = {
     "generations": whole(0),
     "budget": seconds,
-    "population": whole(4),
-    "runs": whole(1),
-    "steps": whole(1),
     "optimiser": one_of("zfcal", "deap"),
     "model": existing,
     "publish": one_of("forward", "score", "likelihood"),
     "confirm": whole(0),
     "diversity": one_of("merged", "population"),
-    "sampler": one_of("exact", "grid"),
     "seed": whole(0),
     "workers": whole(1),
+    "seed_likelihood": flag,
+    "renewal": flag,
+}
+_NEEDED = {
+    "population": whole(4),
+    "runs": whole(1),
+    "steps": whole(1),
+    "sampler": one_of("exact", "grid"),
+    "as_published": flag,
+    "baselines": flag,
     "features": names,
 }
 
@@ -51,7 +57,7 @@ def round_options(options: Mapping[str, Any]) -> CalibrateOptions:
     OptionError
         One has another form, two contradict each other, or one could not take effect.
     """
-    asked = _as_published(taken(options, _FORMS))
+    asked = _as_published(taken(options, _FORMS, needed=_NEEDED))
     _check_together(asked)
     publish, window = published_by(asked), asked.get("window")
     settings = Settings(

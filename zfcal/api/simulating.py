@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
+from zfcal.api import tables
 from zfcal.api.trials import TrialPath, heard_by, path_of, tables_of, task_of
-from zfcal.api.values import PathLike, Time, existing, number, one_of, seconds, taken, whole
+from zfcal.api.values import (
+    PathLike,
+    Time,
+    existing,
+    flag,
+    number,
+    one_of,
+    place,
+    seconds,
+    shown,
+    taken,
+    whole,
+)
 from zfcal.errors import OptionError
 from zfcal.stages.events import Tell
 from zfcal.stages.simulate import SimulateOptions
@@ -16,7 +30,6 @@ from zfcal.stages.simulate import simulate as simulate_trial
 from zfcal.trial import CONFIG_NAME
 
 if TYPE_CHECKING:
-    from zfcal.frames import TrialTables
     from zfcal.virtual.film import FilmOptions
 
 Changes: TypeAlias = str | Iterable[str] | Mapping[str, Any]
@@ -24,17 +37,53 @@ Changes: TypeAlias = str | Iterable[str] | Mapping[str, Any]
 
 LookName: TypeAlias = Literal["clean", "usual", "hard"]
 
+
+def _arena(value: PathLike) -> str:
+    place(value)
+    # As it was typed: the name of one, or a path.
+    return os.fspath(value)
+
+
+def _changes(asked: Changes) -> dict[str, Any]:
+    if isinstance(asked, Mapping):
+        return dict(asked)
+    texts = (asked,) if isinstance(asked, str) else asked
+    if not isinstance(texts, Iterable):
+        raise OptionError(f"{shown(asked)} is neither NAME=VALUE nor values by their names.")
+    return dict(map(_change, texts))
+
+
+def _change(text: Any) -> tuple[str, Any]:
+    if not isinstance(text, str):
+        raise OptionError(f"{shown(text)} is no text such as noise_grey=4.")
+    name, _, value = text.partition("=")
+    try:
+        if value == "none":
+            return name, None
+        if name == "jpeg_quality":
+            return name, int(value)
+        numbers = tuple(map(float, value.split(",")))
+    except ValueError:
+        raise OptionError(f"each takes NAME=VALUE with a number, got {text!r}.") from None
+    return name, numbers if len(numbers) > 1 else numbers[0]
+
+
 _FORMS: dict[str, Callable[[Any], Any]] = {
-    "model": existing,
-    "duration": seconds,
     "seed": whole(0),
-    "arena": str,
+    "arena": _arena,
     "fish": whole(0),
     "robots": whole(0),
     "fps": number(low=0, is_open=True),
-    "video_file": Path,
+    "video_file": place,
     "look": one_of("clean", "usual", "hard"),
     "photograph": existing,
+}
+_NEEDED: dict[str, Callable[[Any], Any]] = {
+    "model": existing,
+    "duration": seconds,
+    "robot": flag,
+    "video": flag,
+    "draw": _changes,
 }
 
 
@@ -81,7 +130,7 @@ def simulation_of(options: Mapping[str, Any]) -> Simulation:
     OptionError
         One has another form, two contradict each other, or one could not take effect.
     """
-    asked = taken(options, _FORMS)
+    asked = taken(options, _FORMS, needed=_NEEDED)
     chosen = SimulateOptions(
         model=asked["model"],
         duration_s=asked["duration"],
@@ -108,7 +157,7 @@ def _film(asked: Mapping[str, Any]) -> FilmOptions | None:
         from zfcal.virtual.images.look import USUAL, look_of
 
         return FilmOptions(
-            look=look_of(asked["look"] or USUAL, _changes(asked["draw"])),
+            look=look_of(asked["look"] or USUAL, asked["draw"]),
             photograph=asked["photograph"],
             seed=asked["seed"],
             video=asked["video_file"],
@@ -117,26 +166,6 @@ def _film(asked: Mapping[str, Any]) -> FilmOptions | None:
         name = next(name for name, value in given.items() if value)
         raise OptionError(f"{name} is about images: add --video.")
     return None
-
-
-def _changes(asked: Changes) -> dict[str, Any]:
-    if isinstance(asked, Mapping):
-        return dict(asked)
-    texts = (asked,) if isinstance(asked, str) else asked
-    return dict(map(_change, texts))
-
-
-def _change(text: str) -> tuple[str, Any]:
-    name, _, value = text.partition("=")
-    try:
-        if value == "none":
-            return name, None
-        if name == "jpeg_quality":
-            return name, int(value)
-        numbers = tuple(map(float, value.split(",")))
-    except ValueError:
-        raise OptionError(f"--draw takes NAME=VALUE with a number, got {text!r}.") from None
-    return name, numbers if len(numbers) > 1 else numbers[0]
 
 
 @overload
@@ -159,7 +188,7 @@ def simulate(
     dry_run: Literal[False] = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables: ...
+) -> tables.TrialTables: ...
 @overload
 def simulate(
     trial: TrialPath,
@@ -180,7 +209,7 @@ def simulate(
     dry_run: bool,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables | None: ...
+) -> tables.TrialTables | None: ...
 def simulate(
     trial: TrialPath,
     *,
@@ -200,7 +229,7 @@ def simulate(
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
-) -> TrialTables | None:
+) -> tables.TrialTables | None:
     """Simulate fish that a model drives, and what cameras see of them: ``zfcal simulate``.
 
     A trial that does not exist is made, at the model's own step (with images: at 15 Hz or so),
