@@ -90,6 +90,7 @@ for name in %r:
 """
 
 
+@pytest.mark.slow
 def test_types_are_known_while_a_program_runs():
     """Frameworks ask for them, in a process that has loaded nothing else."""
     code = HINTS % (FUNCTIONS,)
