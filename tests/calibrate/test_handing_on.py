@@ -12,6 +12,7 @@ from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
+    LONG_RUNS,
     MEMORY,
     NEAREST,
     RULES,
@@ -50,7 +51,7 @@ def later(guided):
             for end in (240, 300, 360)
             for rule, score in scores.items()
         )
-        record = Record(rows=rows, models=(in_use,), n_rounds=3, in_use=in_use)
+        record = Record(rows=rows, models=(in_use,), n_rounds=3, in_use=in_use, by=LONG_RUNS)
         return replace(guided, record=record, seeds=replace(guided.seeds, window_end_s=420))
 
     return make

@@ -13,13 +13,16 @@ from zfcal.calibrate.rules import (
     COMPROMISE,
     KEEP,
     LIKELIHOOD,
+    LONG_RUNS,
     MADE,
     MEMORY,
     NEAREST,
     RULES,
     SAYS,
     SCORE,
+    START,
     Candidate,
+    Followed,
     Forward,
     Lead,
     Record,
@@ -180,7 +183,33 @@ def test_a_lead_is_held_against_the_noise_of_leads():
     """That of S is much larger, and counts only as long as no window has told the other one."""
     record = record_of({NEAREST: [0.7] * 5, MEMORY: [0.75] * 5})
     assert record.choose([NEAREST, MEMORY], 0.2).rule == NEAREST
-    assert replace(record, lead_noise=0.01).choose([NEAREST, MEMORY], 0.2).rule == MEMORY
+    assert replace(record, lead_noises=(0.01,)).choose([NEAREST, MEMORY], 0.2).rule == MEMORY
+
+
+def test_scores_of_two_kinds_are_never_in_one_record():
+    """A window without a start judges nothing; the first with one begins anew."""
+    record = Record(models=tuple(model(SCORE, end) for end in (120, 240)))
+    long = Followed(scores=(0.7,), noise=NOISE, by=LONG_RUNS)
+    start = Followed(scores=(0.9,), noise=NOISE, by=START, lead_noise=0.02)
+    first = record.judged(long, end_s=240, n=9)
+    assert [found.S for found in first.rows] == [0.7]
+    assert math.isnan(first.lead_noise)
+    then = first.judged(start, end_s=360, n=9)
+    assert [(found.S, found.window_end_s) for found in then.rows] == [(0.9, 360)]
+    assert (then.by, then.lead_noise) == (START, pytest.approx(0.02))
+    more = replace(then, models=(*then.models, model(SCORE, 360)))
+    assert more.judged(long, end_s=480, n=9) is more
+    last = more.judged(replace(start, lead_noise=0.04), end_s=540, n=9)
+    assert len(last.rows) == 2
+    assert last.lead_noise == pytest.approx(math.sqrt((0.02**2 + 0.04**2) / 2))
+
+
+def test_a_score_from_a_start_may_exceed_one():
+    """Its interval is not cut there; that of an S is."""
+    record = Record(models=(model(SCORE, 120),))
+    for by, high in ((START, 1.078), (LONG_RUNS, 1.0)):
+        (found,) = record.judged(Followed(scores=(0.98,), noise=0.05, by=by), end_s=240, n=9).rows
+        assert found.high == pytest.approx(high)
 
 
 def test_means_leave_out_what_has_no_number():

@@ -55,11 +55,27 @@ def test_agents_begin_where_they_were_seen_fish_first():
     assert np.isnan(found.poses[[1, 3]]).all()
 
 
-def test_of_more_tracks_than_agents_the_first_count():
-    """Two tracks of fish, one fish."""
-    paths = [[[0.1, 0.1]], [[0.2, 0.2]]]
-    found = seen_at(samples_of(paths, [FISH, FISH]), 0, n_fish=1, n_robots=0)
-    np.testing.assert_array_equal(found.poses[:, :2], [[0.1, 0.1]])
+def test_of_more_tracks_than_agents_those_that_are_there_count():
+    """A track that ended long before does not take the place of the one that followed it."""
+    gone = [[0.1, 0.1]] * 3 + [[math.nan] * 2] * 20
+    here = [[math.nan] * 2] * 3 + [[0.2, 0.2]] * 20
+    also = [[0.3, 0.3]] * 23
+    samples = samples_of([gone, here, also], [FISH] * 3)
+    found = seen_at(samples, 20, n_fish=1, n_robots=0)
+    np.testing.assert_array_equal(found.poses[:, :2], [[0.2, 0.2]])
+    both = seen_at(samples, 20, n_fish=2, n_robots=0)
+    np.testing.assert_array_equal(both.poses[:, :2], [[0.2, 0.2], [0.3, 0.3]])
+
+
+def test_one_that_is_lost_for_a_moment_is_where_it_was_seen_last_or_next():
+    """Within a second, that is five samples."""
+    path = [[0.1, 0.1]] * 4 + [[math.nan] * 2] * 12 + [[0.5, 0.5]] * 2
+    samples = samples_of([path], [FISH])
+    for k, wanted in ((5, 0.1), (8, 0.1), (11, 0.5), (14, 0.5)):
+        pose = seen_at(samples, k, n_fish=1, n_robots=0).poses[0]
+        np.testing.assert_array_equal(pose[:2], [wanted, wanted])
+    for k in (9, 10):
+        assert np.isnan(seen_at(samples, k, n_fish=1, n_robots=0).poses).all()
 
 
 @pytest.mark.parametrize(
@@ -79,9 +95,9 @@ def test_the_heading_is_that_of_a_displacement_of_2_mm(path, row, heading):
 
 
 def test_a_sample_that_is_not_there_is_no_pose():
-    """Beyond the last one, and before the first: such as after a break of the recording."""
+    """Far beyond the last one, and before the first: such as after a break of the recording."""
     samples = samples_of([[[0.1, 0.1], [0.2, 0.1]]], [FISH], first=10)
-    for k in (9, 12, 500):
+    for k in (4, 17, 500):
         assert np.isnan(seen_at(samples, k, n_fish=1, n_robots=0).poses).all()
 
 

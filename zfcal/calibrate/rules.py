@@ -42,6 +42,12 @@ SAYS = {
     KEEP: "the model in use",
 }
 
+START, LONG_RUNS = "start", "long runs"
+"""How models are judged: see `zfcal.calibrate.judging`."""
+
+_MOST = {START: 1.5, LONG_RUNS: 1.0}
+"""What no score of a kind exceeds."""
+
 MADE = (SCORE, LIKELIHOOD, COMPROMISE, MEMORY)
 """Rules that make a model of their own in each round."""
 
@@ -123,16 +129,20 @@ class Followed:
     Parameters
     ----------
     scores
-        S of each; NaN where no feature can be counted.
+        Of each; NaN where nothing can be counted.
     noise
-        Standard deviation of S between windows of one model.
+        Standard deviation of a score between windows of one model.
+    by
+        `START`: by windows from where all were; `LONG_RUNS`: by S against long runs. What one says
+        is not comparable with what the other says.
     lead_noise
-        The same of what one model scores above another, where either of them is true; NaN where
-        that is not known.
+        Standard deviation between windows of what one model scores above another, where either of
+        them is true; NaN where that is not known.
     """
 
     scores: tuple[float, ...]
     noise: float
+    by: str
     lead_noise: float = math.nan
 
 
@@ -205,9 +215,10 @@ class Record:
         The model that was handed on last; None before the first round.
     in_charge
         The rule that publishes, `MEMORY` before rules were judged.
-    lead_noise
-        Standard deviation between windows of what one model scores above another; NaN as long as
-        no window has told.
+    by
+        How all of its rows were judged; empty where there are none.
+    lead_noises
+        Of each window that was judged, how much what one model scores above another varies.
     """
 
     rows: tuple[Forward, ...] = ()
@@ -215,7 +226,17 @@ class Record:
     n_rounds: int = 0
     in_use: Candidate | None = None
     in_charge: str = MEMORY
-    lead_noise: float = math.nan
+    by: str = ""
+    lead_noises: tuple[float, ...] = ()
+
+    @property
+    def lead_noise(self) -> float:
+        """Standard deviation between windows of what one model scores above another.
+
+        NaN as long as no window has told.
+        """
+        known = np.array([noise for noise in self.lead_noises if not math.isnan(noise)])
+        return math.sqrt(np.square(known).mean()) if len(known) else math.nan
 
     def due(self, end_s: int) -> tuple[Candidate, ...]:
         """Return the models that a window is the first to follow, the newest that are.
@@ -233,6 +254,9 @@ class Record:
     def judged(self, found: Followed, *, end_s: int, n: int) -> Record:
         """Return the record with what the models that are due have scored on a window.
 
+        Scores of two kinds are never in one record. Those from a start stay, and a window without
+        one judges nothing; those by long runs give way to the first from a start.
+
         Parameters
         ----------
         found
@@ -243,7 +267,7 @@ class Record:
             Positions of fish in it.
         """
         models = self.due(end_s)
-        if not models:
+        if not models or (self.by == START and found.by != START):
             return self
         half = 1.96 * found.noise
         rows = tuple(
@@ -253,12 +277,18 @@ class Record:
                 made_at_s=model.made_at_s,
                 S=score,
                 low=float(np.maximum(0.0, score - half)),
-                high=float(np.minimum(1.0, score + half)),
+                high=float(np.minimum(_MOST[found.by], score + half)),
                 n=n,
             )
             for model, score in zip(models, found.scores, strict=True)
         )
-        return replace(self, rows=self.rows + rows, lead_noise=found.lead_noise)
+        goes_on = found.by == self.by
+        return replace(
+            self,
+            rows=(self.rows if goes_on else ()) + rows,
+            lead_noises=(*(self.lead_noises if goes_on else ()), found.lead_noise),
+            by=found.by,
+        )
 
     @property
     def own(self) -> tuple[Candidate, ...]:

@@ -262,10 +262,10 @@ def _rules(view: TrialView) -> Table:
     return Table(
         name="rules-by-score",
         title="Forward score of each rule",
-        heads=("rule", "windows", "mean S", "standard deviation", "has published"),
+        heads=("rule", "windows", "mean", "standard deviation", "has published"),
         rows=rows,
         numbers=(1, 2, 3, 4),
-        note="S of the models that the rule made, or would have made, on the first window after.",
+        note="On the first window after a model was made, or would have been. It is not S.",
     )
 
 

@@ -121,9 +121,10 @@ def test_models_are_judged_from_where_all_were(done):
         np.testing.assert_allclose(pose[:2], [tracks.x_m[last], tracks.y_m[last]], atol=1e-9)
         assert np.isfinite(pose[2])
     assert start.time_s == pytest.approx(120.0)
-    noise = [read_extra(rules_of(done, end))["lead_noise"] for end in ENDS]
-    assert noise[:2] == [None, None]
-    assert 0 < noise[3] < 0.2
+    noise = [read_extra(rules_of(done, end))["lead_noises"] for end in ENDS]
+    assert [len(each) for each in noise] == [0, 0, 1, 2]
+    assert 0 < noise[3][1] < 0.2
+    assert read_extra(rules_of(done, 300))["judged_from"] == "start"
     said = read_lineage(done / "models" / "000240.toml").options
     assert said["judged_from"] == "start"
 
@@ -197,9 +198,22 @@ def test_without_the_estimate_other_rules_are_judged(trial, quick, forward):
     assert set(table["rule"]) == {"score", "nearest", "keep"}
     inputs = read_lineage(trial / "models" / "000300.toml").inputs
     assert not any("tracks" in name for name in inputs)
-    assert read_extra(rules_of(trial, 300))["lead_noise"] is None
-    assert "judged_from" not in read_lineage(trial / "models" / "000300.toml").options
+    assert read_extra(rules_of(trial, 300))["judged_from"] == "long runs"
+    said = read_lineage(trial / "models" / "000300.toml").options
+    assert said["judged_from"] == "long runs"
     assert read_result(trial / "models" / "000120.toml")["published"]["rule"] == "score"
+
+
+def test_a_record_of_an_earlier_version_is_not_carried_on(done, forward, heard):
+    """Its scores were made otherwise; its own round is made again by its lineage."""
+    for end in ENDS[:2]:
+        path = rules_of(done, end)
+        table, extra, lineage = read_table(path, RULES), read_extra(path), read_lineage(path)
+        del extra["judged_from"], extra["lead_noises"]
+        write_table(path, table, lineage, extra=extra)
+    calibrate(done, forward, heard.append, task=Task(ends_s=frozenset({240})))
+    assert read_extra(rules_of(done, 240))["n_rounds"] == 1
+    assert len(read_table(rules_of(done, 240), RULES)) == 0
 
 
 def test_a_damaged_minute_costs_the_estimates_that_need_it(trial, forward, heard):
@@ -288,9 +302,9 @@ def test_each_round_says_one_line(trial, forward, heard):
         "Window to 120 s: publishes the window's likelihood estimate (rule likelihood: no window "
         "has followed a model yet). S 0."
     )
-    assert "Forward S" not in lines[1]
+    assert "Forward scores" not in lines[1]
     results = [event.value for event in heard if isinstance(event, Result)]
-    listed = lines[3].split("Forward S so far: ")[1].rstrip(".").split(", ")
+    listed = lines[3].split("Forward scores so far: ")[1].rstrip(".").split(", ")
     wanted = [f"{rule} {mean:.3f}" for rule, mean in results[3]["forward"].items()]
     assert listed == wanted
     assert sorted(results[3]["forward"].values(), reverse=True) == list(

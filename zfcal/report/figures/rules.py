@@ -51,7 +51,7 @@ def rules_picture(scores: Sequence[RuleScore]) -> Picture | None:
         short="Rules",
         panels=(
             Panel(
-                title="S on the first window after a model was made",
+                title="Forward score, on the first window after",
                 alt=f"S of each rule's models on the windows that followed them; means: {said}.",
                 draw=draw,
                 size_in=_SIZE_IN,

@@ -23,7 +23,7 @@ from zfcal.behaviour.features.registry import further
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.cluster import ClusterGroup
 from zfcal.calibrate.group import Group, SeedSource, Simulator
-from zfcal.calibrate.rules import Record
+from zfcal.calibrate.rules import LONG_RUNS, START, Record
 from zfcal.calibrate.task import Previous
 from zfcal.calibrate.task import Task as RoundTask
 from zfcal.errors import DamagedError, InputError
@@ -51,6 +51,11 @@ from zfcal.stages.skipping import skipped_path, without_skipped
 from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.stages.windows import LENGTH_S
+
+_NO_START = (
+    "Window to {} s: tracks do not say where half of the fish were at its beginning, so models "
+    "are not judged on it from there."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -283,12 +288,13 @@ def _lineage(shared: _Shared, places: RoundPlaces, before: _Before) -> Lineage:
     files = [places.stats, options.model_of(opened.trial), *opened.arena_files]
     files += [path for path in before if path is not None]
     said = calibrate_options(opened, options, generations=options.generations_asked)
+    if options.settings.champion == "forward":
+        said |= {"judged_from": START if options.seed_likelihood else LONG_RUNS}
     if options.seed_likelihood:
         # One that is no file is no input: it is told where the estimate is made.
         span_s = _window_span(places.end_s)
         if options.settings.champion == "forward":
             span_s = memory_span(places.end_s)
-            said |= {"judged_from": "start"}
         tracks = readable(segment_files(shared.root, span_s), say_nothing)
         said |= guess_options(tracks)
         files += tracks
@@ -313,6 +319,8 @@ def _search(
     if options.seed_likelihood and options.settings.champion == "forward":
         memory = remembered(shared.opened, template, places.end_s, memory_span(places.end_s))
         start = seen_first(shared.opened, places.end_s)
+        if start is None:
+            tell(Note(text=_NO_START.format(places.end_s)))
     round_task = RoundTask(
         group=shared.group,
         control=control,
@@ -342,6 +350,9 @@ def _previous(shared: _Shared, path: Path | None) -> Previous | None:
 def _record(shared: _Shared, path: Path | None) -> Record:
     """Return the record of the rules; a new one where there is none to carry on."""
     if path is None or not _has_same_genes(shared, path):
+        return Record()
+    if "judged_from" not in read_extra(path) and "in_use" in read_extra(path):
+        # Of a version that judged otherwise, so its scores are no scores to this one.
         return Record()
     return read_record(path, shared.opened.arena.zone_names)
 

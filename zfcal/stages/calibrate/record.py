@@ -36,7 +36,8 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
             n_rounds=int(extra["n_rounds"]),  # type: ignore[arg-type]
             in_use=None if in_use is None else _candidate(in_use, zone_names, n_genes),
             in_charge=_rule(extra["in_charge"]),
-            lead_noise=_noise(extra.get("lead_noise")),
+            by=str(extra["judged_from"]),
+            lead_noises=tuple(_noise(noise) for noise in extra["lead_noises"]),  # type: ignore[union-attr]
         )
     except (KeyError, TypeError, ValueError, OverflowError, InputError) as error:
         raise DamagedError(
@@ -96,7 +97,8 @@ def write_record(
         "in_use": None if record.in_use is None else _entry(record.in_use),
         "in_charge": record.in_charge,
         "n_rounds": record.n_rounds,
-        "lead_noise": None if math.isnan(record.lead_noise) else record.lead_noise,
+        "judged_from": record.by,
+        "lead_noises": [None if math.isnan(noise) else noise for noise in record.lead_noises],
     }
     write_table(path, make_table(RULES, columns), lineage, extra=extra)
 

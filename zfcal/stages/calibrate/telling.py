@@ -20,7 +20,7 @@ def fits_chance(result: RoundResult) -> bool:
 
 
 def standing(result: RoundResult) -> dict[str, float]:
-    """Return the mean forward S of each rule so far, best first; empty where none are judged."""
+    """Return the mean forward score of each rule, best first; empty where none are judged."""
     means = {} if result.handed is None else result.handed.record.means()
     return dict(sorted(means.items(), key=lambda pair: -pair[1]))
 
@@ -47,7 +47,7 @@ def published_note(result: RoundResult, end_s: int) -> Note:
     parts = [f"Window to {end_s} s: publishes {_what(result, end_s)}.", _worth(result, end_s)]
     if means := standing(result):
         listed = ", ".join(f"{rule} {mean:.3f}" for rule, mean in means.items())
-        parts.append(f"Forward S so far: {listed}.")
+        parts.append(f"Forward scores so far: {listed}.")
     return Note(text=" ".join(parts))
 
 
