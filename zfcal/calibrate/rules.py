@@ -5,7 +5,7 @@ model is none where the law is wrong. Which of these faults is the larger one di
 recordings, and no window that a model was fitted to can tell. So each rule has a record: what its
 models scored on the first window that they had not seen, see ``judging``. One rule is in charge
 until another one is surely better. The first is `MEMORY`: where the law is right nothing else is as
-steady, and where it is wrong the others show it within a few windows.
+steady, and where it is wrong another rule takes over in time.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def rules_picture(scores: Sequence[RuleScore]) -> Picture | None:
         panels=(
             Panel(
                 title="Forward score, on the first window after",
-                alt=f"S of each rule's models on the windows that followed them; means: {said}.",
+                alt=f"Forward score of each rule on the windows that followed; means: {said}.",
                 draw=draw,
                 size_in=_SIZE_IN,
             ),
@@ -82,5 +82,5 @@ def _draw(axes: Axes, lines: dict[str, tuple[Floats, Floats]]) -> None:
     for rule, (minute, value) in lines.items():
         colour, marker = _MARKS.get(rule, _OTHER)
         axes.plot(minute, value, color=colour, marker=marker, ms=4.5, lw=1.2, alpha=0.9)
-    axes.set(xlabel="end of the window (min)", ylabel="S")
+    axes.set(xlabel="end of the window (min)", ylabel="forward score")
     axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))

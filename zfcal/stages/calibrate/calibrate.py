@@ -351,9 +351,6 @@ def _record(shared: _Shared, path: Path | None) -> Record:
     """Return the record of the rules; a new one where there is none to carry on."""
     if path is None or not _has_same_genes(shared, path):
         return Record()
-    if "judged_from" not in read_extra(path) and "in_use" in read_extra(path):
-        # Of a version that judged otherwise, so its scores are no scores to this one.
-        return Record()
     return read_record(path, shared.opened.arena.zone_names)
 
 

@@ -17,7 +17,7 @@ from zfcal.errors import DamagedError, InputError
 
 
 def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
-    """Return what rules had scored by a round, and their models.
+    """Return what rules had scored by a round, and their models; none of an earlier version.
 
     Raises
     ------
@@ -25,6 +25,9 @@ def read_record(path: Path, zone_names: tuple[str, ...]) -> Record:
         The file is damaged, or its extra metadata is not what `write_record` writes.
     """
     table, extra = read_table(path, RULES).to_pydict(), read_extra(path)
+    if "in_use" in extra and "judged_from" not in extra:
+        # Of a version that judged otherwise: its scores are no scores to this one.
+        return Record()
     rows = (dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True))
     try:
         models: Any = extra["models"]
