@@ -17,9 +17,11 @@ from zfcal.diagnose.features.naming import Told
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.second_look import _noise_nats, _stays, second_look
+from zfcal.diagnose.second_look import Found, _noise_nats, _stays, second_look
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
+
+NOTHING = Found(steps=(), confirmed=())
 
 
 @pytest.fixture(scope="module")
@@ -60,24 +62,25 @@ def drawn(question, worlds):
 @pytest.mark.slow
 def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
     """A place, of which some headings are drawn, at where it is."""
-    found = second_look(drawn, ())
-    best = found.step.choice.best
+    now = second_look(drawn, NOTHING)
+    (only,), (confirmed,) = now.steps, now.confirmed
+    best = only.choice.best
     assert best.name == "place-preference"
     assert best.values["drawn"] == 1.0
     assert best.values["strength"] > 0.005
     assert math.hypot(best.values["x_m"] - 0.8, best.values["y_m"] - 0.2) < 0.1
     assert best.nats > 10
-    assert found.step.best.p < 1e-4
-    assert found.confirmed.holds
-    assert found.confirmed.steady
-    assert found.confirmed.gain_nats_per_step > 0
+    assert only.best.p < 1e-4
+    assert confirmed.holds
+    assert confirmed.steady
+    assert confirmed.gain_nats_per_step > 0
 
 
 @pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_missing(question):
     """Nor where the model has the effect already."""
     case = open_case(question())
-    assert second_look(case, ()) is None
+    assert second_look(case, NOTHING) is None
 
 
 def gain(name, values):
@@ -157,44 +160,117 @@ def test_a_diagnosis_names_what_features_name(question, monkeypatch):
 
 
 @pytest.fixture
-def asked(monkeypatch):
-    """Return what features are asked of, once they are; they then name nothing."""
-    calls = []
-    monkeypatch.setattr(looking, "_named", lambda *args: calls.append(args))
-    return calls
+def looked(monkeypatch):
+    """Return what is asked of features, look by look, and what they are to say of each."""
+    calls, answers = [], []
+
+    def named(looks, **how):
+        calls.append((looks, how))
+        return answers.pop(0) if answers else None
+
+    monkeypatch.setattr(looking, "_named", named)
+    return calls, answers
 
 
-def test_features_are_asked_of_the_model_as_it_is(question, asked):
-    """Where positions are known to be exact, and nothing was named."""
+def step(name, screen, nats=20.0):
+    """Return an effect that was named, in a model of that screen."""
+    effect = SimpleNamespace(effect=find_effect(name))
+    best = SimpleNamespace(candidate=effect, screen=screen, nats=nats, name=name)
+    return SimpleNamespace(choice=SimpleNamespace(best=best))
+
+
+def found(*names, nats=20.0, **more):
+    """Return that these were found."""
+    steps = tuple(step(name, f"with {name}", nats) for name in names)
+    return Found(steps=steps, confirmed=names, nats=nats, **more)
+
+
+def test_features_are_asked_of_the_model_as_it_is(question, looked):
+    """Where nothing was named."""
     case = open_case(question())
-    assert second_look(case, ()) is None
-    assert asked == [(case, case.screen, None)]
+    assert second_look(case, NOTHING) is None
+    ((looks, how),) = looked[0]
+    assert (looks.case, looks.screen, looks.beside) == (case, case.screen, ())
+    assert how == {"there": None}
 
 
-def test_features_are_not_asked_where_noise_is_not_known(question, asked):
-    """What it makes of a law would be named."""
-    assert second_look(open_case(question(noise_m=None, noise_source="unknown")), ()) is None
-    assert asked == []
+def test_where_noise_is_not_known_it_is_that_of_the_likeliest_law(question):
+    """Of exact positions that is none; the note says where it is from."""
+    case = open_case(question(noise_m=None, noise_source="unknown"))
+    assert case.noise_is_likely
+    assert case.question.noise_m == 0.0
+    assert case.question.noise_source == "the law of headings"
+    assert not open_case(question(noise_m=0.0)).noise_is_likely
 
 
-def test_features_are_not_asked_beside_effects_that_the_model_came_with(question, fish, asked):
-    """On headings: of speeds they say nothing."""
-    for name, values, n in (("turning-bias", {"strength": 0.2}, 0), ("crowding", {}, 1)):
+def test_likely_noise_is_held_against_none(question):
+    """Since a late response makes a law of noise likelier as well; known noise is not doubted."""
+    case = open_case(question())
+    for is_likely, levels in ((True, [4e-4, 0.0]), (False, [4e-4])):
+        noisy = dataclasses.replace(
+            case,
+            question=dataclasses.replace(case.question, noise_m=4e-4),
+            noise_is_likely=is_likely,
+        )
+        looks = looking._Looks(case=noisy, screen=case.screen, beside=())
+        assert [law.noise_m for law in looks.laws] == levels
+        explained = dataclasses.replace(looks, without_noise=True)
+        assert [law.noise_m for law in explained.laws] == [0.0]
+
+
+def test_effects_that_the_model_came_with_are_there(question, fish, looked):
+    """On headings: of speeds features say nothing."""
+    for name, values, n in (("turning-bias", {"strength": 0.2}, 1), ("crowding", {}, 0)):
         own = dict(zip(find_effect(name).names, find_effect(name).values(values), strict=True))
         model = dataclasses.replace(fish, effects={name: own})
-        assert second_look(open_case(dataclasses.replace(question(), model=model)), ()) is None
-        assert len(asked) == n
+        assert second_look(open_case(dataclasses.replace(question(), model=model)), NOTHING) is None
+        assert [effect.name for effect in looked[0].pop()[0].beside] == [name] * n
 
 
-def test_the_first_effect_on_headings_is_held_against_features(question, asked):
+def test_the_first_effect_on_headings_is_held_against_features(question, looked):
     """In the model before it: those on speed stay, and all after it goes."""
+    case, (calls, answers) = open_case(question()), looked
+    before = found("crowding", "alignment", "fatigue")
+    answers.append(found("reaction-delay", without_noise=True))
+    now = second_look(case, before)
+    assert calls[0][0].screen == "with crowding"
+    assert calls[0][1] == {"there": before.steps[1]}
+    assert [each.choice.best.name for each in now.steps] == ["crowding", "reaction-delay"]
+    assert now.confirmed == ("crowding", "reaction-delay")
 
-    def step(name, screen):
-        effect = SimpleNamespace(effect=find_effect(name))
-        best = SimpleNamespace(candidate=effect, screen=screen)
-        return SimpleNamespace(choice=SimpleNamespace(best=best))
 
-    case = open_case(question())
-    kept = (step("crowding", "with crowding"), step("alignment", "x"), step("fatigue", "y"))
-    second_look(case, kept)
-    assert asked == [(case, "with crowding", kept[1])]
+def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
+    """Each gains 15 % of what the clearest one does; what noise seemed to do stays explained."""
+    case, (calls, answers) = open_case(question()), looked
+    answers += [found("reaction-delay", nats=400.0, without_noise=True), found("turning-bias")]
+    now = second_look(case, NOTHING)
+    assert [each.choice.best.name for each in now.steps] == ["reaction-delay", "turning-bias"]
+    assert [[effect.name for effect in looks.beside] for looks, _ in calls] == [
+        [],
+        ["reaction-delay"],
+        ["reaction-delay", "turning-bias"],
+    ]
+    assert [looks.without_noise for looks, _ in calls] == [False, True, True]
+    assert [how.get("least") for _, how in calls] == [None, 60.0, 60.0]
+
+
+def test_what_stays_is_beside_further_effects(question, looked):
+    """Features that name nothing else leave what was named, and add to it."""
+    case, (_, answers) = open_case(question()), looked
+    answers += [None, found("turning-bias")]
+    now = second_look(case, found("alignment"))
+    assert [each.choice.best.name for each in now.steps] == ["alignment", "turning-bias"]
+    answers += [None, None]
+    assert second_look(case, found("alignment")) is None
+
+
+@pytest.mark.slow
+def test_a_second_effect_is_named_beside_the_first(question):
+    """Of two, each in a form of ours, features name both; a tie needs something to say."""
+    both = {
+        "directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0},
+        "wall-persistence": {"strength": 0.5},
+    }
+    now = second_look(open_case(question(both)), NOTHING)
+    assert {each.choice.best.name for each in now.steps} == set(both)
+    assert all(not each.choice.ties for each in now.steps)

@@ -44,6 +44,7 @@ HOOKS = {
     "sight": {"rear-blind-zone": {"ignored": 0.7}},
     "rotation": {"alignment": {"weight": 20.0, "turning": 1.0}},
     "lag": {"reaction-delay": {"delay_s": 0.4}},
+    "lag between steps": {"reaction-delay": {"delay_s": 0.3}},
     "some of it late": {"reaction-delay": {"delay_s": 0.4, "share": 0.3}},
     "late directions": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "whole": 0.0}},
     "all": {
@@ -530,3 +531,21 @@ def test_a_density_on_other_steps_is_that_of_the_fit(scene, short_scene, model):
     there = maximise(short_scene, fitted.parameters, start=fitted.x, rounds=0)
     found = log_p_at(short_scene, fitted.parameters, fitted.x)
     np.testing.assert_allclose(found, there.log_p, atol=1e-9)
+
+
+def test_a_delay_between_steps_is_likeliest_where_it_is(two_rooms, model):
+    """Of fish that respond one and a half steps late, beside one step and two."""
+    late = {s: having(model, {"reaction-delay": {"delay_s": s}}) for s in (0.2, 0.3, 0.4)}
+    xy_m, _ = simulate_tracks(late[0.3], two_rooms, n_agents=5, n_steps=1000, seed=9)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    nats = {
+        s: sum(nats_of(x, t, view_of(scene, m)).sum() for x, t in pairs(scene, m))
+        for s, m in late.items()
+    }
+    assert nats[0.3] > nats[0.2] + 20
+    assert nats[0.3] > nats[0.4] + 20
+
+
+def pairs(scene, model):
+    """Return the true parameters of each zone and its turns."""
+    return zip(start_of(model), zone_turns(scene), strict=True)

@@ -27,9 +27,12 @@ def seen():
     return Seen(
         attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
         toward=ways(N, OTHERS),
-        late_toward=ways(N, OTHERS),
         soon_toward=ways(N, OTHERS),
+        half_toward=ways(N, OTHERS),
+        late_toward=ways(N, OTHERS),
+        older_toward=ways(N, OTHERS),
         late_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
+        older_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
         bearing=ways(N, OTHERS),
         distance_m=rng.uniform(0.03, 0.5, (N, OTHERS)),
         off_axis_rad=rng.uniform(0, np.pi, (N, OTHERS)),
@@ -37,7 +40,9 @@ def seen():
         heading=ways(N, OTHERS),
         here=np.ones((N, OTHERS), dtype=bool),
         is_robot=robot,
+        other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:OTHERS], (N, 1)),
         own_heading=ways(N),
+        way_out=ways(N),
         along_wall=ways(N),
         xy_m=rng.uniform(0.1, 0.3, (N, 2)),
         follows_walls=np.arange(N) % 2 == 0,
@@ -115,6 +120,7 @@ def test_who_is_not_there_has_no_weight(arena, seen):
         is_robot=none.astype(bool),
         attention=none,
         late_attention=none,
+        older_attention=none,
         distance_m=none + AWAY_M,
     )
     for name in ("alignment", "interaction-range", "reaction-delay", "robot-avoidance"):
@@ -128,7 +134,9 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     for each in features_of("reaction-delay", arena):
         weights = each.weights(seen)
         np.testing.assert_array_equal(weights[:, OTHERS:, 0], -seen.attention)
-        assert (each.low, each.high) == (0.0, 1.0)
+        assert each.low == 0.0
+        # Three tenths of a step are three times one.
+        assert each.high == (3.0 if each.label == "a tenth of a step" else 1.0)
 
 
 def test_a_sense_of_travel_is_counted_along_walls_alone(arena, seen):

@@ -24,8 +24,13 @@ def swum(shoal, steps, robots=NOBODY):
 
 @pytest.mark.parametrize(
     "effects",
-    [{}, {"turning-bias": {"strength": 0.5}}, {"reaction-delay": {"delay_s": 0.4}}],
-    ids=["base", "factor", "lag"],
+    [
+        {},
+        {"turning-bias": {"strength": 0.5}},
+        {"reaction-delay": {"delay_s": 0.4}},
+        {"reaction-delay": {"delay_s": 0.3}},
+    ],
+    ids=["base", "factor", "lag", "lag between steps"],
 )
 def test_alone_they_swim_as_a_simulation_of_that_seed(model, two_rooms, effects):
     """Step by step or in one call: the same places, but for the rounding of a sum."""

@@ -15,6 +15,7 @@ from zfcal.diagnose.candidates import (
     company_of,
     not_forms_of,
 )
+from zfcal.diagnose.features.noise import likely_noise_m
 from zfcal.diagnose.heldout import own_speeds
 from zfcal.diagnose.located import Residuals, residuals
 from zfcal.diagnose.null import Chain, Measurement, check_length
@@ -26,7 +27,7 @@ from zfcal.diagnose.standing import standing_of
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.effects.generic import generic_effects
 from zfcal.model.extended import maximise
-from zfcal.model.fitted import Free
+from zfcal.model.fitted import Fitted, Free
 from zfcal.model.scene import Scene, make_scene
 from zfcal.parameters import Parameters
 
@@ -48,7 +49,11 @@ _SHARP_M = 1e-4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """A question, its scene, the fitted model, and the families that are asked for."""
+    """A question, its scene, the fitted model, and the families that are asked for.
+
+    Where the tracks do not show by how much positions err, ``noise_is_likely``, and the question
+    has the noise that the law of headings is likeliest with.
+    """
 
     question: Question
     scene: Scene
@@ -56,6 +61,7 @@ class Case:
     listed: tuple[Candidate, ...]
     generic: tuple[Candidate, ...]
     lacks: dict[str, str]
+    noise_is_likely: bool = False
 
     def at_large(self, number: int, screen: Screen) -> tuple[Residuals, dict[str, float]]:
         """Return the located residuals and the omnibus statistics of a screen."""
@@ -136,6 +142,9 @@ def open_case(question: Question) -> Case:
     fitted = maximise(scene, model, free=free_of_model(model), n_workers=question.n_workers)
     effects, lacks = askable(scene, model)
     own = tuple(model.effects)
+    is_likely = question.noise_m is None
+    if is_likely:
+        question = _with_likely_noise(question, scene, fitted)
     return Case(
         question=question,
         scene=scene,
@@ -143,7 +152,13 @@ def open_case(question: Question) -> Case:
         listed=candidates_of(effects, question.arena, without=own),
         generic=not_forms_of(candidates_of(_generic(scene), question.arena), own),
         lacks=lacks,
+        noise_is_likely=is_likely,
     )
+
+
+def _with_likely_noise(question: Question, scene: Scene, fitted: Fitted) -> Question:
+    noise_m = likely_noise_m(scene, fitted, seed=question.seed)
+    return dataclasses.replace(question, noise_m=noise_m, noise_source="the law of headings")
 
 
 def free_of_model(model: Parameters) -> Free:

@@ -46,7 +46,7 @@ from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.second_look import second_look
+from zfcal.diagnose.second_look import Found, second_look
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVALS,
@@ -114,6 +114,7 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
     """
     tell("fitting", 0, 1)
     case = open_case(question)
+    question = case.question
     tell("fitting", 1, 1)
     scores, own = together(
         lambda: ask_all(case.screen, case.listed, question.n_workers),
@@ -173,15 +174,12 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
 
 def _looked_again(case: Case, judged: _Judged) -> _Judged:
     """Return what stands once features were asked what the law of headings lacks."""
-    found = second_look(case, judged.kept)
+    n = len(judged.kept)
+    found = second_look(case, Found(steps=judged.kept, confirmed=judged.confirmed[:n]))
     if found is None:
         return judged
-    n = found.n_before
     return dataclasses.replace(
-        judged,
-        kept=(*judged.kept[:n], found.step),
-        confirmed=(*judged.confirmed[:n], found.confirmed),
-        suspicious=False,
+        judged, kept=found.steps, confirmed=found.confirmed, suspicious=False
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms, in_model
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
-from zfcal.diagnose.features.gains import Gain, gains_of
+from zfcal.diagnose.features.gains import Gain, fits_beside, gains_of
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told, tell
 from zfcal.diagnose.heldout import heading_gains
@@ -30,71 +31,104 @@ from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEVEL, Best, Step
-from zfcal.model.effects import find_effect
+from zfcal.model.effects import Effect, find_effect
 
 _BY_ITSELF = 4.0
 """Standard errors by which features of a name must lead those of all others where no form of ours
-bears it out: such as a response that is late by less than a step."""
+bears it out and something is left."""
 
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
 
+_MOST_EFFECTS = 4
+"""On headings, in one recording."""
+
+_LEAST_SHARE = 0.15
+"""A further effect gains that share of what the clearest one does, or it may be what is wrong with
+the form of that."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SecondLook:
-    """An effect that features name.
+class Found:
+    """Effects that are missing, in the order of adding, and what each gains on held-out steps.
 
-    Parameters
-    ----------
-    step
-        As one that was selected.
-    confirmed
-        What it gains on held-out steps.
-    n_before
-        So many of the effects named without features stay before it; it takes the place of those
-        that were added after them.
+    ``nats`` is what the clearest of them gains by features, whatever its form. ``without_noise``
+    where one explains what noise of positions had seemed to.
     """
 
-    step: Step
-    confirmed: Confirmed
-    n_before: int
+    steps: tuple[Step, ...]
+    confirmed: tuple[Confirmed, ...]
+    nats: float = 0.0
+    without_noise: bool = False
 
 
-def second_look(case: Case, kept: Sequence[Step]) -> SecondLook | None:
-    """Return the effect on headings that features name; None where nothing is to be changed.
-
-    Features are not asked where the model came with effects on headings: what these leave over,
-    where the fish have another form of them, would be named. Nor where nobody knows by how much
-    positions err: what noise makes of a law would be named.
+def second_look(case: Case, before: Found) -> Found | None:
+    """Return what is missing once features were asked; None where nothing is to be changed.
 
     Parameters
     ----------
     case
         The question, its scene and what is asked for.
-    kept
+    before
         What was named without features. Of effects on headings the first is held against them:
         one beyond the list is kept where it gains more than features do, a listed one where it
-        gains as much.
+        gains as much. Where it is not kept, all that were added after it go as well.
     """
-    given = in_model(case.screen.fitted.parameters)
-    if case.question.noise_m is None or any(not each.effect.on_speed for each in given):
+    given = [each.effect for each in in_model(case.screen.fitted.parameters)]
+    known = [effect for effect in given if not effect.on_speed]
+    n = next((k for k, step in enumerate(before.steps) if _on_headings(step)), len(before.steps))
+    there = before.steps[n] if n < len(before.steps) else None
+    screen = before.steps[n - 1].choice.best.screen if n else case.screen
+    looks = _Looks(case=case, screen=screen, beside=tuple(known))
+    first = _named(looks, there=there)
+    found = before if first is None else _with(before, n, first)
+    while True:
+        named = [step for step in found.steps if _on_headings(step)]
+        if not named or len(named) >= _MOST_EFFECTS:
+            break
+        looks = _Looks(
+            case=case,
+            screen=found.steps[-1].choice.best.screen,
+            beside=(*known, *(step.choice.best.candidate.effect for step in named)),
+            without_noise=found.without_noise,
+        )
+        most = max(found.nats, *(step.choice.best.nats for step in named))
+        further = _named(looks, least=_LEAST_SHARE * most)
+        if further is None:
+            break
+        found = _with(found, len(found.steps), further)
+    return None if found is before else found
+
+
+def _on_headings(step: Step) -> bool:
+    return not step.choice.best.candidate.effect.on_speed
+
+
+def _with(found: Found, n: int, further: Found) -> Found:
+    return Found(
+        steps=(*found.steps[:n], *further.steps),
+        confirmed=(*found.confirmed[:n], *further.confirmed),
+        nats=max(found.nats, further.nats),
+        without_noise=found.without_noise or further.without_noise,
+    )
+
+
+def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:
+    """Return what features name in a model, and what it gains on held-out steps.
+
+    Parameters
+    ----------
+    looks
+        At the model.
+    there
+        What is held against features.
+    least
+        Nats that it has to gain.
+    """
+    case, screen, told = looks.case, looks.screen, looks.tell()
+    if told is None or told.gain.nats < least:
         return None
-    on_headings = [not step.choice.best.candidate.effect.on_speed for step in kept]
-    n = on_headings.index(True) if any(on_headings) else len(kept)
-    screen = kept[n - 1].choice.best.screen if n else case.screen
-    found = _named(case, screen, kept[n] if n < len(kept) else None)
-    return None if found is None else SecondLook(step=found[0], confirmed=found[1], n_before=n)
-
-
-def _named(case: Case, screen: Screen, there: Step | None) -> tuple[Step, Confirmed] | None:
-    """Return what features name in a model, and what it gains on held-out steps."""
-    law = _law(case, screen)
-    listed = {each.name for each in case.listed} - set(screen.fitted.parameters.effects)
-    effects = [find_effect(name) for name in sorted(listed)]
-    gains = gains_of(law, effects, n_workers=case.question.n_workers)
-    noise = (lambda clear: _noise_nats(case, clear)) if has_noise(case.question) else None
-    told = tell(gains, noise)
-    if told is None or (there is not None and _stays(there.choice.best, told, law)):
+    if there is not None and _stays(there.choice.best, told, looks.laws[0]):
         return None
     found, score = _in_the_model(case, screen, told.gain.name)
     ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
@@ -105,9 +139,97 @@ def _named(case: Case, screen: Screen, there: Step | None) -> tuple[Step, Confir
     )
     (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
     is_borne_out = _gains(found) and _is_steady(confirmed, found.screen, screen)
-    if not (is_borne_out or told.lead > _BY_ITSELF):
+    if not (is_borne_out or told.lead > _BY_ITSELF or looks.explains(told)):
         return None
-    return step, dataclasses.replace(confirmed, holds=True, steady=True)
+    return Found(
+        steps=(step,),
+        confirmed=(dataclasses.replace(confirmed, holds=True, steady=True),),
+        nats=told.gain.nats,
+        without_noise=told.gain.without_noise,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Looks:
+    """What features say of a model.
+
+    Parameters
+    ----------
+    case
+        The question.
+    screen
+        The model.
+    beside
+        Effects on headings that are there: whatever form they have, what they explain is not
+        named.
+    without_noise
+        Whether what seemed to be noise is explained.
+    """
+
+    case: Case
+    screen: Screen
+    beside: tuple[Effect, ...]
+    without_noise: bool = False
+
+    @cached_property
+    def laws(self) -> tuple[Law, ...]:
+        """The law of noisy positions; that of exact ones as well where noise is only likely.
+
+        What a late response does to headings is likelier with noise than without, so noise is
+        fitted with each effect: it may be none.
+        """
+        is_noisy = has_noise(self.case.question) and not self.without_noise
+        noise_m = noise_of(self.case.question) if is_noisy else 0.0
+        levels = (noise_m, 0.0) if noise_m and self.case.noise_is_likely else (noise_m,)
+        return tuple(_law(self.case, self.screen, level) for level in levels)
+
+    def gains(self, effects: Sequence[Effect], beside: Sequence[Effect]) -> list[Gain]:
+        """Return what features of effects gain."""
+        n_workers = self.case.question.n_workers
+        first, *others = self.laws
+        found = gains_of(first, effects, beside=beside, n_workers=n_workers)
+        beyond = fits_beside(first, beside).null_log_p if others else None
+        for law in others:
+            found += gains_of(law, effects, beside=beside, beyond=beyond, n_workers=n_workers)
+        return found
+
+    def tell(self) -> Told | None:
+        """Return which name it is; None where chance may have made all gains."""
+        case, gains = self.case, self.gains(self._asked, self.beside)
+        is_noisy = self.laws[0].noise_m > 0
+        noise = (lambda clear: _noise_nats(case, clear)) if is_noisy else None
+        told = tell(gains, noise)
+        return None if told is None else self._settled(told)
+
+    def explains(self, told: Told) -> bool:
+        """Return whether, with a name's features there, no other name gains more than chance.
+
+        What is no effect of the list answers to features of several names.
+        """
+        others = [effect for effect in self._asked if effect.name != told.gain.name]
+        found = self.gains(others, [*self.beside, find_effect(told.gain.name)])
+        return tell(found, None) is None
+
+    @cached_property
+    def _asked(self) -> list[Effect]:
+        """Effects that are looked for."""
+        known = {effect.name for effect in self.beside}
+        names = {each.name for each in self.case.listed} - known
+        return [find_effect(name) for name in sorted(names)]
+
+    def _settled(self, told: Told) -> Told:
+        """Return a name without those ties that have nothing to say beside it."""
+        kept = []
+        for tie in told.ties:
+            own, other = find_effect(told.gain.name), find_effect(tie.name)
+            if self._stands(other, own) or not self._stands(own, other):
+                kept.append(tie)
+        return dataclasses.replace(told, ties=tuple(kept))
+
+    def _stands(self, effect: Effect, beside: Effect) -> bool:
+        """Return whether features of an effect gain more than chance beside those of another."""
+        gains = self.gains([effect], [*self.beside, beside])
+        return min((gain.p for gain in gains), default=1.0) < LEVEL
 
 
 def _gains(form: Refit) -> bool:
@@ -147,8 +269,7 @@ def _alike(apart: Floats, part: NDArray[np.int64]) -> bool:
     return bool(chdtrc(int(told.sum()), ratio) > WAVERS)
 
 
-def _law(case: Case, screen: Screen) -> Law:
-    noise_m = noise_of(case.question) if has_noise(case.question) else 0.0
+def _law(case: Case, screen: Screen, noise_m: float) -> Law:
     return Law(scene=screen.scene, fitted=screen.fitted, noise_m=noise_m, seed=case.question.seed)
 
 
@@ -168,7 +289,8 @@ def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
     effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
 
     def ask(_number: int, other: Screen) -> list[float]:
-        found = gains_of(_law(case, other), effects, kinds=set(keys))
+        law = _law(case, other, noise_of(case.question))
+        found = gains_of(law, effects, kinds=set(keys))
         most: dict[tuple[str, str], float] = {}
         for gain in found:
             most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))

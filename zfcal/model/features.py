@@ -36,11 +36,11 @@ class Seen:
     ----------
     attention : ndarray, shape (step, other)
         alpha times the solid angle at which each other agent is seen; 0 for who is not seen.
-    toward, late_toward, soon_toward : ndarray, shape (step, other, 2)
-        Where the base law draws to, away from who is too near: now, where the other was a step
-        before, and a tenth of a step before. Zeros for who is not there.
-    late_attention : ndarray, shape (step, other)
-        As a step before.
+    toward, soon_toward, half_toward, late_toward, older_toward : ndarray, shape (step, other, 2)
+        Where the base law draws to, away from who is too near: now, where the other was a tenth of
+        a step before, half a step, a step and two steps. Zeros for who is not there.
+    late_attention, older_attention : ndarray, shape (step, other)
+        As a step before, and two.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s : ndarray, shape (step, other)
@@ -48,7 +48,10 @@ class Seen:
     heading : ndarray, shape (step, other, 2)
         Of the other.
     here, is_robot : ndarray of bool, shape (step, other)
-    own_heading, along_wall, xy_m : ndarray, shape (step, 2)
+    other : ndarray of int, shape (step, other)
+        Track of the other; -1 for who is not there.
+    own_heading, along_wall, way_out, xy_m : ndarray, shape (step, 2)
+        ``way_out``: to the nearest way out of a room; zeros elsewhere.
     follows_walls : ndarray of bool, shape (step,)
         Whether the zone does.
     zone, track : ndarray of int, shape (step,)
@@ -64,9 +67,12 @@ class Seen:
 
     attention: Floats
     toward: Floats
-    late_toward: Floats
     soon_toward: Floats
+    half_toward: Floats
+    late_toward: Floats
+    older_toward: Floats
     late_attention: Floats
+    older_attention: Floats
     bearing: Floats
     distance_m: Floats
     off_axis_rad: Floats
@@ -74,8 +80,10 @@ class Seen:
     heading: Floats
     here: NDArray[np.bool_]
     is_robot: NDArray[np.bool_]
+    other: NDArray[np.int32]
     own_heading: Floats
     along_wall: Floats
+    way_out: Floats
     xy_m: Floats
     follows_walls: NDArray[np.bool_]
     zone: NDArray[np.int64]
@@ -121,7 +129,7 @@ class Component:
     """
 
     label: str
-    toward: Weights | Literal["toward", "heading"]
+    toward: Weights | Literal["toward", "bearing", "heading"]
     weights: Weights
     kappa: float | Literal["own", "neighbours"] = "neighbours"
     low: float = 0.0

@@ -19,6 +19,11 @@ from zfcal.model.kernels.state import (
     KAPPA_BASE,
     KAPPA_F,
     LAG_MAX,
+    LATE_COLUMNS,
+    LATE_FELT_M,
+    LATE_PART,
+    LATE_SHARE,
+    LATE_WHOLE,
     LAW_BASE,
     LAW_F,
     LAWS,
@@ -26,6 +31,9 @@ from zfcal.model.kernels.state import (
     Packed,
 )
 from zfcal.parameters import SPEED_BINS, Parameters, ZoneParameters, gene_scales, n_genes
+
+_WHOLE = 1e-6
+"""Steps by which a delay may miss a whole number of them."""
 
 
 def check_model(parameters: Parameters, arena: Arena) -> None:
@@ -193,7 +201,7 @@ def _hooks(effects: Sequence[Effect], kind: str, models: Sequence[Parameters]) -
 def _lags(
     effects: Sequence[Effect], models: Sequence[Parameters], n_models: int
 ) -> NDArray[np.int64]:
-    """Return by how many steps each model responds late."""
+    """Return by how many steps each model responds late, the begun one counted."""
     lags = np.zeros(n_models, dtype=np.int64)
     for effect in effects:
         if effect.lag is None:
@@ -201,18 +209,29 @@ def _lags(
         for model in range(n_models):
             given = models[model % len(models)]
             values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
-            lags[model] = max(lags[model], min(LAG_MAX, round(values[effect.lag] / given.dt_s)))
+            lags[model] = max(lags[model], math.ceil(_steps_late(values[effect.lag], given.dt_s)))
     return lags
 
 
+def _steps_late(delay_s: float, dt_s: float) -> float:
+    """Return a delay in steps; whole where it is that but for rounding."""
+    steps = min(float(LAG_MAX), delay_s / dt_s)
+    return float(round(steps)) if abs(steps - round(steps)) < _WHOLE else steps
+
+
 def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: int) -> Floats:
-    """Return what each model sees late: the share, beyond which distance, and how much of it."""
-    made = np.tile([1.0, 0.0, 1.0], (n_models, 1))
+    """Return what each model sees late: see `zfcal.model.kernels.state.LATE_SHARE`."""
+    made = np.ones((n_models, LATE_COLUMNS))
+    made[:, LATE_FELT_M] = 0.0
     for effect in effects:
         for model in range(n_models if effect.lag is not None else 0):
-            given = models[model % len(models)].effects[effect.name]
-            values = dict(zip(effect.names, effect.values(given), strict=True))
-            made[model] = values[effect.strength], values["felt_m"], values["whole"]
+            given = models[model % len(models)]
+            values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
+            steps = _steps_late(values[effect.lag], given.dt_s) if effect.lag else 0.0
+            made[model, LATE_SHARE] = values[effect.strength]
+            made[model, LATE_FELT_M] = values["felt_m"]
+            made[model, LATE_WHOLE] = values["whole"]
+            made[model, LATE_PART] = steps - math.ceil(steps) + 1.0
     return made
 
 

@@ -27,7 +27,13 @@ from zfcal.model.kernels.extended import harmonic_tilt
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import head_late, perceive
-from zfcal.model.kernels.state import Packed
+from zfcal.model.kernels.state import (
+    LATE_FELT_M,
+    LATE_PART,
+    LATE_SHARE,
+    LATE_WHOLE,
+    Packed,
+)
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
@@ -60,7 +66,7 @@ class View:
     tilt_taken: Floats
     seen_sr: Floats
     spin: Floats
-    late: dict[int, tuple[Floats, Floats]] = dataclasses.field(default_factory=dict)
+    late: dict[float, tuple[Floats, Floats]] = dataclasses.field(default_factory=dict)
     """What was perceived so many steps late, so that a fit looks but once."""
 
 
@@ -79,7 +85,7 @@ def view_of(
         Threads; the numbers do not depend on them.
     """
     packed = pack([parameters], scene.arena)
-    share, all_late = packed.lates[0, 0], sees_late(packed)
+    share, all_late = packed.lates[0, LATE_SHARE], sees_late(packed)
     known = {} if seen is None else seen.late
     toward, angle = _perceived(scene, packed, known, all_late)
     own = angle
@@ -114,28 +120,33 @@ def spin_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
     return spin
 
 
-def sees_late(packed: Packed) -> int:
+def sees_late(packed: Packed) -> float:
     """Return by how many steps all that agents of a model see is late."""
-    share, _, whole = packed.lates[0]
-    return int(packed.lags[0]) if share >= 1.0 and whole > 0.0 else 0
+    late = packed.lates[0]
+    return lag_of(packed) if late[LATE_SHARE] >= 1.0 and late[LATE_WHOLE] > 0.0 else 0.0
+
+
+def lag_of(packed: Packed) -> float:
+    """Return by how many steps a model's agents respond late."""
+    return float(packed.lags[0] - 1.0 + packed.lates[0, LATE_PART])
 
 
 def late_sight(
-    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]]
+    scene: Scene, packed: Packed, known: dict[float, tuple[Floats, Floats]]
 ) -> tuple[Floats, Floats]:
     """Return unit vectors and solid angles of neighbours as a model sees them that is late."""
-    lag, (_, felt_m, whole) = int(packed.lags[0]), packed.lates[0]
-    if whole > 0.0:
+    lag, late = lag_of(packed), packed.lates[0]
+    if late[LATE_WHOLE] > 0.0:
         return _perceived(scene, packed, known, lag)
-    toward, angle = _perceived(scene, packed, known, 0)
+    toward, angle = _perceived(scene, packed, known, 0.0)
     turns, made = scene.turns, np.empty_like(toward)
-    near_m = max(float(felt_m), REPULSION_M)
+    near_m = max(float(late[LATE_FELT_M]), REPULSION_M)
     head_late(scene.states, turns.at, turns.who, lag, near_m, toward, made)
     return made, angle
 
 
 def _perceived(
-    scene: Scene, packed: Packed, known: dict[int, tuple[Floats, Floats]], late: int
+    scene: Scene, packed: Packed, known: dict[float, tuple[Floats, Floats]], late: float
 ) -> tuple[Floats, Floats]:
     """Return what is seen so many steps late, with a model's effects on sight."""
     if late not in known:

@@ -134,7 +134,7 @@ def test_it_says_what_it_means(effect):
     assert bool(effect.opposite) == (own.low < 0.0)
     assert own.default > 0.0
     assert 0.0 < effect.probe <= own.high
-    # A delay is a whole number of steps: no slope leads to it.
+    # A delay is tried at some lengths: its slope has jumps at whole steps.
     may_be_fixed = set(effect.names) if effect.lag else set(effect.names) - {effect.strength}
     assert set(effect.fixed) <= may_be_fixed
 

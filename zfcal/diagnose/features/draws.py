@@ -17,6 +17,8 @@ from zfcal.model.kernels.state import (
     HY,
     KIND,
     LEFT_S,
+    MOUTH_X,
+    MOUTH_Y,
     PAST_HX,
     PAST_HY,
     ROOM,
@@ -183,24 +185,35 @@ def _seen(
     now_x, now_y = theirs(X, at), theirs(Y, at)
     then_x, then_y = theirs(X, before), theirs(Y, before)
     bearing, distance = to(now_x, now_y)
-    soon, soon_m = to((1 - _SOON) * now_x + _SOON * then_x, (1 - _SOON) * now_y + _SOON * then_y)
+    present = here[..., None]
+
+    def a_while_ago(share: float) -> Floats:
+        """Return where the base law draws to, by where all were some of a step before."""
+        x, y = (1 - share) * now_x + share * then_x, (1 - share) * now_y + share * then_y
+        way, away_m = to(x, y)
+        way = np.where(away_m < REPULSION_M, -1.0, 1.0)[..., None] * way
+        return np.asarray(np.where(present & np.isfinite(way), way, 0.0))
+
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
-    toward, angle = perceive(states, at, turns.who, 0, cos_fov)
-    late, late_angle = perceive(states, at, turns.who, 1, cos_fov)
+    toward, angle = perceive(states, at, turns.who, 0.0, cos_fov)
+    late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov)
+    older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov)
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
     dot = (heading[:, None] * bearing).sum(axis=-1)
     past = own[:, [PAST_HX, PAST_HY]]
     turned = np.arctan2(
         past[:, 0] * heading[:, 1] - past[:, 1] * heading[:, 0], (past * heading).sum(axis=1)
     )
-    present = here[..., None]
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
+        soon_toward=a_while_ago(_SOON),
+        half_toward=a_while_ago(0.5),
         late_toward=late[rows, others],
-        soon_toward=np.where(soon_m < REPULSION_M, -1.0, 1.0)[..., None] * soon * present,
+        older_toward=older[rows, others],
         late_attention=steps.alpha[:, None] * late_angle[rows, others],
+        older_attention=steps.alpha[:, None] * older_angle[rows, others],
         bearing=bearing * present,
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
@@ -208,8 +221,10 @@ def _seen(
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         here=here,
         is_robot=(theirs(KIND, at) > 0) & here,
+        other=np.where(here, steps.scene.tracks[at[:, None], others], -1),
         own_heading=heading,
         along_wall=own[:, [TAU_X, TAU_Y]],
+        way_out=np.where(own[:, [ROOM]] > 0, own[:, [MOUTH_X, MOUTH_Y]], 0.0),
         xy_m=own[:, [X, Y]],
         follows_walls=steps.follows,
         zone=turns.zone,
@@ -227,10 +242,13 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
     return replace(
         seen,
         toward=turn(seen.toward, b),
-        late_toward=turn(seen.late_toward, b),
         soon_toward=turn(seen.soon_toward, b),
+        half_toward=turn(seen.half_toward, b),
+        late_toward=turn(seen.late_toward, b),
+        older_toward=turn(seen.older_toward, b),
         bearing=turn(seen.bearing, b),
         heading=turn(seen.heading, b),
         own_heading=turn(seen.own_heading, back),
         along_wall=turn(seen.along_wall, back),
+        way_out=turn(seen.way_out, back),
     )

@@ -20,11 +20,11 @@ from scipy.special import chdtrc, expit, logit
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.law import Columns, Law
+from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
 from zfcal.model.extended import LAPSE
 from zfcal.model.features import Component, Feature, Leaving, OneOf, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES
-from zfcal.model.kernels.rooms import find_rooms
 
 _UNIFORM = 1 / (2 * math.pi)
 _LEAST = 1e-9
@@ -44,6 +44,7 @@ _TRIED = (0.005, 0.02, 0.06)
 _FITTED = 2
 """Of features of which the most promising are fitted, so many."""
 
+Bounds: TypeAlias = tuple[float | None, float | None]
 Objective: TypeAlias = Callable[[Floats], tuple[float, Floats]]
 
 
@@ -65,6 +66,8 @@ class Gain:
         What these are called; empty where it is the only one.
     noise_nats
         What noise of positions alone makes it gain.
+    without_noise
+        Whether it gains that by the law of exact positions, over that of noisy ones.
     """
 
     name: str
@@ -74,6 +77,7 @@ class Gain:
     n_tried: int = 1
     kind: str = ""
     noise_nats: float = 0.0
+    without_noise: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -100,9 +104,33 @@ class Fits:
     ----------
     law
         Of the steps.
+    also
+        Features that are fitted with the base's parameters, because their effects are there.
+    beyond : ndarray, shape (step,), optional
+        Log densities that are to be gained over, where the base alone has higher ones by another
+        law: that of noisy positions, say.
     """
 
     law: Law
+    also: tuple[Component | Turned, ...] = ()
+    beyond: Floats | None = None
+
+    @cached_property
+    def _own(self) -> tuple[list[Columns], list[Bounds]]:
+        """Columns that are always there, and the bounds of their strengths."""
+        columns, bounds = self.law.own_parameters
+        added = [self._columns(feature) for feature in self.also]
+        return (
+            [*columns, *(each for each, _ in added)],
+            [*bounds, *(pair for _, pairs in added for pair in pairs)],
+        )
+
+    def _columns(self, feature: Component | Turned) -> tuple[Columns, list[Bounds]]:
+        """Return the columns of a feature, and the bounds of its strengths."""
+        if isinstance(feature, Turned):
+            return self.law.turned(feature), [(-_MOST_TURN, _MOST_TURN)]
+        columns = self.law.component(feature)
+        return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 
     @cached_property
     def _lapse(self) -> float:
@@ -113,26 +141,40 @@ class Fits:
         """Log densities with the base's own columns alone, and where that fit ended."""
         return self._linear([], [], None)
 
+    @property
+    def null_log_p(self) -> Floats:
+        """Log density of each step by the base alone, its parameters and the lapse refitted."""
+        return self._null[0]
+
     def gain(self, name: str, feature: Component | Turned | Tilt | Leaving) -> Gain:
         """Return what a feature of an effect adds."""
-        if isinstance(feature, Component):
-            at, over = self.law.component(feature)
-            bounds = [(feature.low, feature.high)] * at.shape[1]
-            return self._additive(name, feature.label, (at, over), bounds)
-        if isinstance(feature, Turned):
-            columns = self.law.turned(feature)
-            return self._additive(name, feature.label, columns, [(-_MOST_TURN, _MOST_TURN)])
-        if isinstance(feature, Tilt):
-            return self._tilt(name, feature)
-        return self._leaving(name, feature, find_rooms(self.law.scene.arena)[0])
+        if isinstance(feature, Component | Turned):
+            columns, bounds = self._columns(feature)
+            null, start = self._null
+            log_p, _ = self._linear([columns], bounds, start)
+            made, n = log_p - null, len(bounds)
+        elif isinstance(feature, Tilt):
+            made, _, n = self.tilt(feature)
+        else:
+            made, _, n = self.leaving(feature)
+        if self.beyond is not None:
+            made = made + self.null_log_p - self.beyond
+        return Gain(
+            name=name, label=feature.label, log_p=made, n_strengths=n,
+            without_noise=self.beyond is not None,
+        )  # fmt: skip
 
     def best_of(self, name: str, choice: OneOf) -> list[Gain]:
         """Return what the most promising of some features add."""
-        promise = [self._promise(feature) for feature in choice.features]
-        order = np.argsort(promise)[::-1][:_FITTED]
-        found = [self.gain(name, choice.features[k]) for k in order if promise[k] > 0]
+        found = [self.gain(name, feature) for feature in self.most_promising(choice)]
         n = len(choice.features)
         return [replace(gain, n_tried=n, kind=choice.kind) for gain in found]
+
+    def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Component | Tilt]:
+        """Return the features that a first look says most of."""
+        promise = [self._promise(feature) for feature in choice.features]
+        order = np.argsort(promise)[::-1][:n]
+        return [choice.features[k] for k in order if promise[k] > 0]
 
     def _promise(self, feature: Component | Tilt) -> float:
         """Return how clear a feature is with all its weights alike: a score, or a gain in nats.
@@ -171,25 +213,11 @@ class Fits:
         ways = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         return np.asarray(self.law.cells @ ways / whole)
 
-    def _additive(
-        self,
-        name: str,
-        label: str,
-        columns: Columns,
-        bounds: Sequence[tuple[float | None, float | None]],
-    ) -> Gain:
-        null, start = self._null
-        log_p, _ = self._linear([columns], bounds, start)
-        return Gain(name=name, label=label, log_p=log_p - null, n_strengths=columns[0].shape[1])
-
     def _linear(
-        self,
-        added: Sequence[Columns],
-        bounds: Sequence[tuple[float | None, float | None]],
-        start: Floats | None,
+        self, added: Sequence[Columns], bounds: Sequence[Bounds], start: Floats | None
     ) -> tuple[Floats, Floats]:
         """Return log densities at the best strengths of columns, and these."""
-        own, limits = self.law.own_parameters
+        own, limits = self._own
         at = np.concatenate([c[0] for c in (*own, *added)], axis=1)
         over = np.concatenate([c[1] for c in (*own, *added)], axis=1)
         base_at, base_over = (column[:, 0] for column in self.law.base)
@@ -217,7 +245,8 @@ class Fits:
         strengths = np.append(x[:-1] / scale, x[-1])
         return _log_mixed(densities(x)[0], x[-1]), strengths
 
-    def _tilt(self, name: str, feature: Tilt) -> Gain:
+    def tilt(self, feature: Tilt) -> tuple[Floats, Floats, int]:
+        """Return what a tilt adds to each step, its vectors and the number of its strengths."""
         vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
         taken, base = self.law.turns.taken, self._untilted
         n = len(taken)
@@ -237,7 +266,7 @@ class Fits:
         n_strengths = vectors.shape[1]
         x = self._climb_from_null(objective, n_strengths, _MOST_TILT)
         log_p = _log_mixed(density(x), x[-1]) - base
-        return Gain(name=name, label=feature.label, log_p=log_p, n_strengths=n_strengths)
+        return log_p, np.einsum("sbd,b->sd", vectors, x[:-1]), n_strengths
 
     @cached_property
     def _untilted(self) -> Floats:
@@ -251,14 +280,16 @@ class Fits:
         x = self._climb_from_null(objective, 0, 0.0)
         return _log_mixed(at, x[-1])
 
-    def _leaving(self, name: str, feature: Leaving, between: int) -> Gain:
+    def leaving(self, feature: Leaving) -> tuple[Floats, Floats, int]:
         """Return what a factor on landing between the rooms adds, beside one for each zone.
 
-        ``between`` is the id of that zone.
+        Returns
+        -------
+        gain, log_factor : ndarray, shape (step,)
+        n_strengths : int
         """
-        law = self.law
-        share = law.turns.share[:, :, between - 1] / np.maximum(law.turns.share.sum(axis=2), 1)
-        inside = (law.cells * share).sum(axis=1) / law.cells.sum(axis=1)
+        law, between = self.law, self.law.between
+        inside = (law.cells * law.between_share).sum(axis=1) / law.cells.sum(axis=1)
         landed = (law.turns.landing == between).astype(np.float64)
         base = np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1)
         may = (law.turns.zone != between) & (inside > 0)
@@ -267,7 +298,7 @@ class Fits:
         weights = feature.weights(law.draws[0].seen)
         may_ = may[:, None].astype(np.float64)
 
-        def fitted(columns: Floats) -> Floats:
+        def fitted(columns: Floats) -> tuple[Floats, Floats]:
             def density(x: Floats) -> tuple[Floats, Floats]:
                 log_factor = columns @ x[:-1]
                 factor = np.exp(log_factor)
@@ -280,11 +311,11 @@ class Fits:
                 return value, -np.append(columns.T @ (own * (landed - chance)), slope)
 
             x = self._climb_from_null(objective, columns.shape[1], _MOST_LEAVING)
-            return _log_mixed(density(x)[0], x[-1])
+            return _log_mixed(density(x)[0], x[-1]), columns @ x[:-1]
 
-        null = fitted(each * may_)
-        log_p = fitted(np.concatenate([each, weights], axis=1) * may_) - null
-        return Gain(name=name, label=feature.label, log_p=log_p, n_strengths=weights.shape[1])
+        null, _ = fitted(each * may_)
+        log_p, log_factor = fitted(np.concatenate([each, weights], axis=1) * may_)
+        return log_p - null, log_factor, weights.shape[1]
 
     def _climb_from_null(self, objective: Objective, n: int, most: float) -> Floats:
         x0 = np.append(np.zeros(n), logit(self._lapse))
@@ -304,16 +335,12 @@ def _log_mixed(density: Floats, level: float) -> Floats:
     return np.log((1 - lapse) * density + lapse * _UNIFORM)
 
 
-def _scaled(
-    pair: tuple[float | None, float | None], scale: float
-) -> tuple[float | None, float | None]:
+def _scaled(pair: Bounds, scale: float) -> Bounds:
     low, high = (None if end is None else end * scale for end in pair)
     return low, high
 
 
-def _climb(
-    objective: Objective, x0: Floats, bounds: Sequence[tuple[float | None, float | None]]
-) -> Floats:
+def _climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Floats:
     """Return where an objective is least; the last of its arguments is the lapse."""
     found = minimize(
         objective,
@@ -326,11 +353,13 @@ def _climb(
     return np.asarray(found.x)
 
 
-def gains_of(
+def gains_of(  # noqa: PLR0913 - the last ones have defaults
     law: Law,
     effects: Sequence[Effect],
     *,
     kinds: Collection[tuple[str, str]] | None = None,
+    beside: Sequence[Effect] = (),
+    beyond: Floats | None = None,
     n_workers: int = 1,
 ) -> list[Gain]:
     """Return what features of effects add to a law.
@@ -343,13 +372,18 @@ def gains_of(
         Those without features are left out.
     kinds
         Names and kinds of those that are asked for; None for all.
+    beside
+        Effects that are there: whatever form they have, what they explain is not asked.
+    beyond : ndarray, shape (step,), optional
+        Log densities that are to be gained over, in place of the law's own.
     n_workers
         Threads; the numbers do not depend on them.
     """
-    fits = Fits(law=law)
+    fits = replace(fits_beside(law, beside), beyond=beyond)
+    law = fits.law
     # What all of them need, before they are asked side by side.
     _ = (law.own_parameters, law.cells, fits._null, fits._untilted, fits._mean_heading)  # noqa: SLF001
-    has_rooms = find_rooms(law.scene.arena)[0] > 0
+    has_rooms = law.between > 0
     asked = [
         (effect.name, feature)
         for effect in effects
@@ -360,6 +394,46 @@ def gains_of(
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
     return [gain for some in found for gain in some]
+
+
+def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
+    """Return fits in which effects are there, in whatever form their features can have.
+
+    What adds to the mixture is fitted with the base's parameters, each time; a tilt or a factor on
+    leaving once, where it gains more than chance.
+
+    Parameters
+    ----------
+    law
+        Of the steps; its model has these effects in forms of ours.
+    effects
+        Those without features are left out.
+    """
+    fits, also = Fits(law=law), []
+    for effect in effects:
+        for feature in effect.features(law.scene.arena):
+            chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
+            for each in chosen:
+                if isinstance(each, Component | Turned):
+                    also.append(each)
+                elif isinstance(each, Tilt) or law.between:
+                    law = _absorbed(law, each)
+                    fits = Fits(law=law)
+    return Fits(law=law, also=tuple(also))
+
+
+def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
+    """Return a law with a tilt or a factor on leaving, if that gains more than chance."""
+    fits = Fits(law=law)
+    if isinstance(feature, Tilt):
+        gain, there, n = fits.tilt(feature)
+    else:
+        gain, there, n = fits.leaving(feature)
+    if chdtrc(n, 2 * max(float(gain.sum()), 0.0)) > LEVEL:
+        return law
+    if isinstance(feature, Tilt):
+        return replace(law, leaning=there if law.leaning is None else law.leaning + there)
+    return replace(law, leaving=there if law.leaving is None else law.leaving + there)
 
 
 def kind_of(feature: Feature) -> str:

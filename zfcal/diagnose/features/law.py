@@ -26,6 +26,7 @@ from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.model.features import Component, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.scene import Scene, Turns
 
 DRAWS = 8
@@ -52,17 +53,29 @@ class Law:
         Standard deviation of a position per coordinate; 0 for positions that are exact.
     seed
         Of the draws.
+    n_draws
+        Of where all were; where positions are exact they are the only one.
+    every
+        One of so many steps counts.
+    leaning : ndarray, shape (step, 2), optional
+        A factor exp(leaning . heading) on the density, beside what the model has.
+    leaving : ndarray, shape (step,), optional
+        Log of a factor on landing between the rooms, likewise.
     """
 
     scene: Scene
     fitted: Fitted
     noise_m: float = 0.0
     seed: int = 0
+    n_draws: int = DRAWS
+    every: int = 1
+    leaning: Floats | None = None
+    leaving: Floats | None = None
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
         """Turns in zones that were fitted."""
-        return np.flatnonzero(self.fitted.used)
+        return np.flatnonzero(self.fitted.used)[:: self.every]
 
     @cached_property
     def turns(self) -> Turns:
@@ -96,19 +109,44 @@ class Law:
     @cached_property
     def weight(self) -> Floats:
         """Attraction of what each cell of headings lands in, tilts included, shape (step, cell)."""
-        gamma = np.exp(self._x[:, 3:-1])
         per = 2 * math.pi / ANGLES / PER_CELL
-        made = per * (self.turns.share * gamma[:, None]).sum(axis=2)
+        made = per * (self.turns.share * self._gamma[:, None]).sum(axis=2)
         tilt = self.fitted.view.tilt
-        return np.ascontiguousarray(made * tilt[self.rows] if len(tilt) else made)
+        made = made * tilt[self.rows] if len(tilt) else made
+        if self.leaning is not None:
+            angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
+            ways = np.stack([np.cos(angle), np.sin(angle)])
+            made = made * np.exp(self.leaning @ ways)
+        return np.ascontiguousarray(made)
+
+    @cached_property
+    def _gamma(self) -> Floats:
+        """Attraction of each zone to who is where a step begins, shape (step, zone)."""
+        made = np.exp(self._x[:, 3:-1])
+        if self.leaving is not None:
+            made[:, self.between - 1] *= np.exp(self.leaving)
+        return made
+
+    @cached_property
+    def between(self) -> int:
+        """Id of the zone between the rooms; 0 without rooms."""
+        return find_rooms(self.scene.arena)[0]
+
+    @cached_property
+    def between_share(self) -> Floats:
+        """Share of each cell's attraction that is of landing between the rooms."""
+        share = self.turns.share * self._gamma[:, None]
+        return np.asarray(share[:, :, self.between - 1] / np.maximum(share.sum(axis=2), 1e-300))
 
     @cached_property
     def log_here(self) -> Floats:
         """Log attraction of where the step landed, tilts included, shape (step,)."""
-        gamma = self._x[np.arange(len(self.rows)), 2 + self.turns.landing]
+        gamma = np.log(self._gamma[np.arange(len(self.rows)), self.turns.landing - 1])
         taken = self.fitted.view.tilt_taken
         if len(taken):
             gamma = gamma + np.log(np.maximum(taken[self.rows], 1e-300))
+        if self.leaning is not None:
+            gamma = gamma + (self.leaning * self.turns.taken).sum(axis=1)
         return np.asarray(gamma)
 
     @cached_property
@@ -125,7 +163,7 @@ class Law:
         if not self.noise_m > 0:
             return (draw_of(steps, self.scene.states, self.fitted.view),)
         random = np.random.default_rng([self.seed, 7])
-        return tuple(drawn(steps, self.noise_m, random) for _ in range(DRAWS))
+        return tuple(drawn(steps, self.noise_m, random) for _ in range(self.n_draws))
 
     @cached_property
     def _weights(self) -> list[Floats]:

@@ -10,6 +10,9 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.selection import LEVEL
 
+_HELD_AGAINST_NOISE = 3
+"""Names, those that gain most: the others have no chance to be the best."""
+
 Noise = Callable[[Sequence[Gain]], Sequence[float]]
 """Of some gains: what noise of positions alone makes each of these features gain, in nats."""
 
@@ -48,9 +51,12 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
     """
     n_tried = sum(gain.n_tried for gain in _once(gains))
     clear = [gain for gain in gains if gain.p * n_tried < LEVEL]
-    if noise is not None and clear:
-        known = zip(clear, noise(clear), strict=True)
-        clear = [replace(gain, noise_nats=nats) for gain, nats in known]
+    if noise is not None:
+        ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
+        doubted = [g for g in clear if g.name in ahead and not g.without_noise]
+        known = zip(doubted, noise(doubted) if doubted else (), strict=True)
+        clear = [gain for gain in clear if gain.without_noise and gain.name in ahead]
+        clear += [replace(gain, noise_nats=nats) for gain, nats in known]
         clear = [gain for gain in clear if gain.p * n_tried < LEVEL]
     best = best_by_name(clear)
     if not best:

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, attended, evenly
+from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, attended, evenly
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
@@ -124,12 +124,19 @@ def _mean(seen: Seen) -> Floats:
     return (total / np.maximum(length, 1e-9)[:, None])[:, None]
 
 
+def _toward_mean(seen: Seen) -> Floats:
+    """Return the sine of the angle from the own heading to the others' mean one."""
+    mean, own = _mean(seen)[:, 0], seen.own_heading
+    return np.asarray(own[:, 0] * mean[:, 1] - own[:, 1] * mean[:, 0])
+
+
 _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0),
     Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0),
     Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
     Tilt(label="leaning", vectors=_summed),
     Tilt(label="leaning, the mean", vectors=_mean),
+    Turned(label="turning", by=_toward_mean, neighbours=False),
 )
 
 

@@ -8,7 +8,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.features import Feature, Leaving, Seen
+from zfcal.model.features import Feature, Leaving, Seen, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms
@@ -43,7 +43,14 @@ def _who(seen: Seen) -> Floats:
     return (seen.track[:, None] == tracks[1:]).astype(np.float64)
 
 
-_FEATURES: tuple[Feature, ...] = (Leaving(label="who", weights=_who),)
+def _leaning(seen: Seen) -> Floats:
+    return np.asarray(_who(seen)[..., None] * seen.way_out[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Leaving(label="who", weights=_who),
+    Tilt(label="leaning to the way out", vectors=_leaning),
+)
 
 
 EFFECT = Effect(

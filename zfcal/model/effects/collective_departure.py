@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
-from zfcal.model.features import Feature, Leaving, Seen, hats
+from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, hats, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import LEFT_S, ROOM
@@ -32,7 +34,23 @@ def _freshly_left(seen: Seen) -> Floats:
     return hats(seen.left_s, _KNOTS_S)[:, :-1]
 
 
-_FEATURES: tuple[Feature, ...] = (Leaving(label="time", weights=_freshly_left),)
+def _way_out(seen: Seen) -> Floats:
+    return only(seen.way_out)
+
+
+def _freshly(seen: Seen) -> Floats:
+    return only(_freshly_left(seen))
+
+
+def _leaning(seen: Seen) -> Floats:
+    return np.asarray(_freshly_left(seen)[..., None] * seen.way_out[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Leaving(label="time", weights=_freshly_left),
+    Component(label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0),
+    Tilt(label="leaning to the way out", vectors=_leaning),
+)
 
 
 EFFECT = Effect(

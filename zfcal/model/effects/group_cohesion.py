@@ -82,10 +82,20 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(weights[..., None] * toward[:, None])
 
 
+def _of_each(seen: Seen) -> Floats:
+    return seen.by_distance(_KNOTS_M)
+
+
+def _leaning_to_each(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sjd->sbd", _of_each(seen), seen.bearing))
+
+
 _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0),
     Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
+    Component(label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0),
     Tilt(label="leaning", vectors=_leaning),
+    Tilt(label="leaning to each", vectors=_leaning_to_each),
 )
 
 

@@ -21,6 +21,9 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
 
 
+_MOST_FISH = 12
+"""With more than so many tracks nobody is known for long enough to be followed as such."""
+
 _KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
 
 
@@ -35,9 +38,19 @@ def _fastest(seen: Seen) -> Floats:
     return chosen[..., None]
 
 
+def _who(seen: Seen) -> Floats:
+    """Return one for each fish but the first, shape (step, other, fish - 1)."""
+    fish = np.unique(np.where(seen.is_robot, -1, seen.other))
+    fish = fish[fish >= 0]
+    if len(fish) > _MOST_FISH:
+        return np.zeros((*seen.other.shape, 1))
+    return np.asarray((seen.other[..., None] == fish[1:]) & ~seen.is_robot[..., None], float)
+
+
 _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention),
     factor_on_attention(_fastest, label="the fastest in view"),
+    factor_on_attention(_who, label="who"),
 )
 
 

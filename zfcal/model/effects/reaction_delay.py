@@ -13,20 +13,25 @@ from zfcal.model.features import Component, Feature, Seen
 
 
 def _late(
-    label: str, toward: Callable[[Seen], Floats], attention: Callable[[Seen], Floats]
+    label: str,
+    toward: Callable[[Seen], Floats],
+    attention: Callable[[Seen], Floats],
+    high: float = 1.0,
 ) -> Component:
     """Return a share of the attention that goes to where others were, not to where they are."""
     return Component(
         label=label,
         toward=lambda seen: np.concatenate([toward(seen), seen.toward], axis=1),
         weights=lambda seen: np.concatenate([attention(seen), -seen.attention], axis=1)[..., None],
-        high=1.0,
+        high=high,
     )
 
 
 _FEATURES: tuple[Feature, ...] = (
-    _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention),
+    _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
+    _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
     _late("a step", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
+    _late("two steps", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
 )
 
 
@@ -47,7 +52,7 @@ EFFECT = Effect(
             low=0.0,
             high=2.0,
             default=0.6,
-            says="Age of what fish see of the others, in seconds; a whole number of steps.",
+            says="Age of what fish see of the others, in seconds; between steps all swim straight.",
         ),
         EffectParameter(
             name="felt_m",
@@ -71,6 +76,10 @@ EFFECT = Effect(
         {"delay_s": delay_s, "felt_m": felt_m, "whole": whole}
         for felt_m, whole in ((0.0, 1.0), (0.05, 0.0))
         for delay_s in (0.2, 0.4, 0.6, 1.0, 1.6)
+    ),
+    further_shapes=lambda _arena: tuple(
+        {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
+        for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
     ),
     lacks=needs_neighbour,
     identity_s=2.4,

@@ -7,7 +7,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.features import Feature, Seen, Tilt, Turned
+from zfcal.model.features import Component, Feature, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 
@@ -25,9 +25,21 @@ def _left(seen: Seen) -> Floats:
     return np.asarray((seen.zone[:, None] == zones)[..., None] * left[:, None])
 
 
+def _both_ways(seen: Seen) -> Floats:
+    return np.stack([seen.along_wall, -seen.along_wall], axis=1)
+
+
+def _half(seen: Seen) -> Floats:
+    half = np.where(seen.follows_walls, 0.5, 0.0)
+    return np.stack([half, -half], axis=1)[..., None]
+
+
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
     Tilt(label="leaning", vectors=_left),
+    Component(
+        label="along the wall", toward=_both_ways, weights=_half, kappa="own", low=-0.98, high=0.98
+    ),
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.features import Feature, Seen, Turned
+from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY
@@ -37,7 +37,31 @@ def _last_turn(seen: Seen) -> Floats:
     return np.where(seen.follows_walls, 0.0, seen.last_turn_rad)
 
 
-_FEATURES: tuple[Feature, ...] = (Turned(label="offset", by=_last_turn, neighbours=False),)
+def _before(seen: Seen) -> Floats:
+    return only(_heading_before(seen))
+
+
+def _one(seen: Seen) -> Floats:
+    return np.ones((len(seen.zone), 1, 1))
+
+
+def _heading_before(seen: Seen) -> Floats:
+    c, s = np.cos(seen.last_turn_rad), np.sin(seen.last_turn_rad)
+    x, y = seen.own_heading[:, 0], seen.own_heading[:, 1]
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+
+
+def _leaning(seen: Seen) -> Floats:
+    """Return what of the heading before is aside of the present one: that is the memory."""
+    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
+    return np.asarray((np.sin(seen.last_turn_rad)[:, None] * left)[:, None])
+
+
+_FEATURES: tuple[Feature, ...] = (
+    Turned(label="offset", by=_last_turn, neighbours=False),
+    Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
+    Tilt(label="leaning to the heading before", vectors=_leaning),
+)
 
 
 EFFECT = Effect(

@@ -20,6 +20,7 @@ from zfcal.model.kernels.state import (
     GRID,
     HX,
     HY,
+    LATE_PART,
     LATE_WHOLE,
     SPEED,
     STATES,
@@ -83,12 +84,24 @@ def advance(
 
 
 @inlined
+def _between(past: Floats, after: int, before: int, part: float) -> None:
+    """Write into the last row where all were between two steps, ``part`` of the way back."""
+    for row in range(past.shape[1]):
+        for i in range(past.shape[2]):
+            past[-1, row, i] = (1.0 - part) * past[after, row, i] + part * past[before, row, i]
+    for i in range(past.shape[2]):
+        length = math.hypot(past[-1, 2, i], past[-1, 3, i])
+        if length > 0.0:
+            past[-1, 2, i], past[-1, 3, i] = past[-1, 2, i] / length, past[-1, 3, i] / length
+
+
+@inlined
 def see_late(state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
     """Look at where the others were some steps ago, and keep where all are now.
 
     Where but a share is late, that goes to ``work.late``, and sight is of the present.
     """
-    slots = work.past.shape[0]
+    slots = work.past.shape[0] - 1
     step = int(work.steps[0])
     for i in range(state.shape[1]):
         work.past[step % slots, 0, i], work.past[step % slots, 1, i] = state[X, i], state[Y, i]
@@ -96,6 +109,10 @@ def see_late(state: Floats, model: int, packed: Packed, sight: Sight, work: Work
     seen = max(0, step - packed.lags[model]) % slots
     work.steps[0] = step + 1.0
     late = packed.lates[model]
+    if late[LATE_PART] < 1.0:
+        after = max(0, step - packed.lags[model] + 1) % slots
+        _between(work.past, after, seen, late[LATE_PART])
+        seen = slots
     if late[LATE_WHOLE] > 0.0:
         look_back(state, work.past, seen, model, packed, sight)
     else:

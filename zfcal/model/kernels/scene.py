@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats, Ints
-from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import make_sight, see
 from zfcal.model.kernels.state import (
@@ -89,9 +89,28 @@ def fill_states(
     return states
 
 
+@inlined
+def _once(states: Floats, now: int, lag: float, row: int, j: int) -> float:
+    """Return a state of an agent some steps before, between two of them if need be."""
+    whole = math.ceil(lag)
+    part = lag - whole + 1.0
+    before = states[max(0, now - int(whole)), row, j]
+    if part >= 1.0:
+        return before
+    return (1.0 - part) * states[max(0, now - int(whole) + 1), row, j] + part * before
+
+
+@inlined
+def _was_there(states: Floats, now: int, lag: float, j: int) -> bool:
+    """Tell whether an agent was inside, at both ends of the step if it was between two."""
+    whole = int(math.ceil(lag))  # noqa: RUF046 - of a kernel it is a float
+    there = states[max(0, now - whole), ZONE, j] > 0.0
+    return there and (lag >= whole or states[max(0, now - whole + 1), ZONE, j] > 0.0)
+
+
 @kernel
 def perceive(
-    states: Floats, at: Ints, who: Ints, lag: int, cos_fov: float
+    states: Floats, at: Ints, who: Ints, lag: float, cos_fov: float
 ) -> tuple[Floats, Floats]:
     """Return unit vectors to neighbours and the solid angles at which they are seen.
 
@@ -100,7 +119,7 @@ def perceive(
     at, who : ndarray of int64, shape (step,)
         Sample and agent of each step.
     lag
-        Steps by which others are seen late.
+        Steps by which others are seen late; between two steps they swam straight.
 
     Returns
     -------
@@ -113,12 +132,14 @@ def perceive(
     sight = make_sight(n)
     for s in range(at.size):
         own, i = states[at[s]], who[s]
-        then = states[max(0, at[s] - lag)]
         for j in range(n):
-            there = j != i and then[ZONE, j] > 0.0
-            dx = then[X, j] - own[X, i] if there else 0.0
-            dy = then[Y, j] - own[Y, i] if there else 0.0
-            hx, hy = then[HX, j], then[HY, j]
+            there = j != i and _was_there(states, at[s], lag, j)
+            dx = _once(states, at[s], lag, X, j) - own[X, i] if there else 0.0
+            dy = _once(states, at[s], lag, Y, j) - own[Y, i] if there else 0.0
+            hx, hy = _once(states, at[s], lag, HX, j), _once(states, at[s], lag, HY, j)
+            length = math.hypot(hx, hy)
+            if lag > math.floor(lag) and length > 0.0:
+                hx, hy = hx / length, hy / length
             if hx == 0.0 and hy == 0.0:  # of unknown heading: it swims straight away
                 away = math.sqrt(dx * dx + dy * dy)
                 hx, hy = (dx / away, dy / away) if away > 0.0 else (1.0, 0.0)
@@ -136,7 +157,7 @@ def perceive(
 
 @kernel
 def head_late(
-    states: Floats, at: Ints, who: Ints, lag: int, felt_m: float, toward: Floats, made: Floats
+    states: Floats, at: Ints, who: Ints, lag: float, felt_m: float, toward: Floats, made: Floats
 ) -> None:  # fmt: skip
     """Write unit vectors to where others were; to where they are who are near.
 
@@ -151,13 +172,16 @@ def head_late(
     """
     for s in range(at.size):
         own, i = states[at[s]], who[s]
-        then = states[max(0, at[s] - lag)]
         for j in range(states.shape[2]):
             made[s, j, 0], made[s, j, 1] = toward[s, j, 0], toward[s, j, 1]
             near_x, near_y = own[X, j] - own[X, i], own[Y, j] - own[Y, i]
-            if not then[ZONE, j] > 0.0 or near_x * near_x + near_y * near_y <= felt_m * felt_m:
+            if (
+                not _was_there(states, at[s], lag, j)
+                or near_x * near_x + near_y * near_y <= felt_m * felt_m
+            ):
                 continue
-            dx, dy = then[X, j] - own[X, i], then[Y, j] - own[Y, i]
+            dx = _once(states, at[s], lag, X, j) - own[X, i]
+            dy = _once(states, at[s], lag, Y, j) - own[Y, i]
             away = math.sqrt(dx * dx + dy * dy)
             if away > 0.0:
                 made[s, j, 0], made[s, j, 1] = dx / away, dy / away

@@ -43,7 +43,7 @@ KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
 
 # What is late of what agents see: which share; beyond which distance; and whether who is seen,
 # and how large, is late too, or the direction alone.
-LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_COLUMNS = range(4)
+LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART, LATE_COLUMNS = range(5)
 
 # Laws of a zone's tables of von Mises draws.
 LAW_BASE, LAW_F, LAWS = range(3)
@@ -80,7 +80,7 @@ class Packed(NamedTuple):
     lags : ndarray of int64, shape (model,)
         Steps by which agents respond late: others are seen where they were then.
     lates : ndarray, shape (model, 3)
-        Columns LATE_SHARE, LATE_FELT_M, LATE_WHOLE.
+        Columns LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART.
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
@@ -127,8 +127,8 @@ class Work(NamedTuple):
         Zone ids before the step.
     grid_x, grid_y, values, density : ndarray, shape (angle + 1,)
         Unit vectors of the grid's angles, and densities on it.
-    past : ndarray, shape (LAG_MAX + 1, 4, agent)
-        Where all were at former steps; see `look_back`.
+    past : ndarray, shape (LAG_MAX + 2, 4, agent)
+        Where all were at former steps, see `look_back`; the last row is for between two of them.
     steps : ndarray, shape (1,)
         Steps done since the start, for models that respond late.
     spin : ndarray, shape (2,)
@@ -167,7 +167,7 @@ def make_work(n: int, n_components: int, grid: int) -> Work:
     return Work(
         np.zeros((n, 4)), np.zeros((2 * n + n_components, 5)), np.zeros(n),
         np.cos(angles), np.sin(angles), np.zeros(grid + 1), np.zeros(grid + 1),
-        np.zeros((LAG_MAX + 1, 4, n)), np.zeros(1), np.array([1.0, 0.0]),
+        np.zeros((LAG_MAX + 2, 4, n)), np.zeros(1), np.array([1.0, 0.0]),
         np.zeros((n * n, 3)), sectors, np.zeros((2 * n + n_components + 2, 4)),
     )  # fmt: skip
 
