@@ -37,6 +37,32 @@ def test_the_benchmark_of_coverage_runs(tiny):
         assert held[-1] <= one["n"]
 
 
+@pytest.mark.slow
+def test_the_benchmark_of_the_papers_way_runs(tiny, tmp_path):
+    """One virtual trial: three rounds, of which the first has a window that follows."""
+    found, text = tiny("calibration/bench_as_published.py", "--build", tmp_path / "build")
+    (row,) = found["rows"]
+    assert [each["end_s"] for each in row["rounds"]] == [120, 180, 240]
+    assert [each["forward"] is None for each in row["rounds"]] == [False, True, True]
+    assert "| as published | 0." in text
+
+
+def test_differences_to_the_papers_way_are_taken_trial_by_trial(script):
+    """By 0.1 and 0.3 more: 0.2, and a standard error of 0.1."""
+    scores = {"as published": (0.5, 0.6), "other": (0.6, 0.9)}
+    rows = []
+    for way, each in scores.items():
+        for seed, s in enumerate(each):
+            one = {"reported": s, "anew": s, "forward": s, "ceiling": 0.8}
+            rows.append({"seed": seed, "way": way, "rounds": [one]})
+    found = {"machine": "one", "minutes": 4, "generations": 1, "rows": rows}
+
+    text = script("calibration.bench_as_published").markdown(found)
+
+    assert "| as published | 0.550 ± 0.050 |" in text
+    assert "| other | +0.200 ± 0.100 |" in text
+
+
 def test_a_share_has_its_binomial_interval(script):
     """None of ten: up to 1 - 0.025 ** 0.1."""
     share_and_ends = script("calibration.bench_coverage").share_and_ends

@@ -57,6 +57,59 @@ def test_the_documented_diagnoses_are_those_of_the_numbers(script, repository, r
     assert script("real.document").replaced(text, tables) == text
 
 
+def test_the_documented_distances_are_those_of_the_numbers(script, repository, results):
+    """The same of the ring, in the document about published scores."""
+    text = (repository / "docs" / "reproduce.md").read_text("utf-8")
+    tables = script("real.ring_distances").tables(results("ring_distances"))
+
+    assert script("real.document").replaced(text, tables) == text
+
+
+def test_distances_in_the_ring_by_hand(script):
+    """Two fish a quarter turn apart, the robot opposite one; a lost fish takes no part."""
+    xy_m = np.array(
+        [[[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]], [[1.0, 0.0], [np.nan] * 2, [0.0, -1.0]]]
+    )
+
+    found = script("real.ring_distances").mean_distances(xy_m, 2)
+
+    assert found.fish_turns == pytest.approx(1 / 4)
+    assert found.robot_turns == pytest.approx((1 / 2 + 1 / 4 + 1 / 4) / 3)
+    assert found.fish_m == pytest.approx(2**0.5)
+    assert found.robot_m == pytest.approx((2 + 2 * 2**0.5) / 3)
+
+
+def test_angles_in_the_ring_go_the_shorter_way_round(script):
+    """Ten degrees on either side of the place where angles jump: 20 degrees, and no robot."""
+    angle = np.radians([170.0, -170.0])
+    xy_m = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[None]
+
+    found = script("real.ring_distances").mean_distances(xy_m, None)
+
+    assert found.fish_turns == pytest.approx(20 / 360)
+    assert np.isnan(found.robot_turns)
+
+
+def test_agents_without_regard_to_each_other_are_a_quarter_turn_apart(script):
+    """Mean of 40,000 pairs: the test notices 1 % of it."""
+    angle = np.random.default_rng(1).uniform(-np.pi, np.pi, (40_000, 2))
+    xy_m = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    found = script("real.ring_distances").mean_distances(xy_m, 1)
+
+    assert found.robot_turns == pytest.approx(0.25, abs=0.0025)
+    assert np.isnan(found.fish_m)
+
+
+def test_the_numbers_of_the_ring_are_those_of_its_recordings(script, shared_data, results):
+    """One run measured again."""
+    ring, distances = script("real.ring"), script("real.ring_distances")
+    run = ring.read_ring(shared_data / "zebrafish-robot-ring" / "Despotic_model_1.npz")
+    kept = results("ring_distances")["Despotic_model_1"]
+
+    assert distances.of_run(run).robot_turns == pytest.approx(kept["robot_turns"], abs=1e-4)
+
+
 def test_every_documented_score_stands_with_its_ceiling_and_its_picture(repository, results):
     """A score without a ceiling says nothing, and a picture is small."""
     for name, one in results("real_recordings")["recordings"].items():

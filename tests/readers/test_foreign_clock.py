@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.readers.clock import check_declared, check_rate
+from zfcal.readers.clock import check_declared, check_rate, frames_of
 
 HERE = Path("tracks.csv")
+
+
+def wavering(frame, jitter_s, *, fps=15.0, off=1.0, seed=1):
+    """Return times of frames on a clock that runs `off` times as long, each off by chance."""
+    noise_s = np.random.default_rng(seed).normal(0.0, jitter_s, len(frame))
+    return np.sort(frame / fps * off + noise_s)
 
 
 @pytest.mark.parametrize("digits", [2, 3, 6])
@@ -81,3 +87,80 @@ def test_another_stated_rate_is_refused(declared, fps):
 def test_a_rate_that_is_no_number_is_noted():
     """NaN or 0 in the file: the person's rate is taken."""
     assert "no usable frame rate" in check_declared(HERE, float("nan"), 15.0)[0]
+
+
+@pytest.mark.parametrize("jitter_ms", [0, 4, 8, 12, 16, 20])
+@pytest.mark.parametrize("off", [1.0, 1.013, 0.985])
+def test_frames_do_not_run_ahead_of_a_clock_that_wavers(jitter_ms, off):
+    """Ten minutes without a lost frame: rounding each step loses 200 frames at 12 ms."""
+    frame = np.arange(9000)
+
+    found = frames_of(wavering(frame, jitter_ms / 1000, off=off), 15.0)
+
+    # At 20 ms the first row may itself take the frame before its own.
+    assert np.abs(found - frame).max() <= (1 if jitter_ms == 20 else 0)
+
+
+@pytest.mark.parametrize("jitter_ms", [0, 4, 8, 12, 16, 20])
+def test_lost_frames_stay_lost_however_much_times_waver(jitter_ms):
+    """One frame in twenty at random, and four seconds: none is more than a frame away."""
+    kept = np.random.default_rng(2).random(9000) > 0.05
+    kept[4000:4060] = False
+    frame = np.flatnonzero(kept)
+
+    found = frames_of(wavering(frame, jitter_ms / 1000), 15.0)
+
+    apart = found - (frame - frame[0])
+    assert np.abs(apart).max() <= 1
+    assert np.mean(apart != 0) < 0.01
+    assert (np.diff(found) > 0).all()
+
+
+@pytest.mark.parametrize("gap_s", [0.4, 4.0, 3600.0])
+def test_a_gap_between_wavering_times_has_its_length(gap_s):
+    """Also one so long that the clock's own error of 0.7 % is many frames."""
+    n_lost = round(gap_s * 15)
+    frame = np.concatenate([np.arange(2000), np.arange(2000) + 2000 + n_lost])
+
+    found = frames_of(wavering(frame, 0.012, off=1.007), 15.0)
+
+    assert found[-1] - found[0] == pytest.approx(frame[-1], abs=max(1, 5e-4 * n_lost))
+    assert (np.diff(found[:2000]) == 1).all()
+    assert (np.diff(found[2000:]) == 1).all()
+
+
+def test_one_late_row_in_a_hundred_costs_no_frames():
+    """A computer that is busy notes a row 45 ms late; the next is in time."""
+    frame = np.arange(9000)
+    late = np.random.default_rng(3).random(9000) < 0.01
+
+    assert np.array_equal(frames_of(frame / 15 * 1.004 + 0.045 * late, 15.0), frame)
+
+
+def test_a_clock_that_is_set_slowly_takes_no_frames_along():
+    """Three frames to and fro in ten minutes, beside 12 ms of jitter."""
+    frame = np.arange(9000)
+    slow_s = 0.2 * np.sin(2 * np.pi * frame / 9000)
+
+    assert np.array_equal(frames_of(wavering(frame, 0.012) + slow_s, 15.0), frame)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 30])
+def test_few_wavering_rows_have_a_frame_each(n):
+    """Too few to tell a rate: the expected one holds."""
+    frame = np.arange(n)
+
+    assert np.array_equal(frames_of(wavering(frame, 0.012, seed=4), 15.0), frame)
+
+
+@pytest.mark.parametrize("jitter_ms", [0, 4, 8, 12, 16, 20])
+def test_jitter_is_no_other_rate_and_hides_none(jitter_ms):
+    """15 Hz passes; 5 % off and two rates are refused as on a steady clock."""
+    frame = np.arange(9000)
+
+    check_rate(HERE, wavering(frame, jitter_ms / 1000), fps=15.0)
+    with pytest.raises(InputError, match="expected fps = 15 Hz"):
+        check_rate(HERE, wavering(frame, jitter_ms / 1000, off=1.05), fps=15.0)
+    slower = np.where(frame < 4500, frame, 4500 + (frame - 4500) * 1.5)
+    with pytest.raises(InputError, match="two frame rates"):
+        check_rate(HERE, wavering(slower, jitter_ms / 1000), fps=15.0)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import isotonic_regression
 
 from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
@@ -18,11 +20,27 @@ _TWO_RATES = 1.2
 _BLOCK = 20
 _MAX_BLOCKS = 10
 
+_SURE = 0.25
+"""Steps that are all nearer to whole frames than this leave no doubt."""
+
+_FAR = 20.0
+"""Frames of a gap across which phases are not averaged."""
+
+_WINDOW = 600
+"""Rows over which phases are averaged: few enough for a clock's rate to be steady."""
+
+_LEAST = 40
+"""Rows that tell a rate; fewer have that of the others."""
+
+_NEAREST_FIRST = np.argsort(np.abs(np.arange(-80, 81)), kind="stable")
+_FACTORS = 1 + 5e-4 * np.arange(-80, 81)[_NEAREST_FIRST]
+"""Rates that are tried, the expected one first: it holds where nothing tells another."""
+
 
 def check_rate(path: Path, time_s: Floats, *, fps: float, frame: Ints | None = None) -> None:
     """Refuse a file whose times advance at another rate than ``fps``, or at two rates.
 
-    Gaps and stray rows are left out: a step is regular when it is 0.4 to 1.5
+    Gaps and stray rows are left out: a step is regular when it is half to 1.5
     times the median of its neighbourhood, or its length is told by `frame`.
 
     Parameters
@@ -58,7 +76,7 @@ def _rate(steps: Floats, counts: Floats, *, told: bool) -> float:
     if not told:
         # The lower median is a step that occurs: half way between two would suit neither.
         usual = np.partition(steps, (len(steps) - 1) // 2)[(len(steps) - 1) // 2]
-        regular = (steps > 0.4 * usual) & (steps < 1.5 * usual)
+        regular = (steps > 0.499 * usual) & (steps < 1.5 * usual)
     return float(counts[regular].sum() / steps[regular].sum())
 
 
@@ -73,10 +91,11 @@ def _compare(path: Path, rate_hz: float, fps: float, *, n_steps: int) -> None:
 
 
 def frames_of(time_s: Floats, fps: float) -> Ints:
-    """Return frame numbers: whole frames since the row before, at least one.
+    """Return frame numbers of times that waver, as a computer's clock gives them.
 
-    A wall clock wavers: rounding each time by itself would put two rows into one
-    frame whenever the times drift past the middle of a frame.
+    Where each step is close to whole frames it is rounded. Otherwise the jitter is
+    taken out first: a step that is rounded up costs a frame for good, since the short
+    one behind it still takes a frame of its own.
 
     Parameters
     ----------
@@ -88,10 +107,67 @@ def frames_of(time_s: Floats, fps: float) -> Ints:
     Returns
     -------
     ndarray of int64, shape (row,)
-        From 0.
+        From 0, strictly ascending. A row is off by a frame at most where a frame is lost beside
+        it; jitter is averaged out up to a standard deviation of about 0.3 frames.
+
+    Notes
+    -----
+    The share of a frame by which times lie beside the grid of frames is a circular mean over
+    some hundred rows: lost frames, which are whole, do not move it. What is left over is rounded
+    in one with all other rows, by isotonic regression: a row takes a later place than the one
+    before it, and an empty frame is kept where the rows that follow need it.
     """
-    steps = np.maximum(np.rint(np.diff(time_s) * fps), 1).astype(np.int64)
-    return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(steps)])
+    steps = np.diff(time_s) * fps
+    whole = np.maximum(np.rint(steps), 1.0)
+    if (np.abs(steps - whole) < _SURE).all():
+        return np.concatenate([[0.0], np.cumsum(whole)]).astype(np.int64)
+    stretches = np.split(np.arange(len(time_s)), np.flatnonzero(steps > _FAR) + 1)
+    rate = _local_rates(time_s * fps, stretches)
+    # Across a gap the rates on both sides count alike.
+    at = np.concatenate([[0.0], np.cumsum(steps * (rate[1:] + rate[:-1]) / 2)])
+    phase = np.concatenate([_mean_phase(at[rows]) for rows in stretches])
+    at -= np.unwrap(phase) / (2 * np.pi)
+    row = np.arange(len(at))
+    frame = row + np.rint(isotonic_regression(at - row).x).astype(np.int64)
+    return frame - frame[0]
+
+
+def _local_rates(at: Floats, stretches: list[Ints]) -> Floats:
+    """Return how fast the grid runs at each row, as a factor of the expected rate.
+
+    It is the factor at which the phases of a window's rows agree best. That of all windows
+    together holds for a window as well, unless its own is clearly better.
+    """
+    parts = [part for rows in stretches for part in _windows(rows)]
+    power = np.array([_agreement(at[part]) for part in parts])
+    common = int(np.argmax(power.sum(axis=0)))
+    best = np.argmax(power, axis=1)
+    clear = power.max(axis=1) > 2 * power[:, common]
+    rates = _FACTORS[np.where(clear, best, common)]
+    return np.repeat(rates, [len(part) for part in parts])
+
+
+def _windows(rows: Ints) -> list[Ints]:
+    return np.array_split(rows, max(round(len(rows) / _WINDOW), 1))
+
+
+def _agreement(at: Floats) -> Floats:
+    """Return the squared length of the sum of phases for each of `_FACTORS`."""
+    if len(at) < _LEAST:
+        return np.zeros(len(_FACTORS))
+    turns = np.exp(2j * np.pi * np.outer(_FACTORS, at - at[0]))
+    length: Floats = np.abs(turns.sum(axis=1)) ** 2
+    return length
+
+
+def _mean_phase(at: Floats) -> Floats:
+    """Return the circular mean of the phases around each row, in radians."""
+    turns = np.exp(2j * np.pi * at)
+    real, imaginary = (
+        uniform_filter1d(part, _WINDOW, mode="constant") for part in (turns.real, turns.imag)
+    )
+    phase: Floats = np.arctan2(imaginary, real)
+    return phase
 
 
 def check_declared(path: Path, declared_hz: float, fps: float) -> tuple[str, ...]:
