@@ -130,6 +130,31 @@ def test_what_is_bad_is_named_and_the_rest_is_shown_until_it_is_mended(trial):
     assert looks.look()["problems"] == []
 
 
+def test_a_damaged_segment_is_named(trial):
+    """Whichever it is, and though its minute may be played from poses."""
+    path = trial / "tracks" / "000000.parquet"
+    path.write_bytes(path.read_bytes()[:-20])
+    problems = state_of(trial).look()["problems"]
+    assert len(problems) == 1
+    assert problems[0].startswith("tracks/000000.parquet")
+
+
+def test_what_has_not_changed_is_read_once(trial, monkeypatch):
+    """Looks cost what has changed."""
+    looks = state_of(trial)
+    looks.look()
+    read = []
+    opened = os.open
+    monkeypatch.setattr(
+        "os.open", lambda path, *rest: (read.append(str(path)), opened(path, *rest))[1]
+    )
+    looks.look()
+    assert [path for path in read if path.startswith(str(trial))] == []
+    (trial / "models" / "000120.toml").touch()
+    looks.look()
+    assert {path.rpartition("/")[2] for path in read} == {"000120.toml"}
+
+
 def test_a_trial_that_is_gone_says_so(trial, tmp_path):
     """And is shown again when it is back."""
     looks = state_of(trial)

@@ -24,7 +24,8 @@ PORT = 8642
 HOST = "127.0.0.1"
 
 _NICENESS = 10
-_GRACE_S = 0.6
+_GRACE_S = 0.4
+"""A server that is told to end has nothing to lose: a page finds out without a word as well."""
 _MOST_WAITING = 200
 """Messages that the page may be behind; the oldest are dropped."""
 

@@ -37,7 +37,7 @@ _KINDS = {
     ".js": "text/javascript",
     ".svg": "image/svg+xml",
 }
-_CLOSING_S = 0.3
+_CLOSING_S = 0.15
 """Open pages hear of the end within this time."""
 
 

@@ -11,6 +11,7 @@ from typing import Any, final
 from zfcal.arena import Arena
 from zfcal.artifacts.reading.contents import looks_of
 from zfcal.artifacts.segments import segment_path, segment_starts
+from zfcal.artifacts.tables import read_extra
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import ZfcalError
 from zfcal.stages.recording import starts_between, stretch_of
@@ -81,10 +82,24 @@ class TrialState:
 
     def _is_whole(self, segments: list[int]) -> bool:
         """Return whether the last segment says that the recording ends with it."""
-        if not segments:
+        stretches = [
+            self._reader.read(segment_path(self._trial.root, start), _stretch) for start in segments
+        ]
+        if not stretches or stretches[-1] is None:
             return False
-        stretch = self._reader.read(segment_path(self._trial.root, segments[-1]), stretch_of)
-        return stretch is not None and starts_between(*stretch)[-1] == segments[-1]
+        return starts_between(*stretches[-1])[-1] == segments[-1]
+
+
+def _stretch(path: Path) -> tuple[float, float] | None:
+    """Return from where to where the recording of a segment goes; None for no word.
+
+    Raises
+    ------
+    InputError, DamagedError
+        The segment is none: each is asked for, so that this is told.
+    """
+    read_extra(path)
+    return stretch_of(path)
 
 
 def findings_of(path: Path) -> dict[str, Any]:

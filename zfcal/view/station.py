@@ -6,7 +6,7 @@ import asyncio
 import json
 import time
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, final
 
 from zfcal.arena import Arena
@@ -58,21 +58,8 @@ class Station:
         return len(self._pages) >= MOST_PAGES
 
     async def run(self) -> None:
-        """Look, and tell all pages, until `close`."""
-        look_s = 0.0
-        while not self._is_closed:
-            await self._open.wait()
-            began_s = time.monotonic()
-            pose = await asyncio.to_thread(self._live.poll)
-            if pose is not None:
-                # What the first look finds may lie there for years.
-                self._seen_s = began_s if self._has_looked else self._seen_s
-                self._publish("pose", pose)
-            self._has_looked = True
-            if began_s >= look_s:
-                look_s = began_s + LOOK_S
-                await self._look()
-            await asyncio.sleep(max(0.0, began_s + TICK_S - time.monotonic()))
+        """Look, and tell all pages, until `close`: positions do not wait for the other files."""
+        await asyncio.gather(self._every(TICK_S, self._follow), self._every(LOOK_S, self._look))
 
     def hear(self, message: dict[str, Any]) -> None:
         """Take what the watch tells: its ``status``, or an ``event``."""
@@ -104,6 +91,21 @@ class Station:
         self._open.set()
         for page in self._pages:
             page.put_nowait(None)
+
+    async def _every(self, interval_s: float, step: Callable[[], Awaitable[None]]) -> None:
+        while not self._is_closed:
+            await self._open.wait()
+            next_s = time.monotonic() + interval_s
+            await step()
+            await asyncio.sleep(max(0.0, next_s - time.monotonic()))
+
+    async def _follow(self) -> None:
+        pose = await asyncio.to_thread(self._live.poll)
+        if pose is not None:
+            # What the first look finds may lie there for years.
+            self._seen_s = time.monotonic() if self._has_looked else self._seen_s
+            self._publish("pose", pose)
+        self._has_looked = True
 
     async def _look(self) -> None:
         self._note("state", await asyncio.to_thread(self._state.look))

@@ -17,7 +17,7 @@ export function showStages(state, watch) {
   const notes = [];
   if (!watch) notes.push("No stage runs here; the times are those of the files.");
   if (watch?.lag_s != null) notes.push(`The last round came ${Math.round(watch.lag_s)} s after its tracks.`);
-  if (state.skipped.length) notes.push(`${state.skipped.length} windows were passed over.`);
+  if (state.skipped.length) notes.push(`Windows passed over: ${state.skipped.length}.`);
   byId("stages-note").textContent = notes.join(" ");
 }
 
@@ -36,7 +36,7 @@ export function showFaults(faults, events, problems) {
   const rows = [
     ...problems.map((text) => row("file", text, true)),
     ...events.filter((e) => WARNS.has(e.event)).map((e) => row("watch", messageOf(e), true)).reverse(),
-    ...faults.map((f) => row(clock(f.time_s), f.says, !f.ended)).reverse(),
+    ...faults.map((f) => row(clock(f.time_s), f.ended ? `Over: ${f.says}` : f.says, !f.ended)).reverse(),
   ];
   fill(byId("fault-rows"), rows.length ? rows : [make("li", { class: "muted" }, "None.")]);
 }
