@@ -57,17 +57,17 @@ def test_faults_of_all_minutes_are_told_once(empty, made):
     with closing(made["drive"](empty, 0)) as drive:
         drive.add(made["fault"](10.0))
     with closing(made["drive"](empty, 60)) as drive:
-        drive.add(made["fault"](61.0))
-        drive.flush()
-        for _ in range(3):
+        for time_s in (61.0, 62.0, 63.0):
+            drive.add(made["fault"](time_s))
+            drive.flush()
             live.poll()
-        assert [fault["time_s"] for fault in live.faults] == [10.0, 61.0]
+        assert [fault["time_s"] for fault in live.faults] == [10.0, 61.0, 62.0, 63.0]
     with closing(made["drive"](empty, 60)) as drive:
         drive.add(made["fault"](70.0, ended=True))
         drive.flush()
         live.poll()
     found = [(fault["time_s"], fault["ended"]) for fault in live.faults]
-    assert found == [(10.0, False), (61.0, False), (70.0, True)]
+    assert found == [(10.0, False), (61.0, False), (62.0, False), (63.0, False), (70.0, True)]
 
 
 def test_what_is_no_file_of_poses_hides_no_good_one(empty, made):

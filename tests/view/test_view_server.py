@@ -46,7 +46,8 @@ def ask(page, path="", *, method="GET", host=None, whole=False):
         line.putheader("Host", host or parts.netloc)
     line.endheaders()
     answer = line.getresponse()
-    answer.text = answer.read().decode()
+    is_endless = answer.getheader("content-type", "").startswith("text/event-stream")
+    answer.text = "" if is_endless else answer.read().decode()
     return answer
 
 
