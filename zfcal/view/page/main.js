@@ -2,7 +2,8 @@
 
 import { describeTank, drawTank, fit, setTank, takeColours } from "./tank.js";
 import { forget, newest, now, takePose, then } from "./player.js";
-import { lastAt, showParameters, showScore } from "./score.js";
+import { showParameters } from "./parameters.js";
+import { lastAt, showScore } from "./score.js";
 import { showFaults, showFindings, showStages } from "./panels.js";
 import { byId, calm, clock, dark, draw, entry, fill } from "./shapes.js";
 
@@ -10,6 +11,8 @@ const AGAIN_MS = 1500;
 const SILENT_MS = 5000;
 const STARTING_MS = 30000;
 const SPEEDS = [1, 2, 5, 10, 30];
+const STAYS =
+  "What you see stays; the page comes back by itself when zfcal watch --view runs again.";
 const PLAY = "M5 3 L17 10 L5 17 Z";
 const PAUSE = "M4 3 H8 V17 H4 Z M12 3 H16 V17 H12 Z";
 
@@ -50,7 +53,7 @@ function lose(because) {
 function setLink(isOpen, because = "") {
   page.dataset.link = isOpen ? "open" : "gone";
   byId("alarm").hidden = isOpen && !seen.state?.gone;
-  if (!isOpen) byId("alarm").textContent = `${because} What you see stays; the page comes back by itself when zfcal watch --view runs again.`;
+  if (!isOpen) byId("alarm").textContent = `${because} ${STAYS}`;
   sayLink();
 }
 
@@ -226,7 +229,10 @@ function drawMarks() {
     draw("rect", { x: x(s) - width / 2, y, width, height, fill: colour, opacity });
   byId("marks").setAttribute("viewBox", "0 0 100 10");
   byId("marks").replaceChildren(
-    ...seen.state.minutes.map((s) => draw("rect", { x: x(s), y: 6, width: Math.max(0, Math.min(100, x(s + 60)) - x(s)), height: 3, fill: "fish", opacity: 0.35 })),
+    ...seen.state.minutes.map((s) => {
+      const width = Math.max(0, Math.min(100, x(s + 60)) - x(s));
+      return draw("rect", { x: x(s), y: 6, width, height: 3, fill: "fish", opacity: 0.35 });
+    }),
     ...seen.state.rounds.filter((r) => r.end_s > 0).map((r) => bar(r.end_s, 2, 0.5, 7, "model")),
     ...seen.faults.filter((f) => !f.ended).map((f) => bar(f.time_s, 0, 0.5, 10, "warn")),
   );

@@ -11,12 +11,14 @@ export function showStages(state, watch) {
     const told = watch?.stages[name];
     const last = told?.last_s ?? state.last[name];
     const done = last ? clock(last) : "–";
-    return make("tr", {}, make("th", { scope: "row" }, title), doing(told), make("td", { class: "number" }, done));
+    const head = make("th", { scope: "row" }, title);
+    return make("tr", {}, head, doing(told), make("td", { class: "number" }, done));
   });
   fill(byId("stage-rows"), rows);
   const notes = [];
   if (!watch) notes.push("No stage runs here; the times are those of the files.");
-  if (watch?.lag_s != null) notes.push(`The last round came ${Math.round(watch.lag_s)} s after its tracks.`);
+  const lag = watch?.lag_s ?? null;
+  if (lag !== null) notes.push(`The last round came ${Math.round(lag)} s after its tracks.`);
   if (state.skipped.length) notes.push(`Windows passed over: ${state.skipped.length}.`);
   byId("stages-note").textContent = notes.join(" ");
 }
@@ -46,7 +48,9 @@ function row(time, text, isBad) {
 }
 
 function messageOf(event) {
-  if (event.event === "skipped") return `The window to ${clock(event.window_end_s)} is passed over. ${event.because}`;
+  if (event.event === "skipped") {
+    return `The window to ${clock(event.window_end_s)} is passed over. ${event.because}`;
+  }
   const from = event.stage ? `${NAMES[event.stage]}: ` : "";
   return `${from}${event.problem ?? event.because ?? event.event}`;
 }
@@ -55,6 +59,11 @@ function messageOf(event) {
 export function showFindings(findings) {
   byId("verdict").textContent = findings ? findings.verdict : "No diagnosis yet.";
   const effects = findings ? findings.effects : [];
-  const said = (e) => [make("strong", {}, e.name), `: ${e.says}`, ...(e.p === null ? [] : [make("span", { class: "muted" }, ` p ${e.p < 0.001 ? "< 0.001" : `= ${e.p.toFixed(3)}`}`)])];
-  fill(byId("effects"), effects.map((e) => make("li", {}, ...said(e))));
+  fill(byId("effects"), effects.map(effectOf));
+}
+
+function effectOf({ name, says, p }) {
+  const chance = p < 0.001 ? "p < 0.001" : `p = ${p?.toFixed(3)}`;
+  const said = p === null ? [] : [make("span", { class: "muted" }, ` ${chance}`)];
+  return make("li", {}, make("strong", {}, name), `: ${says}`, ...said);
 }

@@ -4,6 +4,7 @@ import { calm } from "./shapes.js";
 
 const TRAIL_S = 2.5;
 const FARTHEST_M = 0.15;
+const MOVES_M = 0.004;
 const KEPT = 8;
 
 const minutes = new Map();
@@ -41,7 +42,7 @@ export function then(second, starts) {
   if (!minute) return null;
   const step = (second - start) * minute.hz;
   const agents = minute.agents.map((agent) => placeAt(agent, step, minute.hz)).filter(Boolean);
-  return { agents: agents.map(headed), target: targetAt(minute.targets, second), problem: minute.problem };
+  return { agents: agents.map(headed), target: targetAt(minute.targets, second) };
 }
 
 /** Forget a minute that may have grown. */
@@ -56,14 +57,15 @@ function fetched(start) {
     fetch(`minute/${start}`)
       .then((answer) => answer.json())
       .then((found) => {
-        if (minutes.has(start)) minutes.set(start, found.agents ? found : empty(found.problem));
+        if (minutes.has(start)) minutes.set(start, found.agents ? found : EMPTY);
       })
       .catch(() => setTimeout(() => minutes.delete(start), 1000));
   }
   return minutes.get(start);
 }
 
-const empty = (problem) => ({ hz: 1, agents: [], targets: [], problem });
+/** Of a minute that cannot be read; which file that is stands among the messages. */
+const EMPTY = { hz: 1, agents: [], targets: [] };
 
 function placeAt(agent, step, hz) {
   const low = Math.min(Math.floor(step), agent.x.length - 1);
@@ -80,7 +82,7 @@ function placeAt(agent, step, hz) {
     kind: agent.kind,
     x: place[0],
     y: place[1],
-    heading: agent.heading[low] === null ? null : turned(agent.heading[low], agent.heading[low + 1], part) / 1000,
+    heading: turned(agent.heading[low], agent.heading[low + 1], part),
     guess: agent.guess.includes(low),
     trail: joined([...trail, place]),
   };
@@ -88,10 +90,12 @@ function placeAt(agent, step, hz) {
 
 const mix = (a, b, part) => (b === null || b === undefined ? a : a + (b - a) * part);
 
+/** Return a heading in radians between two in milliradians, the short way round. */
 function turned(a, b, part) {
-  if (b === null || b === undefined) return a;
+  if (a === null) return null;
+  if (b === null || b === undefined) return a / 1000;
   const full = 2000 * Math.PI;
-  return a + (((b - a + 1.5 * full) % full) - full / 2) * part;
+  return (a + (((b - a + 1.5 * full) % full) - full / 2) * part) / 1000;
 }
 
 /** Return the trail since the last gap, or leap. */
@@ -102,13 +106,15 @@ function joined(trail) {
 }
 
 const leaps = (trail, i) =>
-  i < trail.length && Math.hypot(trail[i][0] - trail[i - 1][0], trail[i][1] - trail[i - 1][1]) > FARTHEST_M;
+  i < trail.length && distance(trail[i], trail[i - 1]) > FARTHEST_M;
+
+const distance = ([x, y], [u, v]) => Math.hypot(x - u, y - v);
 
 /** Without a heading an agent looks where it swims. */
 function headed(agent) {
   if (agent.heading !== null || agent.trail.length < 2) return agent;
-  const [x, y] = agent.trail.findLast(([u, v]) => Math.hypot(agent.x - u, agent.y - v) > 0.004) ?? [];
-  return x === undefined ? agent : { ...agent, heading: Math.atan2(agent.y - y, agent.x - x) };
+  const from = agent.trail.findLast((place) => distance([agent.x, agent.y], place) > MOVES_M);
+  return from ? { ...agent, heading: Math.atan2(agent.y - from[1], agent.x - from[0]) } : agent;
 }
 
 function targetAt(targets, second) {

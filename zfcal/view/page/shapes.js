@@ -43,14 +43,17 @@ export function figure(value) {
   return value.toFixed(size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3);
 }
 
+const line = (d, colour, width, more = {}) =>
+  draw("path", { d, stroke: colour, fill: "none", "stroke-width": width, ...more });
+
 const KEYS = {
   triangle: (c) => draw("path", { d: "M9 2 L15 12 L3 12 Z", fill: c }),
   square: (c) => draw("rect", { x: 4, y: 2, width: 10, height: 10, fill: c }),
   fish: (c) => draw("path", { d: "M2 7 C7 1 13 2 15 7 C13 12 7 13 2 7 Z", fill: c }),
   ring: (c) => draw("circle", { cx: 9, cy: 7, r: 5, fill: "none", stroke: c, "stroke-width": 2 }),
   bar: (c) => draw("rect", { x: 1, y: 2, width: 16, height: 10, rx: 2, fill: c, opacity: 0.45 }),
-  dash: (c) => draw("path", { d: "M0 7 H18", stroke: c, fill: "none", "stroke-width": 2.5, "stroke-dasharray": "5 3" }),
-  cross: (c) => draw("path", { d: "M5 3 L13 11 M13 3 L5 11", stroke: c, fill: "none", "stroke-width": 2 }),
+  dash: (c) => line("M0 7 H18", c, 2.5, { "stroke-dasharray": "5 3" }),
+  cross: (c) => line("M5 3 L13 11 M13 3 L5 11", c, 2),
 };
 
 /** Return a picture of a mark, for a key. */
