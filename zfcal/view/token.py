@@ -46,5 +46,7 @@ def _kept(path: Path) -> str | None:
         text = path.read_text(encoding="ascii")
     except (OSError, ValueError):
         return None
-    is_open = os.name == "posix" and (status.st_mode & 0o077 or status.st_uid != os.geteuid())
+    # Windows has neither, and keeps what lies in a person's folders from others.
+    user = getattr(os, "geteuid", None)
+    is_open = user is not None and (status.st_mode & 0o077 or status.st_uid != user())
     return None if is_open or path.is_symlink() or not _FORM.fullmatch(text) else text
