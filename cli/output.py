@@ -163,6 +163,10 @@ class Output:
         """Tell something worth knowing."""
         self._talk("note", text)
 
+    def warn(self, text: str) -> None:
+        """Tell something that a person may have to mend."""
+        self._talk("warning", text)
+
     def _announce(self, record: logging.LogRecord) -> None:
         """Show what the library logs: of this start, not of the result, hence not in JSON."""
         if not self.quiet:

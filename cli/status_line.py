@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, final
 
 if TYPE_CHECKING:
     from rich.live import Live
+    from rich.table import Table
 
     from zfcal.drive.events import DriveStatus
     from zfcal.online.watch_events import StageStatus, Status
@@ -64,14 +65,15 @@ class StatusLine:
         self._shown = shown
         self._live: Live | None = None
 
-    def show(self, state: str) -> None:
-        """Draw the state."""
+    def show(self, state: str | Table) -> None:
+        """Draw the state, on one line or as a table."""
         if not self._shown:
             return
         from rich.text import Text
 
         live = self._live or self._start()
-        live.update(Text(state, no_wrap=True, overflow="ellipsis"), refresh=True)
+        drawn = Text(state, no_wrap=True, overflow="ellipsis") if isinstance(state, str) else state
+        live.update(drawn, refresh=True)
 
     def clear(self) -> None:
         """Wipe the line."""

@@ -13,6 +13,7 @@ from .durations import seconds
 from .options import EXISTING, PLACE, speaks
 from .output import Output
 from .tracking import tracking_options
+from .viewing import view_options
 
 
 @click.command("watch")
@@ -20,8 +21,8 @@ from .tracking import tracking_options
 @click.option(
     "--stages",
     metavar="STAGE,...",
-    help="Of track, analyse, calibrate.  [default: analyse,calibrate; track where a source is "
-    "given]",
+    help="Of track, analyse, calibrate; or none, for the page alone.  [default: "
+    "analyse,calibrate; track where a source is given]",
 )
 @click.option("--poll", is_flag=True, help="Look again and again; automatic on network disks.")
 @click.option("--once", is_flag=True, help="Make all that can be made now, and leave.")
@@ -32,6 +33,7 @@ from .tracking import tracking_options
     metavar="TIME",
     help="Leave when nothing has changed for so long.",
 )
+@view_options
 @round_options(budget="  [default: 50s]")
 @click.option(
     "--control",
@@ -48,7 +50,9 @@ def command(out: Output, trial: Path, **options: Any) -> None:
     Each new minute of tracks is analysed at once and calibrated within the
     minute. A round that overruns makes the next ones shorter; windows that
     would come too late are passed over, which is written down. On one computer
-    of several, --stages says which part it does; rsync brings the rest.
+    of several, --stages says which part it does; rsync brings the rest. With
+    --view a page shows all that to browsers on this computer, and plays the trial
+    once it has ended.
 
     \b
     Example:
@@ -56,13 +60,21 @@ def command(out: Output, trial: Path, **options: Any) -> None:
         zfcal watch trial --overhead 0 --below 1 --budget 50s
         zfcal watch trial --stages calibrate --json
         zfcal watch trial --once --generations 20
+        zfcal watch trial --view
     """
     from zfcal.online.watch import watch
 
+    from .viewing import open_page, stay
     from .watching import Voice, watch_options
 
     chosen = watch_options(trial, options)
     out.in_lines = True
-    with Voice(out) as voice:
-        for left in watch(trial, chosen, voice.hear):
+    with (
+        open_page(trial, options) as page,
+        Voice(out, page, table=options["table"]) as voice,
+    ):
+        voice.announce()
+        for left in watch(trial, chosen, voice.hear) if chosen.jobs(trial) else ():
             out.tell(left)
+        if page is not None and not chosen.once and chosen.until_idle_s is None:
+            stay(page, out)

@@ -115,6 +115,12 @@ def debian():
 
 
 @pytest.fixture(scope="session")
+def browsing():
+    """Return the module whose `Browser` is a headless Chromium that a test drives."""
+    return _module("browsing")
+
+
+@pytest.fixture(scope="session")
 def forking():
     """Return the module whose `Forks` runs commands that a test kills at work."""
     return _module("forks")

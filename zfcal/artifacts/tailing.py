@@ -32,8 +32,8 @@ class Tail:
     ----------
     path
         It need not be there yet.
-    topic
-        The channel that is read.
+    topics
+        The channels that are read.
 
     Attributes
     ----------
@@ -45,12 +45,12 @@ class Tail:
         Bytes behind the last whole record, at the last look.
     """
 
-    def __init__(self, path: Path, topic: str) -> None:
+    def __init__(self, path: Path, *topics: str) -> None:
         self.path = path
         self.metadata: dict[str, dict[str, str]] = {}
         self.is_closed = False
         self.lost_bytes = 0
-        self._topic = topic
+        self._topics = topics
         self._offset = 0
         self._channels: set[int] = set()
 
@@ -134,7 +134,7 @@ class Tail:
     def _messages(self, whole: bytes) -> Iterator[tuple[int, bytes]]:
         try:
             for record in unpacked(io.BytesIO(whole), skip_magic=True):
-                if isinstance(record, Channel) and record.topic == self._topic:
+                if isinstance(record, Channel) and record.topic in self._topics:
                     self._channels.add(record.id)
                 elif isinstance(record, Metadata):
                     self.metadata[record.name] = dict(record.metadata)

@@ -26,6 +26,7 @@ from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
+from zfcal.parameters import Parameters
 from zfcal.report.followed import Followed, followed_from
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import see
@@ -234,9 +235,21 @@ def _statistics(reader: _Reader, second: int | None) -> dict[tuple[int, str], St
 def _round(reader: _Reader, second: int, path: Path) -> Round | None:
     arena, dt_s = reader.arena, reader.trial.dt_s
     model = reader.attempt(path, lambda p: read_model_for(p, arena, dt_s=dt_s))
-    if model is None:
-        return None
-    result = read_result(path)
+    return None if model is None else round_of(second, model, read_result(path))
+
+
+def round_of(second: int, model: Parameters, result: Mapping[str, Any]) -> Round:
+    """Return the round that made a model.
+
+    Parameters
+    ----------
+    second
+        Second at which its window ends; 0 for the starting model.
+    model
+        The model.
+    result
+        What its file says of the calibration; may be empty.
+    """
     said = result.get("intervals", {}).get("parameters", {})
     score, names = _named(result.get("score"))
     known = {name: row for name, row in said.items() if {"low", "high", "identified"} <= row.keys()}

@@ -1,0 +1,168 @@
+"""The page in a real browser: what it shows, how it follows, plays, and comes back."""
+
+import re
+import time
+from urllib.parse import urlsplit
+
+import pytest
+
+from zfcal.view.process import Page
+
+pytestmark = [pytest.mark.apt, pytest.mark.slow]
+
+DRAWN = "document.documentElement.dataset.agents"
+SECOND = "Number(document.documentElement.dataset.second)"
+LINK = "document.getElementById('link').textContent"
+
+
+@pytest.fixture
+def browser(debian, browsing, tmp_path):
+    """Return a page of Chromium that a test drives."""
+    with browsing.Browser(debian.need("chromium"), tmp_path / "profile") as opened:
+        opened.show()
+        yield opened
+
+
+def text_of(name):
+    """Return what asks for the text of an element."""
+    return f"document.getElementById('{name}').innerText"
+
+
+def test_it_shows_the_trial_and_asks_for_nothing_elsewhere(browser, trial, tmp_path):
+    """Tank, S of its ceiling, parameters with intervals, stages; no error, no other address."""
+    with Page(trial, 0) as page:
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+        browser.value("document.getElementById('play').click()")
+        browser.press("End")
+        assert browser.until("document.getElementById('s').innerText === '0.800'")
+        assert browser.value(text_of("s-of")) == "of 0.900"
+        assert "89 % of its ceiling" in browser.value(text_of("s-note"))
+        assert "1.00 to 9.00" in browser.value(text_of("parameters"))
+        assert "published by the rule nearest" in browser.value(text_of("parameters-note"))
+        assert browser.value(text_of("stage-rows")).split() == [
+            *("Track", "not", "here", "3:00", "Analyse", "not", "here", "–"),
+            *("Calibrate", "not", "here", "3:00"),
+        ]
+        label = "document.getElementById('tank').ariaLabel"
+        assert re.search(
+            r"at \d:\d\d: 3 fish; .*the robot in", browser.until(f"{label}.length > 30 && {label}")
+        )
+        assert "3:00: 0.80 of 0.90" in browser.value("document.getElementById('rounds').ariaLabel")
+        assert browser.problems() == []
+        hosts = {urlsplit(address).netloc for address in browser.asked_for()}
+        assert hosts <= {urlsplit(page.url).netloc, ""}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_it_fits_the_window_in_the_colours_that_a_person_prefers(browser, trial, width, scheme):
+    """Nothing sticks out; ground and ink are those of the report; fingers hit the buttons."""
+    with Page(trial, 0) as page:
+        browser.show(width, 800, scheme=scheme)
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+        assert browser.value("document.documentElement.scrollWidth") <= width
+        ground = browser.value("getComputedStyle(document.body).backgroundColor")
+        assert ground == {"light": "rgb(255, 255, 255)", "dark": "rgb(22, 25, 29)"}[scheme]
+        sizes = (
+            "[...document.querySelectorAll('button')].map(b => b.getBoundingClientRect().height)"
+        )
+        assert min(browser.value(sizes)) >= 40
+        painted = (
+            "(() => { const c = document.getElementById('tank');"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "return new Set(new Uint32Array(d.buffer)).size })()"
+        )
+        assert browser.value(painted) > 20
+
+
+def test_it_follows_a_trial_that_grows(browser, empty, made):
+    """Positions five times a second and more; a minute and a round as they come."""
+    with Page(empty, 0) as page, made["poses"](empty, 0) as writer:
+        browser.go(page.url)
+        browser.until(f"{LINK} === 'Replay'")
+        writer.add(made["poses_at"](0.0))
+        seen, n = set(), 0
+        began_s = time.monotonic()
+        while time.monotonic() - began_s < 8:
+            n += 1
+            writer.add(made["poses_at"](n / 10))
+            seen.add(browser.value(SECOND))
+            time.sleep(0.1)
+        assert browser.value(LINK) == "Live"
+        # The first second or two pass before it knows that this is live.
+        assert len(seen) > 5 * 4
+        assert browser.value(DRAWN) == "3"
+        made["round"](empty, 120, 0.75)
+        made_it = "document.querySelectorAll('#marks rect').length"
+        browser.until(f"{made_it} >= 2")
+        browser.press("ArrowLeft")
+        assert browser.until(f"{LINK} === 'Replay'")
+        browser.press("l")
+        assert browser.until("document.documentElement.dataset.mode === 'live'")
+
+
+def test_it_says_that_the_server_is_gone_and_comes_back_by_itself(browser, trial, made):
+    """What was seen stays; the next server at the same place is found, with what is new."""
+    with Page(trial, 0) as page:
+        port = urlsplit(page.url).port
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+    browser.until(f"{LINK} === 'Server gone, tries again'")
+    assert browser.value("document.getElementById('alarm').hidden") is False
+    assert "has ended" in browser.value(text_of("alarm"))
+    assert browser.value(DRAWN) == "4"
+    made["round"](trial, 240, 0.85)
+    with Page(trial, port):
+        browser.until("document.documentElement.dataset.link === 'open'")
+        browser.until("document.getElementById('alarm').hidden")
+        browser.press("End")
+        browser.until("document.getElementById('rounds').ariaLabel.includes('4:00: 0.85')")
+
+
+def test_it_plays_and_every_key_does_what_it_says(browser, trial):
+    """Space, arrows, with shift, the ends, speeds; at the end it stops."""
+    with Page(trial, 0) as page:
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+        playing = "document.documentElement.dataset.playing === 'true'"
+        browser.press(" ")
+        browser.until(f"{playing} && {SECOND} > 0.5")
+        browser.press(" ")
+        browser.until(f"!({playing})")
+        browser.press("Home")
+        browser.until(f"{SECOND} === 0")
+        browser.press("ArrowRight")
+        browser.until(f"{SECOND} === 5")
+        browser.ask("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight", modifiers=8)
+        browser.until(f"{SECOND} === 65")
+        browser.press("ArrowLeft")
+        browser.until(f"{SECOND} === 60")
+        for speed in ("2", "5", "10"):
+            browser.press("+")
+            assert browser.value("document.getElementById('speed').value") == speed
+        browser.press("-")
+        assert browser.value("document.getElementById('speed').value") == "5"
+        browser.press("End")
+        browser.until(f"{SECOND} === 180")
+        bar = "document.getElementById('time')"
+        assert browser.value(f"{bar}.getAttribute('aria-valuetext')") == "3:00 of 3:00"
+        browser.value(f"{bar}.value = 90; {bar}.dispatchEvent(new Event('input'))")
+        browser.until(f"{SECOND} === 90")
+        assert browser.problems() == []
+
+
+def test_who_wants_little_motion_gets_little(browser, trial):
+    """Nothing plays by itself, and what plays is drawn at most about twice a second."""
+    with Page(trial, 0) as page:
+        browser.show(motion="reduce")
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+        assert browser.value("document.documentElement.dataset.playing") != "true"
+        browser.press(" ")
+        seen = set()
+        began_s = time.monotonic()
+        while time.monotonic() - began_s < 3:
+            seen.add(browser.value(SECOND))
+        assert 3 <= len(seen) <= 8
