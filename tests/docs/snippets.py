@@ -165,10 +165,10 @@ def commands_below(command):
 
 
 def options_of(command):
-    """Return every spelling of every option that a command has."""
-    context = click.Context(command)
-    parameters = command.get_params(context)
-    return {word for each in parameters for word in (*each.opts, *each.secondary_opts)}
+    """Return every spelling of every option that a command has and shows."""
+    context = click.Context(command, help_option_names=["-h", "--help"])
+    shown = [each for each in command.get_params(context) if not getattr(each, "hidden", False)]
+    return {word for each in shown for word in (*each.opts, *each.secondary_opts)}
 
 
 def fault_of(group, typed):
@@ -180,6 +180,8 @@ def fault_of(group, typed):
     """
     words = [word.strip("[]") for word in typed.words if word not in {"...", "…"}]
     is_block = typed.snippet.is_block
+    if not is_block and words and PLACEHOLDER(words[0]):
+        return None
     try:
         command, context, left = find_command(group, words)
         names = {word.partition("=")[0] for word in left if re.match(r"--|-[a-zA-Z]", word)}
