@@ -27,6 +27,7 @@ NOT_RUN = {
     "--twin": "an hour",
     "--overhead below.mp4": "a film of fish from below",
     "watch trial --stages": "a recording that grows",
+    "zfcal watch trial ": "a recording that grows",
     "zfcal calibrate trial --as-published": "a minute for each of 300 generations",
 }
 """What a command has in it that is not run, and what it would need."""
@@ -47,6 +48,9 @@ ELSEWHERE = {
     ),
     ("docs/commands.md", "zfcal track TRIAL"): "tests/cli/test_track_command.py",
     ("docs/tracking.md", "Tracking"): "tests/cli/test_track_command.py",
+    ("docs/commands.md", "zfcal diagnose TRIAL..."): "tests/cli/test_diagnose_command.py",
+    ("docs/commands.md", "zfcal extend TRIAL..."): "tests/cli/test_extend_command.py",
+    ("docs/commands.md", "zfcal watch TRIAL"): "tests/cli/test_watch_command.py",
     ("docs/real-recordings.md", "Real recordings"): "tests/benchmarks/test_bench_real.py",
 }
 """Sections whose commands need more than a page tells, and the tests that run such commands."""
@@ -91,7 +95,8 @@ def readme(folder, repository):
     samples(folder, repository)
     angle = np.linspace(0, 40, 15 * 125)[:, None] + np.arange(6) * math.pi / 3
     px = np.stack([573 + 222 * np.cos(angle), 530 - 222 * np.sin(angle)], axis=-1)
-    found = {"trajectories": px, "frames_per_second": 15, "identities_labels": list("abcdef")}
+    labels = [str(n + 1) for n in range(6)]
+    found = {"trajectories": px, "frames_per_second": 15, "identities_labels": labels}
     np.save(folder / "day3.npy", np.array(found, dtype=object), allow_pickle=True)
 
 
@@ -99,7 +104,7 @@ def tracked(folder, repository):
     """Put tracks of another program there, and trials of other days."""
     with gzip.open(repository / "data-samples" / "two-rooms.csv.gz") as packed:
         (folder / "tracks.csv").write_bytes(packed.read())
-    copies(folder, repository, "day1", "day2", "day3", "alone1", "alone2")
+    copies(folder, repository, "day1", "day2", "day3")
 
 
 def copies(folder, repository, *names):
@@ -143,7 +148,9 @@ def square(folder, repository):
     assert repository.is_dir()
 
 
-LESS = ("--generations 20 --seed 1", "--generations 0 --population 12 --steps 200 --seed 1")
+SMALL = "--population 12 --steps 200"
+QUICK = f"--generations 0 {SMALL}"
+LESS = ("--generations 20 --seed 1", f"{QUICK} --seed 1")
 
 STORIES = (
     Story(
@@ -173,24 +180,43 @@ STORIES = (
             ("docs/commands.md", "zfcal analyse TRIAL..."),
             ("docs/statistics.md", "What there is"),
             ("docs/commands.md", "zfcal report TRIAL..."),
+            ("docs/how-to/own-arena.md", None),
             ("docs/commands.md", "zfcal inspect FILE..."),
             ("docs/commands.md", "zfcal check TRIAL..."),
-            ("docs/commands.md", "zfcal export TRIAL..."),
         ),
         prepare=tracked,
-        changes=(LESS, ("zfcal calibrate -", "zfcal calibrate - --generations 0")),
+        before="""
+            zfcal init tank --arena two-rooms --fish 4 --fps 5
+            for name in alone1 alone2; do
+                zfcal simulate $name --model tank/models/000000.toml --duration 3min
+            done
+            rm -r tank
+        """,
+        changes=(LESS, ("zfcal calibrate -", f"zfcal calibrate - {LESS[1]}")),
     ),
     Story(
         name="searches",
         parts=(
             ("docs/commands.md", "zfcal calibrate TRIAL..."),
             ("docs/explanation/calibration.md", "How to read a model"),
-            ("docs/commands.md", "zfcal watch TRIAL"),
             ("docs/commands.md", "zfcal simulate TRIAL"),
-            ("docs/commands.md", "zfcal diagnose TRIAL..."),
-            ("docs/commands.md", "zfcal extend TRIAL..."),
         ),
         prepare=two_sets,
+        before="zfcal analyse trial",
+        changes=(
+            LESS,
+            ("trial --budget 50s", f"trial --budget 1s {SMALL}"),
+            ("--features D,W,O,T,residence,curvature", f"--features D,W,O,T,curvature {QUICK}"),
+            (
+                "--window 0:900 --held-out 900:1800 -o first-half.toml",
+                f"--window 0:180 --held-out 180:360 {QUICK} -o first-half.toml",
+            ),
+            ("--duration 1800 --seed 2", "--duration 120 --seed 2"),
+            (
+                "--duration 2min --video --video-file filmed.avi",
+                "--duration 5s --video --video-file filmed.avi",
+            ),
+        ),
     ),
     Story(
         name="comparison",
@@ -200,6 +226,25 @@ STORIES = (
             ("docs/how-to/figure.md", None),
         ),
         prepare=two_sets,
+        before=f"zfcal analyse trial && zfcal calibrate trial {QUICK}",
+    ),
+    Story(
+        name="python",
+        parts=(("docs/python.md", None),),
+        prepare=two_sets,
+        before="""
+            zfcal init tank --arena open-square --fish 5 --fps 15
+            cp tank/models/000000.toml my.toml
+            for name in alone1 alone2; do
+                zfcal simulate $name --model my.toml --arena open-square --fish 5 --duration 2min
+            done
+            zfcal analyse trial
+            zfcal calibrate trial --generations 0 --population 12 --steps 200
+        """,
+        changes=(
+            ('duration="30min"', 'duration="4min"'),
+            ("budget=50, seed=1)", "generations=0, population=12, steps=200, seed=1)"),
+        ),
     ),
     Story(name="arena", parts=(("docs/how-to/own-arena.md", None),)),
     Story(name="effect", parts=(("docs/how-to/own-effect.md", None),)),
@@ -213,7 +258,10 @@ STORIES = (
     Story(name="virtual-rig", parts=(("docs/tutorials/virtual-rig.md", None),)),
     Story(
         name="bright",
-        parts=(("docs/how-to/bright-fish.md", None),),
+        parts=(
+            ("docs/how-to/bright-fish.md", None),
+            ("docs/commands.md", "zfcal export TRIAL..."),
+        ),
         before="""
             zfcal init trial --arena two-rooms --fish 4 --fps 15
             zfcal simulate trial --model trial/models/000000.toml \\

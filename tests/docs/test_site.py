@@ -10,6 +10,7 @@ import pytest
 from zfcal import errors
 from zfcal.behaviour.features.registry import statistics
 from zfcal.model.effects import all_effects
+from zfcal_cli import output
 from zfcal_cli.main import group
 
 OPTIONS = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000"]
@@ -52,6 +53,15 @@ def test_statistics_effects_and_errors_are_on_the_page(made):
     for effect in all_effects():
         assert f"[`{effect.name}`]" in made.effects()
     assert f"| `LockedError` | {errors.LockedError.exit_code} |" in made.errors()
+
+
+def test_every_exit_code_has_its_row(repository):
+    """Those of errors, and those that the command line adds."""
+    page = (repository / "docs" / "commands.md").read_text(encoding="utf-8")
+    classes = [each for each in vars(errors).values() if hasattr(each, "exit_code")]
+    named = {value for name, value in vars(output).items() if name.startswith("EXIT_")}
+    for code in {0, 2, 141, 143, *named, *(each.exit_code for each in classes)}:
+        assert re.search(rf"^\| (\d+, )?{code}(, \d+)? \|", page, re.MULTILINE), code
 
 
 def test_a_page_that_asks_for_what_is_not_made_is_an_error(made):

@@ -1,6 +1,8 @@
 """Every command of every page can be typed: options exist, and values are of their kind."""
 
+import json
 import re
+import tomllib
 
 import click
 import pytest
@@ -57,6 +59,16 @@ def test_options_that_sentences_name_exist(snippets, reading, repository):
         if word not in known
     ]
     assert wrong == []
+
+
+def test_blocks_of_other_languages_are_of_that_language(snippets):
+    """Python compiles, TOML and JSON can be read."""
+    read = {"json": json.loads, "toml": tomllib.loads}
+    read["python"] = lambda text: compile(text, "snippet", "exec") if ">>>" not in text else None
+    found = [each for each in snippets if each.is_block and each.language in read]
+    for each in found:
+        read[each.language](each.text)
+    assert {each.language for each in found} == set(read)
 
 
 @pytest.mark.parametrize(
