@@ -177,7 +177,7 @@ def test_the_benchmark_of_publishing_runs(command):
 
 @pytest.mark.slow
 def test_the_picture_of_the_model_shows_what_the_page_says(script):
-    """Alone a hill ahead, at a wall two along it, beside others more toward them; all sum to one."""
+    """Alone a hill ahead, at a wall two along it, beside others more toward them; all sum to 1."""
     picture = script("calibration.model_picture")
     arena = picture.load_arena("open-square", Path())
     zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)

@@ -202,11 +202,11 @@ STORIES = (
             ("docs/commands.md", "zfcal simulate TRIAL"),
         ),
         prepare=two_sets,
-        before="zfcal analyse trial",
+        before="zfcal analyse trial --features residence,curvature",
         changes=(
             LESS,
             ("trial --budget 50s", f"trial --budget 1s {SMALL}"),
-            ("--features D,W,O,T,residence,curvature", f"--features D,W,O,T,curvature {QUICK}"),
+            ("curvature --publish score", f"curvature --publish score {QUICK}"),
             (
                 "--window 0:900 --held-out 900:1800 -o first-half.toml",
                 f"--window 0:180 --held-out 180:360 {QUICK} -o first-half.toml",

@@ -175,7 +175,7 @@ def test_a_story(story, snippets, reading, shell, repository, request):
             check_output(snippet.text, said, snippet.place)
         elif snippet.language == "python" and ">>>" not in snippet.text:
             said = run_python(shell, snippet, changed(snippet.text, story, used))
-        elif reading.typed_in(snippet):
+        elif reading.typed_in(snippet) or snippet.text.startswith("cp "):
             text = changed(runnable(snippet.text), story, used)
             done = shell(text, is_brief=is_brief)
             assert done.returncode == 0, f"{snippet.place}\n{text}\n{done.stdout}"
