@@ -258,10 +258,7 @@ STORIES = (
     Story(name="virtual-rig", parts=(("docs/tutorials/virtual-rig.md", None),)),
     Story(
         name="bright",
-        parts=(
-            ("docs/how-to/bright-fish.md", None),
-            ("docs/commands.md", "zfcal export TRIAL..."),
-        ),
+        parts=(("docs/how-to/bright-fish.md", None),),
         before="""
             zfcal init trial --arena two-rooms --fish 4 --fps 15
             zfcal simulate trial --model trial/models/000000.toml \\
@@ -284,5 +281,19 @@ STORIES = (
         ),
     ),
     Story(name="samples", parts=(("data-samples/README.md", None),)),
-    Story(name="film", parts=(("docs/video.md", None),)),
+    Story(
+        name="film",
+        parts=(
+            ("docs/video.md", None),
+            ("docs/commands.md", "zfcal export TRIAL..."),
+        ),
+        changes=(
+            ("--duration 2min --video", "--duration 10s --video"),
+            (
+                "2min --video --look hard --draw noise_grey=7",
+                "2s --video --look hard --draw noise_grey=7",
+            ),
+            ("2min --video-file plain.avi", "2s --video-file plain.avi"),
+        ),
+    ),
 )
