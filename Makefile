@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test test-slow test-plain test-programs lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
+.PHONY: help install demo docs check test test-slow test-plain test-programs lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -62,6 +62,14 @@ format: install  ## Format the code
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
 	@touch $@
 
+# What makes pages of docs/, in addition to zfcal, whose commands and functions it looks at.
+.venv/.documented: .venv/.installed requirements-docs.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-docs.lock
+	@touch $@
+
+docs: .venv/.documented  ## Make the documentation's pages; open build/docs/index.html
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -j auto docs build/docs
+
 # Programs that zfcal exports for, in an environment of their own: they bring much, and other versions.
 # zfcal is there too, with the extra that takes one of them to read files.
 .venv-programs/.locked: requirements-programs.lock
@@ -107,6 +115,7 @@ COMPILE = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strateg
 lock: install  ## Write the locks anew; pins that still fit stay
 	$(COMPILE) pyproject.toml --extra dev --output-file requirements.lock
 	$(COMPILE) --group bench --constraint requirements.lock --output-file requirements-bench.lock
+	$(COMPILE) --group docs --constraint requirements.lock --output-file requirements-docs.lock
 	$(COMPILE) pyproject.toml --extra sleap --group programs --output-file requirements-programs.lock
 
 lock-upgrade:  ## Write the locks anew with the newest versions

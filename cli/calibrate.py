@@ -43,7 +43,7 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
         zfcal calibrate trial --generations 20 --seed 1
         zfcal calibrate trial --budget 50s
         zfcal calibrate trial*/ --cluster tcp://host:8786
-        zfcal calibrate trial --features D,W,O,T,residence,curvature
+        zfcal calibrate trial --features D,W,O,T,residence --publish score
         zfcal calibrate trial --window 0:900 --held-out 900:1800 -o first-half.toml
     """
     from zfcal.api.calibrating import calibration_of

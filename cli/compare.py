@@ -20,7 +20,7 @@ class _TwoSets(click.Command):
         """Write --against before each word of its set, as click wants it."""
         written: list[str] = []
         within = False
-        for word, following in zip(args, [*args[1:], "-o"], strict=True):
+        for word, following in zip(args, [*args, "-o"][1:], strict=True):
             if word == _AGAINST:
                 if _is_option(following):
                     raise click.UsageError(f"{_AGAINST} needs the trials of set B.", ctx)

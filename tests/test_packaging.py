@@ -60,12 +60,6 @@ def pins(repository):
     return locked(repository / "requirements.lock")
 
 
-@pytest.fixture(scope="module")
-def bench_pins(repository):
-    """Return the same of what benchmarks compare with."""
-    return locked(repository / "requirements-bench.lock")
-
-
 def locked(path: Path) -> dict[str, tuple[str, str, list[str]]]:
     """Return for each package of a lock its version, its marker and its hashes."""
     text = path.read_text(encoding="utf-8").replace("\\\n", " ")
@@ -217,16 +211,18 @@ def test_every_pin_has_hashes_and_none_an_address(repository, pins):
     assert [name for name, (_, _, hashes) in pins.items() if not hashes] == []
 
 
-def test_benchmarks_are_locked_apart(repository, project, pins, bench_pins):
+@pytest.mark.parametrize("group", ["bench", "docs"])
+def test_groups_are_locked_apart(repository, project, pins, group):
     """With hashes and without addresses, at zfcal's own versions; zfcal needs none of it."""
-    text = (repository / "requirements-bench.lock").read_text(encoding="utf-8")
-    assert not re.search(r"://|--index|--find-links|@ ", text)
-    assert [name for name, (_, _, hashes) in bench_pins.items() if not hashes] == []
-    shared = pins.keys() & bench_pins.keys()
-    assert {name: bench_pins[name][0] for name in shared} == {n: pins[n][0] for n in shared}
-    for requirement in map(Requirement, project["dependency-groups"]["bench"]):
+    path = repository / f"requirements-{group}.lock"
+    assert not re.search(r"://|--index|--find-links|@ ", path.read_text(encoding="utf-8"))
+    found = locked(path)
+    assert [name for name, (_, _, hashes) in found.items() if not hashes] == []
+    shared = pins.keys() & found.keys()
+    assert {name: found[name][0] for name in shared} == {name: pins[name][0] for name in shared}
+    for requirement in map(Requirement, project["dependency-groups"][group]):
         name = canonicalize_name(requirement.name)
-        assert requirement.specifier.contains(bench_pins[name][0])
+        assert requirement.specifier.contains(found[name][0])
         assert name not in pins
 
 

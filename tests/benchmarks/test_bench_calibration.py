@@ -1,6 +1,7 @@
 """The benchmarks of calibration, each run small; who wins, what is fresh, what is committed."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -198,3 +199,26 @@ def test_the_benchmark_of_publishing_runs(command):
     seconds = found["seconds"]
     assert 0 < seconds["simulations of the models"] < seconds["all of judging and handing on"]
     assert 0 < found["share_of_the_rules"] < 1
+
+
+@pytest.mark.slow
+def test_the_picture_of_the_model_shows_what_the_page_says(script):
+    """Alone a hill ahead, at a wall two along it, beside others more toward them; all sum to 1."""
+    picture = script("calibration.model_picture")
+    arena = picture.load_arena("open-square", Path())
+    zones = tuple((zone.name, zone.follows_walls) for zone in arena.zones)
+    natural = picture.natural(zones, dt_s=picture.DT_S)
+    for name, (_, ahead) in picture.PLACES.items():
+        theta, alone = picture.density(natural, arena, name, 1)
+        _, beside = picture.density(natural, arena, name, 3)
+        assert np.trapezoid(alone, theta) == pytest.approx(1.0)
+        assert np.trapezoid(beside, theta) == pytest.approx(1.0)
+        back = int(np.argmin(np.cos(theta - ahead)))
+        is_at_wall = name == "near a wall"
+        assert abs(theta[np.argmax(alone[90:271]) + 90] - ahead) < 0.05
+        assert (alone[back] > 0.9 * alone.max()) == is_at_wall
+        xy, _ = picture.poses(arena, name)
+        toward = np.arctan2(*(xy[1] - xy[0])[::-1])
+        there = int(np.argmin(np.abs(theta - toward)))
+        assert beside[there] > alone[there]
+    assert len(picture.draw(natural, arena).axes) == 4

@@ -84,6 +84,14 @@ def test_every_command_stands_in_the_documentation(repository, name):
                     assert f"`{word}" in section, f"{words} {word}"
 
 
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in {"demo", "camera"}])
+def test_a_command_without_words_is_wrong_usage(zfcal, name):
+    """It says what is missing."""
+    done = zfcal(name)
+    assert done.code == 2
+    assert "issing" in done.err or "needs" in done.err or "Give" in done.err
+
+
 @pytest.mark.parametrize("name", ["watch", "analyse", "drive"])
 def test_help_says_what_json_is(zfcal, name):
     """Of a watch a line for each event, of all others one document."""

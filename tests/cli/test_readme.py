@@ -103,7 +103,8 @@ def test_the_samples_are_sound_trials(zfcal, repository, tmp_path, name):
 
 def test_links_lead_somewhere(readme, repository):
     """Every file that the README names in a link or as a picture is there."""
-    for target in re.findall(r"\]\(([^)#:]+)\)", readme):
+    targets = re.findall(r"\]\(([^)#:]+)\)", readme) + re.findall(r'src="([^"]+)"', readme)
+    for target in targets:
         assert (repository / target).exists(), target
 
 
