@@ -83,6 +83,10 @@ class DriveVoice:
             raise self._problem
         self._put(told)
 
+    def say(self, told: Told) -> None:
+        """Tell it at once: where no robot is steered."""
+        self._say(0.0, told)
+
     def _put(self, told: Told) -> None:
         self._told.put((time.monotonic() - self._began_s, told))
 

@@ -14,13 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.online.arrivals import Signature
 from zfcal.online.scheduling import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, StageStatus, Takes
 from zfcal.online.worker import Job, Worker
 from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
-from zfcal.stages.recording import starts_between, stretch_of
 from zfcal.stages.segments import Segments
 from zfcal.stages.skipping import write_skipped
 from zfcal.stages.trial_context import Task, open_trial
@@ -291,26 +289,3 @@ def begin(name: str, job: Job) -> Running:
 def is_of_a_round(name: str) -> bool:
     """Return whether rounds make the file with a name in a trial: it is nothing to analyse."""
     return name.startswith("models/") or name.endswith(("-model.parquet", "-rules.parquet"))
-
-
-def has_ended(root: Path, whole: Mapping[int, float]) -> bool:
-    """Return whether a recording is there to its end.
-
-    The last segment of a recording says from where to where it goes; that of a
-    camera which may come back does not.
-
-    Parameters
-    ----------
-    root
-        The trial's directory.
-    whole
-        The segments that are there, by their starts.
-    """
-    for start in reversed(segment_starts(root)):
-        if start not in whole:
-            return False
-        stretch = stretch_of(segment_path(root, start))
-        if stretch is not None:
-            needed = starts_between(*stretch)
-            return needed[-1] == max(whole) and set(needed) <= whole.keys()
-    return False
