@@ -32,6 +32,9 @@ from .tracking import tracking_options
     metavar="TIME",
     help="Leave when nothing has changed for so long.",
 )
+@click.option(
+    "-n", "--dry-run", is_flag=True, help="Say what each stage would make now; write nothing."
+)
 @round_options(budget="  [default: 50s]")
 @click.option(
     "--control",
@@ -53,15 +56,21 @@ def command(out: Output, trial: Path, **options: Any) -> None:
     \b
     Example:
         zfcal watch trial
+        zfcal watch trial --dry-run
         zfcal watch trial --overhead 0 --below 1 --budget 50s
         zfcal watch trial --stages calibrate --json
         zfcal watch trial --once --generations 20
     """
-    from zfcal.online.watch import watch
-
     from .watching import Voice, watch_options
 
     chosen = watch_options(trial, options)
+    if options["dry_run"]:
+        from zfcal.online.plan import tell_watch_plan
+
+        out.attempt(lambda: tell_watch_plan(trial, chosen, out.tell))
+        return
+    from zfcal.online.watch import watch
+
     out.in_lines = True
     with Voice(out) as voice:
         for left in watch(trial, chosen, voice.hear):

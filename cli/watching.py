@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _DEFAULT_BUDGET_S = 50.0
 
-_OWN = {"trial", "stages", "poll", "once", "until_idle_s"}
+_OWN = {"trial", "stages", "poll", "once", "until_idle_s", "dry_run"}
 _OF_CALIBRATE = {
     "generations", "budget", "population", "runs", "steps", "optimiser", "seed_likelihood",
     "champion", "publish", "model", "baselines", "seed", "workers", "as_published", "confirm",

@@ -1,7 +1,9 @@
 """zfcal watch, as people and scripts run it."""
 
+import json
 import shutil
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -167,6 +169,32 @@ def test_what_fails_is_said_and_tried_again(watching, live):
         (root / "trial.toml").write_text(right)
         assert watch.wait() == 0
     assert (root / "models" / "000180.toml").exists()
+
+
+def test_a_dry_run_says_what_each_stage_would_make(zfcal, trial):
+    """The windows that are there; nothing is written, no process starts, no lock lies there."""
+    before = sorted(trial.rglob("*"))
+    done = zfcal("watch", "trial", "--dry-run")
+    assert done.code == 0
+    assert "watch would run analyse, calibrate in trial." in done.err
+    assert "would make trial/stats/000120.parquet: missing" in done.err
+    assert "would make trial/stats/000180.parquet: missing" in done.err
+    assert "calibrate: nothing to make now" in done.err
+    assert sorted(trial.rglob("*")) == before
+
+
+def test_a_dry_run_takes_no_round_with_a_budget_for_stale(zfcal, trial):
+    """Such a round is made once, whatever its inputs; one with generations is made again."""
+    zfcal("analyse", "trial")
+    zfcal("calibrate", "trial", "--generations", 1, "--publish", "score")
+    changed = ("--publish", "score", "--dry-run", "--json")
+    kept = json.loads(zfcal("watch", "trial", "--budget", "5s", *changed).out)
+    again = json.loads(zfcal("watch", "trial", "--generations", 2, *changed).out)
+    states = [
+        {Path(each["path"]).name: each["state"] for each in told["artifacts"]}
+        for told in (kept, again)
+    ]
+    assert [state["000120.toml"] for state in states] == ["up to date", "planned"]
 
 
 @pytest.mark.parametrize(
