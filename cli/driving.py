@@ -48,6 +48,7 @@ class DriveVoice:
         self._out = out
         if events:
             out.as_json = out.in_lines = True
+        out.has_own_line()
         self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
         self._told: queue.SimpleQueue[tuple[float, Told] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._speak, daemon=True)

@@ -109,6 +109,7 @@ class Voice:
 
     def __init__(self, out: Output) -> None:
         self._out = out
+        out.has_own_line()
         self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
 
     def __enter__(self) -> Self:
