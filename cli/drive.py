@@ -74,7 +74,7 @@ _DRIVING = {
 @click.option(
     "--events", is_flag=True, help="Write a line of JSON for all that happens, in place of paths."
 )
-@click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
+@click.option("--replay", is_flag=True, help="Compute again what the log says, and compare.")
 @click.option(
     "-n",
     "--dry-run",
@@ -116,8 +116,8 @@ def command(
 ) -> None:
     r"""Drive the robot by the newest model while the poses grow.
 
-    Each step of the model sets a target, ten times a second the wheels are told. All
-    that decides is logged in drive/. The robot is stopped when it is not seen for half
+    Each step of the model sets a target. The wheels get a command ten times a second.
+    All that decides is logged in drive/. The robot is stopped when it is not seen for half
     a second, when the port or its supply has gone, and at the end, whatever ends it.
 
     \b
@@ -135,7 +135,7 @@ def command(
         _stop(out, port, resync=resync)
         return
     if resync:
-        raise click.UsageError("--resync is for --stop: a drive says it by itself.")
+        raise click.UsageError("--resync is for --stop: a drive sends it without the option.")
     if trial is None:
         raise click.UsageError("Missing argument 'TRIAL'.")
     if replay:
@@ -202,7 +202,7 @@ def _stop(out: Output, port: str | None, *, resync: bool) -> None:
         if is_held:
             out.note(
                 "Another process has the port: a drive goes on at its next tick. "
-                "End it with Ctrl-C, and say STOP again."
+                "End it with Ctrl-C, and send STOP again."
             )
         out.result({"port": port, "sent": "STOP", "is_held_by_another": is_held})
 

@@ -50,7 +50,7 @@ def command(out: Output, trial: Path, **options: Any) -> None:
 
     Each new minute of tracks is analysed at once and calibrated within the
     minute. A round that overruns makes the next ones shorter; windows that
-    would come too late are passed over, which is written down. On one computer
+    would come too late are skipped, and a file says so. On one computer
     of several, --stages says which part it does; rsync brings the rest.
 
     \b

@@ -150,8 +150,8 @@ _WORDS = {
     "began": "watch: {stages} of {trial}{polling}.",
     "started": "{stage}: process {process}.",
     "arrived": "{path}: arrived.",
-    "unfinished": "{problem} It is passed over until it is.",
-    "skipped": "calibrate: the window to {window_end_s} s is passed over, {went_on_with_s} s is "
+    "unfinished": "{problem} It is skipped until it is.",
+    "skipped": "calibrate: the window to {window_end_s} s is skipped, {went_on_with_s} s is "
     "next. {because}",
     "finished": "{stage}: window to {window_end_s} s in {took_s:.1f} s, {lag_s:.1f} s after its "
     "tracks.",

@@ -34,7 +34,7 @@ def test_init_refuses_a_trial_that_differs(zfcal):
     zfcal("init", "trial", "--arena", "ring", "--fish", "6")
     done = zfcal("init", "trial", "--arena", "ring", "--fish", "5")
     assert done.code == 1
-    assert "n_fish = 6, asked for 5" in done.err
+    assert "n_fish = 6, the command gives 5" in done.err
     assert "--force" in done.err
     assert zfcal("init", "trial", "--arena", "ring", "--fish", "5", "--force").code == 0
 
@@ -80,7 +80,7 @@ def test_an_export_is_read_back_by_the_command_that_it_tells(zfcal, trial):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("trial",), "Nothing is asked for"),
+        (("trial",), "There is nothing to export"),
         (("trial", "--to", "csv", "--mm-per-px", "1"), "have no effect"),
         (("trial", "--layout", "--origin", "1,2"), "have no effect"),
         (("trial", "--to", "ctrax"), "'ctrax' is not one of"),

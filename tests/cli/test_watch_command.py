@@ -145,7 +145,7 @@ def test_a_trial_that_goes_away_is_waited_for(watching, live):
     """A disk that is mounted again, a folder that was moved by mistake."""
     root, bring = live
     with watching.start(root, "--poll", *watching.quick) as watch:
-        watch.until("began", polls="asked for")
+        watch.until("began", polls="--poll was given")
         away = root.rename(root.with_name("away"))
         watch.until("gone")
         away.rename(root)

@@ -77,7 +77,7 @@ def _open(root: Path, options: DriveOptions) -> tuple[OpenTrial, Lineage]:
     opened = open_trial(root)
     if opened.trial.n_robots < 1:
         raise InputError(
-            f"{opened.trial.config}: n_robots is 0: there is nobody to drive.",
+            f"{opened.trial.config}: n_robots is 0: there is no robot to drive.",
             hint="Set n_robots = 1 in trial.toml, and track the robot with --below.",
         )
     if options.clock not in {"wall", "poses"}:
@@ -184,7 +184,8 @@ def _robot(
         line.close()
         raise InputError(
             f"{port}: the port cannot be opened ({line.problem or 'no answer'}).",
-            hint="Check that it exists (rfcomm bind), that nobody else uses it, and your rights.",
+            hint="Check that it exists (rfcomm bind), that no other process uses it, and that "
+            "you may open it.",
         )
     return robot, virtual
 

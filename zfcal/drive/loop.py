@@ -221,7 +221,7 @@ class Loop:
         if self._asked_s and time.monotonic() - self._asked_s > _ANSWER_S:
             if not self._driver.is_answered:
                 letter = self._options.manner.letter
-                says = f"No FishBot {letter} answers; what is sent may be heard by nobody."
+                says = f"No FishBot {letter} answers: check that it is switched on and near."
                 self._crew.tell(Note(text=says, warning=True))
             self._asked_s = 0.0
 

@@ -52,7 +52,7 @@ def check_logs(opened: OpenTrial, options: DriveOptions) -> None:
     if options.clock == "poses" and drive_files(opened.trial.root):
         raise InputError(
             f"{opened.trial.root / 'drive'}: holds the log of an earlier drive.",
-            hint="Check it with --replay, or drive anew with --force.",
+            hint="Check it with --replay, or drive again with --force.",
         )
 
 
@@ -104,7 +104,7 @@ def tell_plan(opened: OpenTrial, options: DriveOptions, tell: Tell, *, task: Tas
         tell(Note(text=f"It would remove {len(known)} files of an earlier drive."))
     first = _first(opened, options, model, tell)
     tell(Note(text=_first_words(opened, options, first)))
-    if first is not None:
+    if first is not None and not (options.clock == "wall" and _is_over(opened)):
         start_s = int(first.poses.time_s // SEGMENT_S * SEGMENT_S)
         path = opened.trial.path("drive", start_s, ".mcap")
         tell(Planned(path=path, reason="the robot is driven"))
@@ -146,9 +146,14 @@ def _poses_of(opened: OpenTrial, options: DriveOptions, tell: Tell) -> Iterator[
             tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
 
 
-def _first_words(opened: OpenTrial, options: DriveOptions, first: _First | None) -> str:
+def _is_over(opened: OpenTrial) -> bool:
+    """Return whether the trial's recording has ended: no poses will come."""
     root = opened.trial.root
-    is_over = has_ended(root, segment_starts(root))
+    return has_ended(root, segment_starts(root))
+
+
+def _first_words(opened: OpenTrial, options: DriveOptions, first: _First | None) -> str:
+    root, is_over = opened.trial.root, _is_over(opened)
     if first is None:
         ends = "it would end, since the recording has ended" if is_over else "it would wait"
         return f"{root / 'poses'}: no poses. It would send STOP, and {ends}."

@@ -19,8 +19,8 @@ from zfcal.stages.trial_context import Task, open_trial
 from zfcal.stages.windows import LENGTH_S
 from zfcal.trial import LOOP_NAME
 
-DRIVE_S = 60.0
-"""So much of the trial is driven, by the times of its poses: a second or two of work."""
+DRIVE_S = 30.0
+"""So much of the trial is driven, by the times of its poses, which are not waited for."""
 
 ABOUT_S = 60.0
 """So long the demonstration takes on two cores with nothing else to do."""
@@ -109,11 +109,21 @@ def drive_demo(trial: Path, tell: Tell, *, task: Task) -> None:
         tell(Planned(path=log, reason="missing" if not log.exists() else "of another model"))
         return
 
+    doubts: list[Note] = []
+
     def hear(told: Event | DriveStatus) -> None:
-        if not isinstance(told, DriveStatus):
+        if isinstance(told, Note) and told.kind == "fault":
+            doubts.append(told)
+        elif not isinstance(told, DriveStatus):
             tell(told)
 
     drive(trial, options, hear, task=Task(force=True))
+    n_doubts = sum(not note.values.get("ended", False) for note in doubts)
+    if n_doubts:
+        says = (
+            f"{n_doubts} times a pose was in doubt or the robot was lost, and no pose of then was"
+        )
+        tell(Note(text=f"{says} driven by: {log} says when."))
 
 
 def _is_of_newest(trial: Path) -> bool:
