@@ -185,16 +185,18 @@ def test_a_dry_run_says_what_each_stage_would_make(zfcal, trial):
 
 def test_a_dry_run_takes_no_round_with_a_budget_for_stale(zfcal, trial):
     """Such a round is made once, whatever its inputs; one with generations is made again."""
-    zfcal("analyse", "trial")
-    zfcal("calibrate", "trial", "--generations", 1, "--publish", "score")
+    assert zfcal("analyse", "trial").code == 0
+    made = zfcal("calibrate", "trial", "--generations", 1, "--publish", "score")
+    assert made.code == 0, made.err
     changed = ("--publish", "score", "--dry-run", "--json")
     kept = json.loads(zfcal("watch", "trial", "--budget", "5s", *changed).out)
+    reasons = [each["reason"] for each in kept["artifacts"]]
     again = json.loads(zfcal("watch", "trial", "--generations", 2, *changed).out)
     states = [
         {Path(each["path"]).name: each["state"] for each in told["artifacts"]}
         for told in (kept, again)
     ]
-    assert [state["000120.toml"] for state in states] == ["up to date", "planned"]
+    assert [state["000120.toml"] for state in states] == ["up to date", "planned"], reasons
 
 
 @pytest.mark.parametrize(
