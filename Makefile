@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo docs check test test-slow test-plain test-programs lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
+.PHONY: help install demo docs man check test test-slow test-plain test-programs lint format bench bench-diagnosis bench-real real-data effects-page lock lock-upgrade clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name what; do \
@@ -28,6 +28,9 @@ install: .venv/.installed  ## Build .venv from the lock and put zfcal into it
 
 demo: install  ## Run the main job on the sample; say where the figures lie
 	$(BIN)/zfcal demo demo-trial
+
+man: install  ## Write the manual pages, so that `man zfcal` shows them in .venv
+	$(BIN)/zfcal --man .venv/share/man/man1
 
 check: lint test-plain test-slow test  ## Run everything that must pass before a change lands
 

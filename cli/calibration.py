@@ -55,7 +55,7 @@ def round_options(*, generations: str = "", budget: str = "") -> Decorator:
         click.option(
             "--publish",
             type=click.Choice(["forward", "score", "likelihood"]),
-            help="Which model is handed on: by the rule whose models have been better so far, the "
+            help="Which model is published: by the rule whose models have been better so far, the "
             "best by its score, or the estimate if its score allows.  [default: forward; a trial "
             "that has models keeps its way]",
         ),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .closed_loop_options import closed_loop_options
-from .options import PLACE, speaks
+from .options import PLACE, makes_artifacts, speaks
 from .output import Output
 
 if TYPE_CHECKING:
@@ -19,14 +19,17 @@ if TYPE_CHECKING:
 @click.command("demo")
 @click.argument("folder", metavar="[DIR]", type=PLACE, default=Path("zfcal-demo"))
 @closed_loop_options
-@click.option("--force", is_flag=True, help="Make it again, even if it is up to date.")
+@makes_artifacts
 @speaks
-def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bool) -> None:
-    r"""Simulate a tank and its cameras, track, analyse, calibrate and report.
+def command(
+    out: Output, folder: Path, *, loop: dict[str, Any] | None, dry_run: bool, force: bool
+) -> None:
+    r"""Simulate a tank and its cameras, track, analyse, calibrate, drive and report.
 
     DIR gets tank/ (the simulated truth and the images of it), trial/ (all that
-    is made from these images) and a contact sheet of the worst frames. Takes a
-    minute or two.
+    is made from these images) and a contact sheet of the worst frames. A virtual
+    robot is driven by the calibrated model. Takes about a minute; the first start
+    of all compiles for a minute or two more.
 
     With --closed-loop the fish react to a robot, which is driven by what is
     calibrated meanwhile: cameras, tracker, analysis, calibration, drive and a
@@ -36,24 +39,35 @@ def command(out: Output, folder: Path, *, loop: dict[str, Any] | None, force: bo
     \b
     Example:
         zfcal demo
+        zfcal demo --dry-run
         zfcal demo /tmp/demo --force
         zfcal demo loop --closed-loop --duration 10min
         zfcal demo baseline --closed-loop --no-video --swims random --seed 3
         zfcal demo on --closed-loop --fish-model fish.toml --model extended.toml
     """
     from zfcal.api.reporting import write_page
+    from zfcal.stages.events import Planned
     from zfcal.stages.trial_context import Task
     from zfcal.virtual.demo import run_demo
 
-    task = Task(force=force)
+    from .demo_closing import closing, takes
+
+    task = Task(dry_run=dry_run, force=force)
 
     def work() -> None:
-        if loop is None:
-            trial = run_demo(folder, out.tell, task=task)
-        else:
+        if loop is not None:
             trial = _closed_loop(out, folder, loop, task)
+        else:
+            trial = run_demo(folder, out.tell, task=task)
+        if dry_run:
+            if not (trial / "report").exists():
+                out.tell(Planned(path=trial / "report" / "index.html", reason="missing"))
+            out.note(takes(loop))
+            return
         write_page([trial], None, out.tell, task=task)
         out.note(f"Figures: {trial / 'report'} (open {trial / 'report' / 'index.html'})")
+        for line in closing(folder, trial, is_loop=loop is not None):
+            out.note(line)
 
     out.attempt(work)
 
@@ -79,6 +93,10 @@ def _closed_loop(out: Output, folder: Path, asked: dict[str, Any], task: Task) -
         if name in given
     }
     published = published_by(asked)
+    if task.dry_run:
+        from zfcal.virtual.demo_steps import tell_loop
+
+        return tell_loop(folder, loop.get("duration_s", 600.0), out.tell, task=task)
     options = LoopOptions(
         **loop,
         video=not asked["no_video"],

@@ -20,6 +20,7 @@ _DRIVING = {
     "radius_mm",
     "clock",
     "events",
+    "dry_run",
     "force",
 }
 
@@ -73,7 +74,13 @@ _DRIVING = {
 @click.option(
     "--events", is_flag=True, help="Write a line of JSON for all that happens, in place of paths."
 )
-@click.option("--replay", is_flag=True, help="Work out anew what the log says, and compare.")
+@click.option("--replay", is_flag=True, help="Compute again what the log says, and compare.")
+@click.option(
+    "-n",
+    "--dry-run",
+    is_flag=True,
+    help="Say what would be opened and sent; open and write nothing.",
+)
 @click.option("--force", is_flag=True, help="Remove what an earlier drive left.")
 @click.option(
     "--stop",
@@ -102,14 +109,15 @@ def command(
     publish_zones: str | None,
     events: bool,
     replay: bool,
+    dry_run: bool,
     force: bool,
     stop: bool,
     resync: bool,
 ) -> None:
     r"""Drive the robot by the newest model while the poses grow.
 
-    Each step of the model sets a target, ten times a second the wheels are told. All
-    that decides is logged in drive/. The robot is stopped when it is not seen for half
+    Each step of the model sets a target. The wheels get a command ten times a second.
+    All that decides is logged in drive/. The robot is stopped when it is not seen for half
     a second, when the port or its supply has gone, and at the end, whatever ends it.
 
     \b
@@ -117,6 +125,7 @@ def command(
         zfcal drive trial --port /dev/rfcomm5
         zfcal drive trial --port virtual --pattern pid --duration 30min
         zfcal drive trial --port virtual --model trial/models/extended.toml
+        zfcal drive trial --port virtual --dry-run
         zfcal drive trial --port virtual --events
         zfcal drive trial --publish cats2://rig
         zfcal drive trial --replay
@@ -126,7 +135,7 @@ def command(
         _stop(out, port, resync=resync)
         return
     if resync:
-        raise click.UsageError("--resync is for --stop: a drive says it by itself.")
+        raise click.UsageError("--resync is for --stop: a drive sends it without the option.")
     if trial is None:
         raise click.UsageError("Missing argument 'TRIAL'.")
     if replay:
@@ -137,7 +146,8 @@ def command(
         return
     if publish_zones is not None:
         raise click.UsageError("--publish-zones is for --publish.")
-    from zfcal.drive.drive import DriveOptions, drive
+    from zfcal.drive.drive import drive
+    from zfcal.drive.options import DriveOptions
     from zfcal.drive.pilot import Manner
     from zfcal.stages.trial_context import Task
 
@@ -149,6 +159,8 @@ def command(
         raise click.UsageError(
             "--events or --json: lines while it drives, or a document at the end."
         )
+    if events and dry_run:
+        raise click.UsageError("--events or --dry-run: a dry run has no events.")
     manner = Manner(
         pattern=pattern, free_running=free_running, letter=robot, radius_m=radius_mm / 1000
     )
@@ -161,9 +173,14 @@ def command(
         model=model,
     )
 
+    task = Task(dry_run=dry_run, force=force)
+    if dry_run:
+        out.attempt(lambda: drive(trial, options, DriveVoice(out, events=False).say, task=task))
+        return
+
     def work() -> None:
         with DriveVoice(out, events=events) as voice:
-            voice.because = drive(trial, options, voice.hear, task=Task(force=force))
+            voice.because = drive(trial, options, voice.hear, task=task)
 
     out.attempt(work)
 
@@ -185,7 +202,7 @@ def _stop(out: Output, port: str | None, *, resync: bool) -> None:
         if is_held:
             out.note(
                 "Another process has the port: a drive goes on at its next tick. "
-                "End it with Ctrl-C, and say STOP again."
+                "End it with Ctrl-C, and send STOP again."
             )
         out.result({"port": port, "sent": "STOP", "is_held_by_another": is_held})
 
@@ -219,4 +236,4 @@ def _refuse(idle: set[str], why: str) -> None:
     for name in sorted(idle):
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             option = next(each for each in context.command.params if each.name == name)
-            raise click.UsageError(f"{option.opts[0]} cannot be given with {why}")
+            raise click.UsageError(f"{option.opts[-1]} cannot be given with {why}")

@@ -48,6 +48,7 @@ class DriveVoice:
         self._out = out
         if events:
             out.as_json = out.in_lines = True
+        out.has_own_line()
         self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
         self._told: queue.SimpleQueue[tuple[float, Told] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._speak, daemon=True)
@@ -82,6 +83,10 @@ class DriveVoice:
         if self._problem is not None:
             raise self._problem
         self._put(told)
+
+    def say(self, told: Told) -> None:
+        """Tell it at once: where no robot is steered."""
+        self._say(0.0, told)
 
     def _put(self, told: Told) -> None:
         self._told.put((time.monotonic() - self._began_s, told))

@@ -61,7 +61,7 @@ def command(
     from zfcal.stages.trial_context import Task
 
     if not formats and not layout:
-        raise click.UsageError("Nothing is asked for: give --to FORMAT, --layout, or both.")
+        raise click.UsageError("There is nothing to export: give --to FORMAT, --layout, or both.")
     if (mm_per_px or origin) and set(formats) <= set(TABLES):
         raise click.UsageError("--mm-per-px and --origin have no effect: nothing is in pixels.")
     roots = roots_of(out, trials)

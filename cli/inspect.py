@@ -49,4 +49,4 @@ def _draw(out: Output, path: Path, png: Path) -> None:
 
     arena = read_arena(path)
     write_whole(png, lambda part: draw_arena(arena, part))
-    out.tell(Made(path=png, reason="asked for"))
+    out.tell(Made(path=png, reason="requested"))

@@ -61,6 +61,9 @@ TASKS = {
 _WHOLE_SENTENCE = 300
 """Longer than the first sentence of any command's help, in characters."""
 
+_AS_JSON = f"{__name__}.as_json"
+"""Key of --json in what click keeps while it reads the options."""
+
 _EXIT_USAGE = 2
 _EXIT_READER_GONE = 141
 _STREAM_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -123,9 +126,23 @@ class _LazyGroup(click.Group):
 
 def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if value and not ctx.resilient_parsing:
-        from importlib.metadata import version
+        from .version import about, version_text
 
-        click.echo(f"zfcal {version('zfcal')}")
+        click.echo(about() if ctx.meta.get(_AS_JSON) else version_text())
+        ctx.exit()
+
+
+def _note_json(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[_AS_JSON] = value
+
+
+def _write_manual(ctx: click.Context, _: click.Parameter, folder: Path | None) -> None:
+    if folder is not None and not ctx.resilient_parsing:
+        from .manual import write_pages
+        from .version import number
+
+        for path in write_pages(group, folder, TASKS, number()):
+            click.echo(str(path))
         ctx.exit()
 
 
@@ -143,9 +160,17 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
     "--version",
     is_flag=True,
     expose_value=False,
-    is_eager=True,
+    # Not eager: --json is taken first, wherever it stands.
     callback=_print_version,
     help="Show the version and leave.",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    is_eager=True,
+    callback=_note_json,
+    help="With --version: also Python, libraries and threads, for a bug report.",
 )
 @click.option(
     "--completion",
@@ -155,8 +180,18 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
     callback=_print_completion,
     help="Print the completion script of a shell and leave.",
 )
+@click.option(
+    "--man",
+    metavar="DIR",
+    type=click.Path(file_okay=False, path_type=Path),
+    expose_value=False,
+    is_eager=True,
+    callback=_write_manual,
+    help="Write the manual pages into a folder and leave.",
+)
+@click.pass_context
 @laid_out
-def group() -> None:
+def group(ctx: click.Context, as_json: bool) -> None:  # noqa: ARG001 - it is in ctx.meta
     r"""Analyse and calibrate: a robot among zebrafish.
 
     Every command reads files of a trial directory and writes files into it.
@@ -169,7 +204,13 @@ def group() -> None:
         zfcal init trial --arena two-rooms --fish 4 --robot --fps 15
         zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
         eval "$(zfcal --completion bash)"
+        zfcal --man ~/.local/share/man/man1
     """
+    if ctx.meta[_AS_JSON]:
+        command = ctx.invoked_subcommand
+        raise click.UsageError(
+            f"--json stands behind the command, or with --version: zfcal {command} ... --json"
+        )
 
 
 def main() -> NoReturn:

@@ -86,7 +86,7 @@ class Output:
         self.exit_code = 0
         self.bare = False
         self.in_lines = False
-        self._bars = Bars(shown=sys.stderr.isatty() and not quiet)
+        self._bars = Bars(shown=sys.stderr.isatty() and not quiet, name=command)
         self._artifacts: dict[Path, dict[str, str]] = {}
         self._left_out: dict[tuple[str, str], dict[str, str]] = {}
         self._messages: list[dict[str, str]] = []
@@ -99,6 +99,7 @@ class Output:
         logger = logging.getLogger("zfcal")
         logger.setLevel(logging.INFO)
         logger.addHandler(self._handler)
+        self._bars.watch()
         return self
 
     def __exit__(
@@ -108,7 +109,7 @@ class Output:
         trace: TracebackType | None,
     ) -> None:
         logging.getLogger("zfcal").removeHandler(self._handler)
-        self._bars.clear()
+        self._bars.close()
         if isinstance(error, BrokenPipeError):
             raise ReaderGoneError from error
         if error is not None:
@@ -137,6 +138,10 @@ class Output:
                 self._bars.show(event.stage, event.done, event.total)
             case of.Result():
                 self._results.append(event.value)
+
+    def has_own_line(self) -> None:
+        """Leave the last line of the terminal to the command's own status line."""
+        self._bars.close()
 
     def attempt(self, work: Callable[[], object]) -> None:
         """Do a part of the work; an error that a person can mend ends that part alone.

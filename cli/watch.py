@@ -34,6 +34,9 @@ from .viewing import view_options
     help="Leave when nothing has changed for so long.",
 )
 @view_options
+@click.option(
+    "-n", "--dry-run", is_flag=True, help="Say what each stage would make now; write nothing."
+)
 @round_options(budget="  [default: 50s]")
 @click.option(
     "--control",
@@ -49,7 +52,7 @@ def command(out: Output, trial: Path, **options: Any) -> None:
 
     Each new minute of tracks is analysed at once and calibrated within the
     minute. A round that overruns makes the next ones shorter; windows that
-    would come too late are passed over, which is written down. On one computer
+    would come too late are skipped, and a file says so. On one computer
     of several, --stages says which part it does; rsync brings the rest. With
     --view a page shows all that to browsers on this computer, and plays the trial
     once it has ended.
@@ -57,17 +60,23 @@ def command(out: Output, trial: Path, **options: Any) -> None:
     \b
     Example:
         zfcal watch trial
+        zfcal watch trial --dry-run
         zfcal watch trial --overhead 0 --below 1 --budget 50s
         zfcal watch trial --stages calibrate --json
         zfcal watch trial --once --generations 20
         zfcal watch trial --view
     """
-    from zfcal.online.watch import watch
-
     from .viewing import open_page, stay
     from .watching import Voice, watch_options
 
     chosen = watch_options(trial, options)
+    if options["dry_run"]:
+        from zfcal.online.plan import tell_watch_plan
+
+        out.attempt(lambda: tell_watch_plan(trial, chosen, out.tell))
+        return
+    from zfcal.online.watch import watch
+
     out.in_lines = True
     with (
         open_page(trial, options) as page,

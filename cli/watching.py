@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 _DEFAULT_BUDGET_S = 50.0
 
 _NONE = "none"
-_OWN = {"trial", "stages", "poll", "once", "until_idle_s", "view", "view_port", "table"}
+_OWN = {
+    "trial", "stages", "poll", "once", "until_idle_s", "view", "view_port", "table", "dry_run",
+}  # fmt: skip
 _OF_CALIBRATE = {
     "generations", "budget", "population", "runs", "steps", "optimiser", "seed_likelihood",
     "champion", "publish", "model", "baselines", "seed", "workers", "as_published", "confirm",
@@ -130,6 +132,7 @@ class Voice:
         self._page = page
         self._table = WatchTable() if table else None
         self._shown: Status | None = None
+        out.has_own_line()
         self._line = StatusLine(shown=sys.stderr.isatty() and not out.quiet)
 
     def __enter__(self) -> Self:
@@ -193,8 +196,8 @@ _WORDS = {
     "began": "watch: {stages} of {trial}{polling}.",
     "started": "{stage}: process {process}.",
     "arrived": "{path}: arrived.",
-    "unfinished": "{problem} It is passed over until it is.",
-    "skipped": "calibrate: the window to {window_end_s} s is passed over, {went_on_with_s} s is "
+    "unfinished": "{problem} It is skipped until it is.",
+    "skipped": "calibrate: the window to {window_end_s} s is skipped, {went_on_with_s} s is "
     "next. {because}",
     "finished": "{stage}: window to {window_end_s} s in {took_s:.1f} s, {lag_s:.1f} s after its "
     "tracks.",

@@ -11,6 +11,7 @@ from importlib.metadata import entry_points, packages_distributions, version
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -174,6 +175,18 @@ def test_the_console_script_finds_its_function():
 def test_one_version_everywhere(project):
     """The package, its metadata and pyproject.toml agree."""
     assert zfcal.__version__ == version("zfcal") == project["project"]["version"]
+
+
+def test_who_cites_or_reads_what_changed_finds_this_version(repository, project):
+    """CITATION.cff and the changelog have the version of the project, of the same day."""
+    cited = yaml.safe_load((repository / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["cff-version"] == "1.2.0"
+    assert {"message", "title", "authors"} <= cited.keys()
+    assert cited["version"] == project["project"]["version"]
+    assert cited["license"] == project["project"]["license"]
+    text = (repository / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## \[(\d.*?)\] - (\S+)$", text, re.MULTILINE)
+    assert newest.groups() == (cited["version"], str(cited["date-released"]))
 
 
 def test_every_import_is_a_dependency(project, tree):

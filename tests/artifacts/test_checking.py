@@ -165,7 +165,9 @@ def test_a_segment_of_nobody_is_noted(trial, tracks):
     lineage = Lineage(schema=TRACKS, command="import")
     write_tracks(trial.path("tracks", 0, ".parquet"), tracks.take(slice(0, 0)), lineage)
 
-    assert found_in(trial, "tracks/000000.parquet") == [(NOTE, "nobody was seen in this segment")]
+    assert found_in(trial, "tracks/000000.parquet") == [
+        (NOTE, "no animal was seen in this segment")
+    ]
 
 
 def test_a_file_of_the_future_is_a_warning(trial):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -33,7 +34,7 @@ def test_init_refuses_a_trial_that_differs(zfcal):
     zfcal("init", "trial", "--arena", "ring", "--fish", "6")
     done = zfcal("init", "trial", "--arena", "ring", "--fish", "5")
     assert done.code == 1
-    assert "n_fish = 6, asked for 5" in done.err
+    assert "n_fish = 6, the command gives 5" in done.err
     assert "--force" in done.err
     assert zfcal("init", "trial", "--arena", "ring", "--fish", "5", "--force").code == 0
 
@@ -79,7 +80,7 @@ def test_an_export_is_read_back_by_the_command_that_it_tells(zfcal, trial):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("trial",), "Nothing is asked for"),
+        (("trial",), "There is nothing to export"),
         (("trial", "--to", "csv", "--mm-per-px", "1"), "have no effect"),
         (("trial", "--layout", "--origin", "1,2"), "have no effect"),
         (("trial", "--to", "ctrax"), "'ctrax' is not one of"),
@@ -376,4 +377,27 @@ def test_a_demo_ends_with_figures(zfcal, monkeypatch):
     assert "Figures: here/trial/report" in done.err
     assert "here/trial/models/000120.toml" in done.lines
     assert "here/trial/poses/000060.mcap" in done.lines
+    assert "here/trial/drive/000000.mcap" in done.lines
+    looks, runs = done.err.split("What to look at:")[1].split("What to run next:")
+    assert "here/trial/report/index.html" in looks
+    assert "here/trial/drive/000000.mcap" in looks
+    assert "zfcal drive here/trial --replay" in runs
     assert "nothing to do" in zfcal("demo", "here").err
+    assert zfcal("drive", "here/trial", "--replay").code == 0
+    assert "nothing to do" in zfcal("demo", "here", "--dry-run").err
+    Path("here/trial/models/000120.toml").unlink()
+    planned = zfcal("demo", "here", "--dry-run").err
+    assert "would make here/trial/models/000120.toml: missing" in planned
+    assert "would make here/trial/drive/000000.mcap" in planned
+
+
+def test_a_dry_demo_says_what_files_and_how_long(zfcal):
+    """Nothing is written, not even the folder; with the option also for a closed loop."""
+    done = zfcal("demo", "here", "--dry-run")
+    assert done.code == 0
+    assert "would make here/trial/models/000180.toml: missing" in done.err
+    assert "about a minute on two cores" in done.err
+    loop = zfcal("demo", "here", "--dry-run", "--closed-loop", "--duration", "30min")
+    assert "would make here/trial/tracks/001740.parquet: missing" in loop.err
+    assert "about 10 min on two cores" in loop.err
+    assert not Path("here").exists()

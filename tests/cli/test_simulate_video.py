@@ -91,4 +91,4 @@ def test_an_existing_trial_has_its_own_frame_rate(zfcal):
     """Asking for another is an error, not ignored."""
     done = zfcal("simulate", "trial", *WORDS[2:], "--video", "--fps", "30")
     assert done.code == 1
-    assert "fps is 15.0, asked for 30.0" in done.err
+    assert "fps is 15.0, the command gives 30.0" in done.err

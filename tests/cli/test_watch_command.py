@@ -1,7 +1,9 @@
 """zfcal watch, as people and scripts run it."""
 
+import json
 import shutil
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -143,7 +145,7 @@ def test_a_trial_that_goes_away_is_waited_for(watching, live):
     """A disk that is mounted again, a folder that was moved by mistake."""
     root, bring = live
     with watching.start(root, "--poll", *watching.quick) as watch:
-        watch.until("began", polls="asked for")
+        watch.until("began", polls="--poll was given")
         away = root.rename(root.with_name("away"))
         watch.until("gone")
         away.rename(root)
@@ -167,6 +169,34 @@ def test_what_fails_is_said_and_tried_again(watching, live):
         (root / "trial.toml").write_text(right)
         assert watch.wait() == 0
     assert (root / "models" / "000180.toml").exists()
+
+
+def test_a_dry_run_says_what_each_stage_would_make(zfcal, trial):
+    """The windows that are there; nothing is written, no process starts, no lock lies there."""
+    before = sorted(trial.rglob("*"))
+    done = zfcal("watch", "trial", "--dry-run")
+    assert done.code == 0
+    assert "watch would run analyse, calibrate in trial." in done.err
+    assert "would make trial/stats/000120.parquet: missing" in done.err
+    assert "would make trial/stats/000180.parquet: missing" in done.err
+    assert "calibrate: nothing to make now" in done.err
+    assert sorted(trial.rglob("*")) == before
+
+
+def test_a_dry_run_takes_no_round_with_a_budget_for_stale(zfcal, trial):
+    """Such a round is made once, whatever its inputs; one with generations is made again."""
+    assert zfcal("analyse", "trial").code == 0
+    made = zfcal("calibrate", "trial", "--generations", 1, "--publish", "score")
+    assert made.code == 0, made.err
+    changed = ("--publish", "score", "--dry-run", "--json")
+    kept = json.loads(zfcal("watch", "trial", "--budget", "5s", *changed).out)
+    reasons = [each["reason"] for each in kept["artifacts"]]
+    again = json.loads(zfcal("watch", "trial", "--generations", 2, *changed).out)
+    states = [
+        {Path(each["path"]).name: each["state"] for each in told["artifacts"]}
+        for told in (kept, again)
+    ]
+    assert [state["000120.toml"] for state in states] == ["up to date", "planned"], reasons
 
 
 @pytest.mark.parametrize(

@@ -351,7 +351,7 @@ def test_what_cannot_be_driven_is_told(root, tmp_path):
         replay(root, say_nothing)
     config = root / "trial.toml"
     config.write_text(config.read_text().replace("n_robots = 1", "n_robots = 0"))
-    with pytest.raises(InputError, match="nobody to drive"):
+    with pytest.raises(InputError, match="no robot to drive"):
         drive(root, options, say_nothing)
 
 

@@ -112,7 +112,7 @@ def test_network_file_systems_are_polled(tmp_path, monkeypatch, kind, polls):
     reason = reason_to_poll(tmp_path, asked=False)
     assert (reason is not None) == polls
     assert not polls or kind in reason
-    assert reason_to_poll(tmp_path, asked=True) == "asked for"
+    assert reason_to_poll(tmp_path, asked=True) == "--poll was given"
 
 
 def test_without_the_library_it_polls(tmp_path, monkeypatch):

@@ -12,13 +12,12 @@ from zfcal.online.watch_stages import (
     AnalyseStage,
     CalibrateStage,
     Turn,
-    has_ended,
     is_of_a_round,
 )
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.events import LeftOut, Made, Note, say_nothing
-from zfcal.stages.recording import STRETCH_KEY
+from zfcal.stages.recording import STRETCH_KEY, has_ended
 from zfcal.stages.skipping import skipped_ends, skipped_path
 from zfcal.stages.trial_context import Task
 

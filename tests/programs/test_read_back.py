@@ -54,7 +54,7 @@ def test_labels_of_sleap_io_are_imported(files, imported):
 
     assert done.returncode == 0, done.stderr
     assert "read as --format sleap." in done.stderr
-    assert "1 instances without a track are passed over." in done.stderr
+    assert "1 instances without a track are left out." in done.stderr
     assert tracks.frame.tolist() == [2, 2, 3, 3, 4, 9, 9]
     assert tracks.agent.tolist() == [0, 3, 0, 3, 0, 0, 3]
     assert tracks.kind.tolist() == [0, 1, 0, 1, 0, 0, 1]

@@ -60,8 +60,8 @@ def test_metres_are_taken_beside_pixels_unless_a_scale_is_given(write, read):
     pixels = read(path, "csv", m_per_px=0.001)
 
     assert (metres.tracks.x_m[0], pixels.tracks.x_m[0]) == (0.5, 0.1)
-    assert "Columns passed over: x_px, y_px." in metres.notes
-    assert "Columns passed over: x_m, y_m." in pixels.notes
+    assert "Columns that are not used: x_px, y_px." in metres.notes
+    assert "Columns that are not used: x_m, y_m." in pixels.notes
 
 
 def test_a_frame_column_does_without_times(write, read):
@@ -112,7 +112,7 @@ def test_extra_columns_are_passed_over_and_reported(write, read):
     """Nothing is dropped without a word."""
     path = write("tracks.csv", "time_s,agent,x_m,y_m,speed,mood\n0,0,0.1,0.2,9,calm\n")
 
-    assert "Columns passed over: speed, mood." in read(path, "csv").notes
+    assert "Columns that are not used: speed, mood." in read(path, "csv").notes
 
 
 def test_rows_may_be_grouped_by_agent_and_spread_over_lines(write, read):

@@ -58,7 +58,7 @@ def test_fish_and_robots_are_told_by_their_category(make, read):
     assert found.tracks.kind[:3].tolist() == [FISH, FISH, ROBOT]
     assert found.tracks.agent[:3].tolist() == [0, 1, 2]
     assert "Agents are numbered: fish_1 = 0, fish_2 = 1, lure = 2." in found.notes
-    assert any("passed over: stone (obstacle)" in note for note in found.notes)
+    assert any("left out: stone (obstacle)" in note for note in found.notes)
 
 
 def test_the_names_of_robofish_io_give_numbers_and_categories_give_kinds(make, read):

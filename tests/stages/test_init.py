@@ -44,7 +44,7 @@ def test_a_trial_that_differs_is_not_overwritten(tmp_path, heard, read_all):
     create_trial(root, TWO_ROOMS, heard.append)
     before = read_all(root)
     other = NewTrial(n_fish=5, n_robots=1, fps=15.0, arena="two-rooms", seed=3)
-    with pytest.raises(InputError, match="n_fish = 4, asked for 5"):
+    with pytest.raises(InputError, match="n_fish = 4, the command gives 5"):
         create_trial(root, other, heard.append)
     assert read_all(root) == before
 

@@ -124,7 +124,7 @@ def test_a_model_without_a_home_needs_an_arena_and_fish(home, tmp_path):
 
 def test_options_that_contradict_an_existing_trial_are_refused(home, heard):
     """An option that cannot take effect is an error."""
-    with pytest.raises(InputError, match="n_fish is 2, asked for 3"):
+    with pytest.raises(InputError, match="n_fish is 2, the command gives 3"):
         simulate(home, options_of(home, n_fish=3), heard.append)
 
 

@@ -120,7 +120,7 @@ def test_another_experiment_is_not_lost(loop):
     folder, _ = loop
     before = {p: p.read_bytes() for p in (folder / "trial").rglob("*.parquet")}
     other = dataclasses.replace(SHORT, fish=FishOptions(wariness=0.0))
-    with pytest.raises(InputError, match=r"its fish_wariness is 0\.3, asked for 0\.0"):
+    with pytest.raises(InputError, match=r"its fish_wariness is 0\.3, the command gives 0\.0"):
         closed_loop(folder, other, lambda _: None)
     assert {p: p.read_bytes() for p in (folder / "trial").rglob("*.parquet")} == before
 

@@ -129,6 +129,6 @@ def _check_together(options: Mapping[str, Any]) -> None:
             if options.get(name) is not None:
                 raise OptionError(f"{option} belongs to --window, which is not given.")
     elif options.get("out") is None:
-        raise OptionError("--window needs -o FILE: its model is none of the trial's rounds.")
+        raise OptionError("--window needs -o FILE: its model belongs to no round of the trial.")
     if options.get("cluster") is not None and options["workers"] is not None:
         raise OptionError("--workers are threads of this machine: with --cluster it has none.")

@@ -27,7 +27,7 @@ _IN_USE: set[str] = set()
 _HINTS = {
     errno.ENOSPC: "The disk is full: make room and run the same command again.",
     errno.EDQUOT: "Your quota is used up: make room and run the same command again.",
-    errno.EFBIG: "A limit on file sizes stands in the way (ulimit -f), or the file system's own.",
+    errno.EFBIG: "Raise the limit on file sizes (ulimit -f), or use a file system that has none.",
     errno.EROFS: "The file system is mounted read-only: copy the trial to a disk of your own.",
     errno.EACCES: "You may not write there: change its permissions, or copy the trial.",
     errno.EPERM: "You may not write there: change its permissions, or copy the trial.",

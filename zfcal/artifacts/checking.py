@@ -276,7 +276,7 @@ def _check_tracks(place: _Place, path: Path) -> Iterator[Finding]:
         )
         yield Finding(level=WARNING, where=name, says=says, hint="Import or track it again.")
     if len(tracks) == 0:
-        yield Finding(level=NOTE, where=name, says="nobody was seen in this segment")
+        yield Finding(level=NOTE, where=name, says="no animal was seen in this segment")
     if place.arena is None or len(tracks) == 0:
         return
     xy_m, _ = place.arena.settle(np.stack([tracks.x_m, tracks.y_m], axis=-1))

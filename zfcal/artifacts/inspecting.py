@@ -117,7 +117,7 @@ def _lineage(path: Path) -> Description | None:
 
 
 def _table(path: Path) -> tuple[str | None, str | None, Description]:
-    table = read_parquet(path, "Copy it again from where it was made, or make it anew.")
+    table = read_parquet(path, "Copy it again from where it was made, or make it again.")
     schema = schema_of(table)
     known = schema in TABLE_SCHEMAS
     # A table for other programs has the columns that they want.

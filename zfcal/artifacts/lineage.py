@@ -129,7 +129,7 @@ def read_lineage(path: Path) -> Lineage:
             raise unreadable(path, error) from error
         raise DamagedError(
             f"{path}: cannot be read whole ({first_line(error)}).",
-            hint="Copy it again from where it was made, or remove it and make it anew.",
+            hint="Copy it again from where it was made, or remove it and make it again.",
         ) from error
 
 
@@ -151,7 +151,7 @@ def _from_dict(path: Path, found: Mapping[str, Any] | None) -> Lineage:
         raise DamagedError(
             f"{path}: its lineage is incomplete: {', '.join(wrong or ['seed'])} missing or no "
             f"{'text or table' if wrong else 'whole number'}.",
-            hint="Another program has rewritten it: make it anew.",
+            hint="Another program has rewritten it: make it again.",
         )
     return Lineage(**{key: found[key] for key in wanted}, seed=seed)
 

@@ -120,7 +120,7 @@ def _file_system(kind: str) -> Iterator[Finding]:
             level=WARNING,
             where="file system",
             says=f"{kind}: changes made on other computers are not announced",
-            hint="zfcal watch --poll looks for them; it does so by itself on such a file system.",
+            hint="zfcal watch --poll looks for them, on such a file system without the option too.",
         )
     else:
         yield Finding(level=OK, where="file system", says=kind or "of unknown type")

@@ -173,7 +173,7 @@ def _text_of(path: Path) -> str:
             hint="Save it as UTF-8, or copy the right file there.",
         ) from error
     if not text.strip("\0 \t\r\n"):
-        raise DamagedError(f"{path}: the file is empty.", hint="Copy it again, or make it anew.")
+        raise DamagedError(f"{path}: the file is empty.", hint="Copy it again, or make it again.")
     return text
 
 

@@ -110,7 +110,7 @@ def from_bytes(data: bytes, *, key: str) -> Progress | None:
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise DamagedError(
             f"The checkpoint of {len(data)} bytes cannot be read: {error}.",
-            hint="Remove it; the round then starts anew and ends in the same result.",
+            hint="Remove it; the round then starts again and ends in the same result.",
         ) from error
 
 

@@ -134,7 +134,7 @@ def refuse_unlike(here: Fingerprint, there: Fingerprint | Exception, worker: str
     worker
         Its address.
     """
-    hint = "Install the same version on every computer and start the workers anew."
+    hint = "Install the same version on every computer and restart the workers."
     if not isinstance(there, Fingerprint):
         raise InputError(f"Worker {worker} cannot load zfcal {here.zfcal}: {there}", hint=hint)
     if names := here.unlike(there):

@@ -37,7 +37,7 @@ _NOT_DECIDED = {"sent", "n_sent"}
 
 
 @final
-class _NoLine:
+class NoLine:
     """A line on which nothing is said."""
 
     is_open = False
@@ -163,7 +163,7 @@ class _Again:
     def _take_model(self, item: dict[str, Any]) -> None:
         self._model = _model_of(item, self._opened)
         if item.get("begins") or self._pilot is None:
-            self._pilot = Pilot(self._opened, self._manner, FishBot(self._manner.letter, _NoLine()))
+            self._pilot = Pilot(self._opened, self._manner, FishBot(self._manner.letter, NoLine()))
 
     def _take_frame(self, number: int) -> None:
         poses = self._poses.get(number)

@@ -42,7 +42,7 @@ def check_model(parameters: Parameters, arena: Arena) -> None:
         raise InputError(
             f"The model has zones {list(parameters.zone_names)}, arena {arena.name!r} has "
             f"{list(arena.zone_names)}.",
-            hint="A model is calibrated for one arena; calibrate it anew for another one.",
+            hint="A model is calibrated for one arena; calibrate it again for another one.",
         )
     for zone in parameters.zones:
         if set(zone.gamma) != set(arena.zone_names):

@@ -25,7 +25,7 @@ _CHECK_MS = 1000
 def reason_to_poll(root: Path, *, asked: bool) -> str | None:
     """Return why a trial is looked at again and again without notifications; None to use them."""
     if asked:
-        return "asked for"
+        return "--poll was given"
     kind = file_system(root)
     if is_network(kind):
         return f"the file system is {kind}, where changes made elsewhere are not announced"

@@ -38,11 +38,11 @@ from zfcal.online.watch_stages import (
     Turn,
     WatchOptions,
     begin,
-    has_ended,
     is_of_a_round,
 )
 from zfcal.online.worker import Done, Failure, Worker
 from zfcal.stages import events as of
+from zfcal.stages.recording import has_ended
 from zfcal.stages.skipping import skipped_ends
 from zfcal.stages.trial_context import open_trial
 from zfcal.stages.windows import window_ends

@@ -12,15 +12,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.online.arrivals import Signature
 from zfcal.online.scheduling import Overruns, budget_of, choose
 from zfcal.online.watch_events import Skipped, StageStatus, Takes
 from zfcal.online.worker import Job, Worker
-from zfcal.stages.events import LeftOut, Planned, Tell, UpToDate
-from zfcal.stages.recording import starts_between, stretch_of
+from zfcal.stages.events import Event, LeftOut, Planned, Tell, UpToDate
 from zfcal.stages.segments import Segments
 from zfcal.stages.skipping import write_skipped
 from zfcal.stages.trial_context import Task, open_trial
@@ -100,6 +98,12 @@ class TrackStage:
         track(self.root, self.options, ear.hear)
         return Outcome(left_out=ear.left_out)
 
+    def plan(self, tell: Tell) -> None:
+        """Say what would be made now."""
+        from zfcal.stages.track.track import track
+
+        track(self.root, self.options, tell, task=Task(dry_run=True))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalyseStage:
@@ -117,6 +121,12 @@ class AnalyseStage:
         task = Task(ends_s=frozenset(turn.seen_s))
         analyse(self.root, self.options, ear.hear, task=task, segments=self.segments)
         return Outcome(left_out=ear.left_out)
+
+    def plan(self, tell: Tell) -> None:
+        """Say what would be made now."""
+        from zfcal.stages.analyse.analyse import analyse
+
+        analyse(self.root, self.options, tell, task=Task(dry_run=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,6 +182,19 @@ class CalibrateStage:
             self.overruns.add(self.clock() - now_s, options.budget_s)
         return Outcome(end_s=choice.end_s, left_out=ear.left_out)
 
+    def plan(self, tell: Tell) -> None:
+        """Say which rounds would be made now."""
+        from zfcal.stages.calibrate.calibrate import calibrate
+
+        once = self.options.budget_s is not None
+
+        def hear(event: Event) -> None:
+            if once and isinstance(event, Planned) and not _is_first(event.reason):
+                event = UpToDate(path=event.path)
+            tell(event)
+
+        calibrate(self.root, self.options, hear, task=Task(dry_run=True))
+
     def _get_ready(self) -> None:
         """Have the simulator compiled, or loaded."""
         from zfcal.calibrate.search import warm_up
@@ -201,7 +224,7 @@ class CalibrateStage:
         return [
             end
             for end, reason in planned.items()
-            if end in turn.seen_s and not (once and not reason.startswith(("missing", "damaged")))
+            if end in turn.seen_s and not (once and not _is_first(reason))
         ]
 
     def _pass_over(self, end_s: int, instead_s: int, *, waited_s: float) -> Skipped:
@@ -210,6 +233,15 @@ class CalibrateStage:
         if not (self.root / "models" / f"{end_s:06d}.toml").exists():
             path = write_skipped(self.root, end_s, went_on_with_s=instead_s, because=because)
         return Skipped(end_s=end_s, went_on_with_s=instead_s, because=because, path=path)
+
+
+def _is_first(reason: str) -> bool:
+    """Return whether a round with this reason was not made before."""
+    return reason.startswith(("missing", "damaged"))
+
+
+StageJob: TypeAlias = TrackStage | AnalyseStage | CalibrateStage
+"""What a stage does with an order; its `plan` says what it would do now, and writes nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,9 +267,9 @@ class WatchOptions:
     once: bool = False
     until_idle_s: float | None = None
 
-    def jobs(self, root: Path) -> dict[str, Job]:
+    def jobs(self, root: Path) -> dict[str, StageJob]:
         """Return what each of the stages does, in their order."""
-        jobs: dict[str, Job] = {}
+        jobs: dict[str, StageJob] = {}
         if self.track is not None:
             jobs[TRACK] = TrackStage(root=root, options=self.track)
         if self.analyse is not None:
@@ -291,26 +323,3 @@ def begin(name: str, job: Job) -> Running:
 def is_of_a_round(name: str) -> bool:
     """Return whether rounds make the file with a name in a trial: it is nothing to analyse."""
     return name.startswith("models/") or name.endswith(("-model.parquet", "-rules.parquet"))
-
-
-def has_ended(root: Path, whole: Mapping[int, float]) -> bool:
-    """Return whether a recording is there to its end.
-
-    The last segment of a recording says from where to where it goes; that of a
-    camera which may come back does not.
-
-    Parameters
-    ----------
-    root
-        The trial's directory.
-    whole
-        The segments that are there, by their starts.
-    """
-    for start in reversed(segment_starts(root)):
-        if start not in whole:
-            return False
-        stretch = stretch_of(segment_path(root, start))
-        if stretch is not None:
-            needed = starts_between(*stretch)
-            return needed[-1] == max(whole) and set(needed) <= whole.keys()
-    return False

@@ -101,7 +101,7 @@ def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str
         text=tuple(name for name in names if name in _TEXT),
     )
     extra = [name or "(no name)" for name in names if name not in wanted]
-    notes = (f"Columns passed over: {', '.join(extra)}.",) if extra else ()
+    notes = (f"Columns that are not used: {', '.join(extra)}.",) if extra else ()
     return read_table(path, layout), unit, notes
 
 

@@ -78,7 +78,7 @@ def _poses(path: Path, frame: Ints, columns: Sequence[_Column], values: Floats) 
     notes: tuple[str, ...] = ()
     if _SINGLE in agents and len(agents) > 1:
         agents = tuple(agent for agent in agents if agent != _SINGLE)
-        notes = ("Body parts of no animal (individual 'single') are passed over.",)
+        notes = ("Body parts of no animal (individual 'single') are not used.",)
     keypoints = tuple(dict.fromkeys(part for agent, part, _ in found if agent in agents))
     cube = np.full((len(frame), len(agents), len(keypoints), 3), np.nan)
     for (agent, part, coord), place in found.items():

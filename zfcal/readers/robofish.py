@@ -98,7 +98,7 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
     elif sampling.frequency_hz is not None:
         notes += check_declared(path, sampling.frequency_hz, options.fps)
     if left_out:
-        notes.append(f"Entities that are neither fish nor robot are passed over: {left_out}.")
+        notes.append(f"Entities that are neither fish nor robot are left out: {left_out}.")
     if unused:
         notes.append(f"Sampling {sampling.name!r} is taken, not used: {', '.join(unused)}.")
     ended = [f"{e.name} ({len(e.xy)})" for e in entities if 1 < len(e.xy) < n_samples]

@@ -57,7 +57,7 @@ def labelled(path: Path, options: ImportOptions) -> tuple[Poses, tuple[str, ...]
             cube[row, agents.index(agent), columns] = _points(instance)
     notes = _rate(path, rate_hz, options)
     if nobody:
-        notes = (*notes, f"{nobody} instances without a track are passed over.")
+        notes = (*notes, f"{nobody} instances without a track are left out.")
     poses = Poses(
         position=cube[..., :2],
         score=cube[..., 2],

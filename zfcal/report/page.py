@@ -149,7 +149,7 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
         return _Place(folder=folder, base=roots[0])
     if out_dir is None:
         raise InputError(
-            f"A report over {len(roots)} trials belongs to none of them: it needs a folder.",
+            f"A report over {len(roots)} trials belongs to no single one: it needs a folder.",
             hint="Say where it goes: zfcal report TRIAL... --out FOLDER",
         )
     if len({root.resolve() for root in roots}) < len(roots):

@@ -72,7 +72,7 @@ def check_wheels(wheels: Wheels) -> None:
     for side, value in (("left", wheels.left_m_s), ("right", wheels.right_m_s)):
         if not abs(value) <= WHEEL_LIMIT_M_S + _SLACK_M_S:
             raise InputError(
-                f"The {side} wheel is asked for {value:.3f} m/s, the robot's limit is "
+                f"The speed of the {side} wheel is {value:.3f} m/s, the robot's limit is "
                 f"{WHEEL_LIMIT_M_S:.2f} m/s; nothing was sent.",
                 hint="Beyond it the robot sets both wheels to zero.",
             )

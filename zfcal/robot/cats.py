@@ -273,7 +273,7 @@ class OlderRig:
         if not self.missing:
             found.append(f"{self.address} has taken {len(self._wanted)} settings.")
         elif late and not self._said:
-            found.append(f"{self.address} does not answer; it is asked again and again.")
+            found.append(f"{self.address} does not answer; the request is repeated.")
         elif late:
             path = min(self.missing)
             says = ";".join(f"{value:g}" for value in self._said.get(path, ())) or "nothing"

@@ -114,7 +114,7 @@ def _options(opened: OpenTrial, given: dict[str, object]) -> ImportOptions:
         raise InputError(
             f"{trial.config}: fps is {trial.fps:g} Hz, --fps says {fps} Hz.",
             hint=f"Both must be the rate of the recording: correct one of them (zfcal init "
-            f"{trial.root} --force --fps {fps} ... writes the trial anew).",
+            f"{trial.root} --force --fps {fps} ... writes the trial again).",
         )
     known = {key: value for key, value in given.items() if value is not None}
     limits = {"n_fish": trial.n_fish, "n_robots": trial.n_robots, "fps": trial.fps}

@@ -138,7 +138,8 @@ def _reason(trial: Trial, document: str | None, task: Task) -> str | None:
         return "forced"
     found = read_trial(trial.root)
     changed = [
-        f"{field.name} = {getattr(found, field.name)!r}, asked for {getattr(trial, field.name)!r}"
+        f"{field.name} = {getattr(found, field.name)!r}, "
+        f"the command gives {getattr(trial, field.name)!r}"
         for field in dataclasses.fields(Trial)
         if field.name not in {"root", "cameras", "model"}
         and getattr(found, field.name) != getattr(trial, field.name)
@@ -151,7 +152,7 @@ def _reason(trial: Trial, document: str | None, task: Task) -> str | None:
     if changed:
         raise InputError(
             f"{trial.root}: is a trial already, and differs: {'; '.join(changed)}.",
-            hint=f"Edit {trial.config}, or write it anew with --force (tracks, statistics, "
+            hint=f"Edit {trial.config}, or write it again with --force (tracks, statistics, "
             "scores and models stay).",
         )
     return None

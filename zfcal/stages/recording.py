@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -126,6 +126,29 @@ def stretch_of(path: Path) -> tuple[float, float] | None:
     if not isinstance(said, list) or len(said) != 2:
         return None
     return float(str(said[0])), float(str(said[1]))
+
+
+def has_ended(root: Path, whole: Collection[int]) -> bool:
+    """Return whether a recording is there to its end.
+
+    The last segment of a recording says from where to where it goes; that of a
+    camera which may come back does not.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    whole
+        The segments that are there, by their starts.
+    """
+    for start in reversed(segment_starts(root)):
+        if start not in whole:
+            return False
+        stretch = stretch_of(segment_path(root, start))
+        if stretch is not None:
+            needed = starts_between(*stretch)
+            return needed[-1] == max(whole) and set(needed) <= set(whole)
+    return False
 
 
 def starts_between(first_s: float, end_s: float) -> list[int]:

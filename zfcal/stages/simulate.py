@@ -149,7 +149,7 @@ def _check_existing(opened: OpenTrial, options: SimulateOptions) -> None:
         asked, found = getattr(options, name), getattr(trial, name)
         if asked is not None and asked != found:
             raise InputError(
-                f"{trial.config}: {name} is {found!r}, asked for {asked!r}.",
+                f"{trial.config}: {name} is {found!r}, the command gives {asked!r}.",
                 hint="Simulate into a new directory, or leave the option out.",
             )
 

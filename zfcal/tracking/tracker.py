@@ -310,7 +310,7 @@ class FishTracker:
             self._note(frame, "forced", f"{forced} animals in blobs that are not as large")
         animals = sum(map(self._trails.is_animal, detections))
         if n is not None and animals > len(seen):
-            self._note(frame, "unclaimed", f"{animals} blobs like animals, {len(seen)} are told")
+            self._note(frame, "unclaimed", f"{animals} blobs like animals, {len(seen)} are tracked")
 
 
 def follow(tracker: FishTracker, frames: Iterable[Frame]) -> Iterator[tuple[Frame, list[Seen]]]:

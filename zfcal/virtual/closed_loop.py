@@ -18,10 +18,11 @@ from typing import NamedTuple, final
 import numpy as np
 
 from zfcal.drive.clock import PoseClock
-from zfcal.drive.drive import DriveOptions, lineage_of
+from zfcal.drive.drive import lineage_of
 from zfcal.drive.driving import Crew, Driver
 from zfcal.drive.log import DriveLog
 from zfcal.drive.models import DriveModels
+from zfcal.drive.options import DriveOptions
 from zfcal.errors import InputError
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.port import SerialLine

@@ -15,12 +15,17 @@ from zfcal.stages.calibrate.searching import CalibrateOptions
 from zfcal.stages.camera.rig import BELOW, OVERHEAD, CameraChoice
 from zfcal.stages.events import Made, Note, Tell, UpToDate
 from zfcal.stages.init import NewTrial, create_trial
+from zfcal.stages.recording import starts_between
+from zfcal.stages.segments import STEP_S
 from zfcal.stages.simulate import SimulateOptions, simulate
 from zfcal.stages.track.plan import Pictures, TrackOptions
 from zfcal.stages.track.track import track
 from zfcal.stages.trial_context import Task
+from zfcal.stages.windows import LENGTH_S
 from zfcal.tracks import KINDS, Tracks, concatenate
-from zfcal.virtual.film import FilmOptions, film, frames_folder
+from zfcal.trial import CONFIG_NAME, FIRST_MODEL
+from zfcal.virtual.demo_steps import Step, drive_demo, tell_steps
+from zfcal.virtual.film import FilmOptions, film, frames_folder, frames_path
 
 DURATION_S = 180.0
 FPS = 15.0
@@ -49,7 +54,7 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
     tell
         Hears of every file.
     task
-        How to go about it.
+        How to go about it. A dry run says of each file whether it would be made.
 
     Returns
     -------
@@ -57,19 +62,52 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
         The trial.
     """
     task = task or Task()
-    tank, trial = folder / "tank", folder / "trial"
-    new = NewTrial(n_fish=4, n_robots=1, fps=FPS, arena="two-rooms", seed=_TANK_SEED)
-    made = create_trial(tank, new, tell, task=task)
-    swim = SimulateOptions(model=tank / made.model, duration_s=DURATION_S)
-    simulate(tank, swim, tell, task=task)
-    film(tank, FilmOptions(), tell, task=task)
-    seen = dataclasses.replace(new, seed=_TRIAL_SEED, source="zfcal demo: images of a drawn tank")
-    create_trial(trial, seen, tell, task=task)
-    track(trial, _cameras(tank, folder / "contact-sheet.png"), tell, task=task)
-    analyse(trial, AnalyseOptions(), tell, task=task)
-    calibrate(trial, CalibrateOptions(settings=SETTINGS), tell, task=task)
-    tell(Note(text=f"{trial}: a trial of {DURATION_S:g} s, tracked, analysed and calibrated."))
+    trial = folder / "trial"
+    if task.dry_run:
+        tell_steps(_steps(folder, tell), tell, task)
+        return trial
+    for step in _steps(folder, tell):
+        step.work(task)
+    tell(
+        Note(
+            text=f"{trial}: a trial of {DURATION_S:g} s, tracked, analysed, calibrated and driven."
+        )
+    )
     return trial
+
+
+def _steps(folder: Path, tell: Tell) -> list[Step]:
+    """Return what a demonstration does, in order."""
+    tank, trial, sheet = folder / "tank", folder / "trial", folder / "contact-sheet.png"
+    new = NewTrial(n_fish=4, n_robots=1, fps=FPS, arena="two-rooms", seed=_TANK_SEED)
+    seen = dataclasses.replace(new, seed=_TRIAL_SEED, source="zfcal demo: images of a drawn tank")
+    swim = SimulateOptions(model=tank / FIRST_MODEL, duration_s=DURATION_S)
+    minutes = starts_between(0.0, DURATION_S)
+    truth, tracks = ([segment_path(root, start) for start in minutes] for root in (tank, trial))
+    images = [frames_path(tank, name, start) for name in (OVERHEAD, BELOW) for start in minutes]
+    poses = [trial / "poses" / f"{start:06d}.mcap" for start in minutes]
+    ends = range(LENGTH_S, int(DURATION_S) + 1, STEP_S)
+    stats = [trial / "stats" / f"{end:06d}.parquet" for end in ends]
+    models = [trial / "models" / f"{end:06d}.toml" for end in ends]
+    settings = [[root / FIRST_MODEL, root / CONFIG_NAME] for root in (tank, trial)]
+    options = _cameras(tank, sheet)
+    calibration = CalibrateOptions(settings=SETTINGS)
+    return [
+        Step(makes=settings[0], work=lambda task: create_trial(tank, new, tell, task=task)),
+        Step(makes=truth, work=lambda task: simulate(tank, swim, tell, task=task)),
+        Step(makes=images, work=lambda task: film(tank, FilmOptions(), tell, task=task)),
+        Step(makes=settings[1], work=lambda task: create_trial(trial, seen, tell, task=task)),
+        Step(
+            makes=[*tracks, *poses, sheet],
+            work=lambda task: track(trial, options, tell, task=task),
+        ),
+        Step(makes=stats, work=lambda task: analyse(trial, AnalyseOptions(), tell, task=task)),
+        Step(makes=models, work=lambda task: calibrate(trial, calibration, tell, task=task)),
+        Step(
+            makes=[trial / "drive" / "000000.mcap"],
+            work=lambda task: drive_demo(trial, tell, task=task),
+        ),
+    ]
 
 
 def _cameras(tank: Path, sheet: Path) -> TrackOptions:

@@ -83,7 +83,7 @@ def live_loop(
     if any((root / "poses").glob("*.mcap")) and not task.force:
         raise InputError(
             f"{root}: has been recorded; what happened in real time does not happen again.",
-            hint="Take another directory, or begin anew with --force.",
+            hint="Take another directory, or begin again with --force.",
         )
     clear(experiment)
     with contextlib.ExitStack() as stack:

@@ -194,7 +194,7 @@ def _begun(root: Path, new: NewTrial, model: Parameters, tell: Tell, task: Task)
     if read_model_for(path, opened.arena, dt_s=trial.dt_s) != model:
         raise InputError(
             f"{path}: is another model than this experiment begins with.",
-            hint="Take another directory, or begin anew with --force; the robot begins with "
+            hint="Take another directory, or begin again with --force; the robot begins with "
             "--model, the fish with --fish-model.",
         )
     return opened
@@ -246,8 +246,8 @@ def is_whole(experiment: Experiment) -> bool:
         name = other[0]
         raise InputError(
             f"{experiment.root}: holds another experiment: its {name} is "
-            f"{there.get(name, 'not known')}, asked for {asked[name]}.",
-            hint="Take another directory, or begin anew with --force.",
+            f"{there.get(name, 'not known')}, the command gives {asked[name]}.",
+            hint="Take another directory, or begin again with --force.",
         )
     return True
 

@@ -51,7 +51,7 @@ def _lost_confidence(confidence: Floats, *, has_certainty: bool) -> Iterator[str
     elif n_below and not has_certainty:
         yield (
             f"confidence is lost: {n_below} of {len(confidence)} positions are less than certain, "
-            f"{n_guesses} of them guesses; whoever opens the file takes all for certain."
+            f"{n_guesses} of them guesses; in the file they look like certain ones."
         )
 
 

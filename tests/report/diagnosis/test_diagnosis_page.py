@@ -267,7 +267,7 @@ def test_cards_say_what_is_missing_how_much_and_what_else_was_asked(make_sheet):
     assert "80 % (70 to 90)" in cards[1].answer
     assert "a wrong effect with as many parameters, 2 %" in cards[1].answer
     assert "a diagnosis chooses its effects on all" in cards[1].answer
-    assert "4 candidates were asked for" in cards[2].answer
+    assert "4 candidates were tested" in cards[2].answer
     assert "robot-avoidance (a robot)" in cards[2].answer
 
 
@@ -297,7 +297,7 @@ def test_what_a_recording_is_too_short_for_is_not_called_not_missing(make_sheet)
         Screened(name="fatigue", z=0.1, p=1.0, minutes_needed=45.0),
         Screened(name="crowding", z=-1.4, p=1.0),
     )
-    answer = card(make_sheet(screened=asked).findings, "What else was asked?").answer
+    answer = card(make_sheet(screened=asked).findings, "What else was tested?").answer
     assert "Of those not missing the loudest is crowding, z = -1.4." in answer
     assert (
         "This recording is too short to show these where they are faint: boldness and fatigue; "
@@ -308,7 +308,7 @@ def test_what_a_recording_is_too_short_for_is_not_called_not_missing(make_sheet)
 def test_an_effect_that_was_found_does_not_wait_for_more_minutes(make_sheet):
     """Beside another it may have been faint at first."""
     asked = (Screened(name="alignment", z=1.0, p=0.9, minutes_needed=45.0),)
-    answer = card(make_sheet(screened=asked).findings, "What else was asked?").answer
+    answer = card(make_sheet(screened=asked).findings, "What else was tested?").answer
     assert "too short" not in answer
 
 
@@ -328,7 +328,7 @@ def test_a_recording_that_nobody_makes_is_not_counted_in_minutes(make_sheet):
     asked = [Screened(name="freezing", z=0.1, p=1.0, minutes_needed=2.5e8)]
     by_name = {table.name: table for table in tables(make_sheet(screened=tuple(asked)))}
     assert by_name["candidates"].rows[0][3] == "over 10,080"
-    answer = card(make_sheet(screened=tuple(asked)).findings, "What else was asked?").answer
+    answer = card(make_sheet(screened=tuple(asked)).findings, "What else was tested?").answer
     assert answer.endswith("faint: freezing; a week would not do.")
 
 

@@ -18,7 +18,7 @@ from zfcal.stages.calibrate.holdout import (
     evaluate_model,
     pooled_fish,
 )
-from zfcal.stages.events import Made, UpToDate, say_nothing
+from zfcal.stages.events import Made, Note, UpToDate, say_nothing
 from zfcal.stages.segments import Segments
 from zfcal.stages.simulate import SimulateOptions, simulate
 from zfcal.stages.trial_context import open_trial
@@ -90,6 +90,13 @@ def test_a_span_makes_one_model_with_both_scores(tmp_path, make_trial, quick, he
     for name in ("before", "after"):
         assert 0 < result["held_out"][name]["S"] <= 1
         assert 0 < result["held_out"][name]["ceiling"] <= 1
+    said = [event.text for event in heard if isinstance(event, Note)]
+    after = result["held_out"]["after"]
+    assert f"S {result['S']:.3f}, ceiling {result['ceiling']:.3f} (" in said[-3]
+    assert said[-3].startswith("Window 0:120 s: ")
+    assert said[-1].startswith(
+        f"Held-out 120:240 s, after calibration: S {after['S']:.3f}, ceiling"
+    )
     assert read_all(root) == before
     heard.clear()
     calibrate_span(root, span, quick, heard.append)

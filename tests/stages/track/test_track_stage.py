@@ -542,7 +542,7 @@ def test_more_blobs_than_fish_are_told_once(new, film, heard):
     [
         ({}, {"overhead": CameraChoice()}, "names no source of overhead images"),
         ({}, {"overhead": CameraChoice(source="FILM")}, "names no calibration of the overhead"),
-        ({"n_robots": 1}, {}, "cannot be told from the fish"),
+        ({"n_robots": 1}, {}, "cannot be distinguished from the fish"),
         ({"n_robots": 2}, {}, "states 2 robots"),
         ({}, {"below": CameraChoice(source="0", corners_px=CORNERS)}, "states no robot"),
         ({}, {"robot_as_fish": True}, "--robot-as-fish is for a trial with a robot"),

@@ -412,5 +412,5 @@ def _written(looks: Looks | None) -> Looks | None:
 def _changed(place: str) -> ChangedError:
     return ChangedError(
         f"{place}: has changed while it was being used.",
-        hint="Run the command again once nobody writes there any more.",
+        hint="Run the command again when no other process writes there.",
     )

@@ -236,7 +236,7 @@ def _of_chance(findings: Findings) -> Iterator[Statement]:
     others = [each for each in asked if each.name not in found]
     waiting = [each for each in others if each.minutes_needed is not None]
     rest = [each for each in others if each.minutes_needed is None]
-    said = [f"{len(asked)} candidates were asked for."]
+    said = [f"{len(asked)} candidates were tested."]
     if rest:
         loudest = max(rest, key=lambda each: abs(each.z))
         said.append(f"Of those not missing the loudest is {loudest.name}, z = {loudest.z:.1f}.")
@@ -245,7 +245,7 @@ def _of_chance(findings: Findings) -> Iterator[Statement]:
     lacking = [f"{each.name} ({each.lacks})" for each in findings.screened if each.lacks]
     if lacking:
         said.append(f"What the recording lacks: {'; '.join(lacking)}.")
-    yield Statement(question="What else was asked?", answer=" ".join(said))
+    yield Statement(question="What else was tested?", answer=" ".join(said))
 
 
 def _too_short(waiting: Sequence[Screened]) -> str:

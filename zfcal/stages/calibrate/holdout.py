@@ -38,7 +38,8 @@ from zfcal.stages.calibrate.searching import (
     checkpoint_key,
     run_search,
 )
-from zfcal.stages.events import Event, Result, Tell
+from zfcal.stages.calibrate.telling import stretch_note
+from zfcal.stages.events import Event, Note, Result, Tell
 from zfcal.stages.segments import STEP_S, Segments, guess_options
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
 from zfcal.stages.trial_context import OpenTrial, Task
@@ -252,7 +253,9 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         key = checkpoint_key(output.lineage)
         result = run_search(round_task, asked, checkpoint, run.tell, key=key)
         models = {"before": group.template, "after": result.champion}
-        judged = _judge(opened, span, models, seed, segments)
+        judged, notes = _judge(opened, span, models, seed, segments)
+        trained = f"Window {_text(span.train_s)} s"
+        notes = [stretch_note(trained, result.scores, result.ceiling), *notes]
         found = Found(
             result=result,
             baselines=baseline_scores(round_task, options, result),
@@ -261,7 +264,7 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
 
         def write(path: Path, lineage: Lineage) -> list[Event]:
             write_model(path, result.champion, lineage, {**found.table, **judged})
-            return [Result(value={"path": str(output.path), **found.summary, **judged})]
+            return [*notes, Result(value={"path": str(output.path), **found.summary, **judged})]
 
         yield Draft(output=output.with_options(generations=result.generations), write=write)
         discard(checkpoint)
@@ -288,17 +291,21 @@ def _lineage(
 
 def _judge(
     opened: OpenTrial, span: Span, models: Mapping[str, Parameters], seed: int, segments: Segments
-) -> dict[str, JSON]:
-    """Score models on what was held out."""
+) -> tuple[dict[str, JSON], list[Note]]:
+    """Score models on what was held out; also in words."""
     if span.held_out_s is None:
-        return {}
-    scored: dict[str, JSON] = {"window": _text(span.held_out_s)}
+        return {}, []
+    stretch = _text(span.held_out_s)
+    scored: dict[str, JSON] = {"window": stretch}
+    notes = []
     for name, model in models.items():
         found = evaluate_model(
             opened.trial.root, model, span.held_out_s, seed=seed, segments=segments
         )
         scored[name] = score_table(found.scores, found.ceiling)
-    return {"held_out": scored}
+        where = f"Held-out {stretch} s, {name} calibration"
+        notes.append(stretch_note(where, found.scores, found.ceiling))
+    return {"held_out": scored}, notes
 
 
 def _text(span_s: tuple[int, int]) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 from zfcal.artifacts.lineage import JSON
+from zfcal.behaviour.ceilings import Ceiling
+from zfcal.behaviour.scores import Scores
 from zfcal.calibrate.rounds import RoundResult
 from zfcal.calibrate.rules import SAYS
 from zfcal.stages.events import Note
@@ -49,6 +51,23 @@ def published_note(result: RoundResult, end_s: int) -> Note:
         listed = ", ".join(f"{rule} {mean:.3f}" for rule, mean in means.items())
         parts.append(f"Forward scores so far: {listed}.")
     return Note(text=" ".join(parts))
+
+
+def stretch_note(name: str, scores: Scores, ceiling: Ceiling) -> Note:
+    """Return what a model is worth on a stretch of a trial, on one line.
+
+    Parameters
+    ----------
+    name
+        Of the stretch.
+    scores, ceiling
+        What the model scores there, and what it reaches against itself.
+    """
+    mean, low, high = ceiling.overall
+    score = "S" if scores.named is None else "the score"
+    band = f"{_three(low)} to {_three(high)}"
+    text = f"{name}: {score} {_three(scores.overall)}, ceiling {_three(mean)} ({band})."
+    return Note(text=text)
 
 
 def _what(result: RoundResult, end_s: int) -> str:

@@ -194,7 +194,7 @@ def _notes(alignment: Alignment) -> tuple[str, ...]:
     if abs(alignment.offset_s) > _LATE_S:
         notes.append(
             f"The clocks differ: {alignment.offset_s * _MM:+.0f} ms are to be added to the times "
-            "below. More than 50 ms keep the robot from being told by its LEDs."
+            "below. More than 50 ms prevent that the robot is recognised by its LEDs."
         )
     return tuple(notes)
 

@@ -129,7 +129,7 @@ def write_sheet(path: Path, board: Board, tell: Tell) -> None:
     """
     image = draw_board(board, square_px=round(board.square_m * _PX_PER_M))
     write_bytes_whole(path, encoded(image, "png"))
-    tell(Made(path=path, reason="asked for"))
+    tell(Made(path=path, reason="requested"))
 
 
 def _work(files: tuple[Path, ...], given: BoardImages, tell: Tell) -> Found:

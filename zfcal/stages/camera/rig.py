@@ -203,7 +203,7 @@ def view_of(opened: OpenTrial, name: str, choice: CameraChoice) -> View | None:
     if file is None and choice.corners_px is None:
         raise InputError(
             f"{trial.config}: names no calibration of the {name} camera, so its pixels cannot be "
-            "told in metres.",
+            "converted to metres.",
             hint=f"Calibrate it with zfcal camera and set [cameras.{name}] file; or give "
             f"{'--camera FILE or --corners' if name == OVERHEAD else '--below-camera FILE'}.",
         )

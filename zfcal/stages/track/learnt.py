@@ -112,13 +112,13 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
     taken, film = str(learnt["polarity"]), learnt["film_polarity"]
     how = {
         _FILM: "as the film shows",
-        _OPTION: "as was said",
+        _OPTION: "by the option",
         _BEFORE: "as before",
-        _DEFAULT: "untold",
+        _DEFAULT: "the default",
     }
     size = "" if learnt["area_px"] is None else f", about {learnt['area_px']:.0f} px large"
     yield Note(
-        text=f"{source}: animals are taken for {_SAYS[taken]} "
+        text=f"{source}: animals count as {_SAYS[taken]} "
         f"({how[str(learnt['polarity_from'])]}){size}; blobs below {learnt['min_blob_px']:.1f} px "
         f"are none ({how[str(learnt['min_blob_from'])]})."
     )

@@ -168,8 +168,8 @@ class Outcome:
         self._tell(
             Note(
                 text=f"{name}: {self._tally}; {self._exact / frames:.1%} of them with exactly "
-                f"{n_agents} animals seen, none guessed or left over ({self._emitted / frames:.1%} "
-                f"with as many rows){'; ' if wrong else ''}{wrong}."
+                f"{n_agents} animals seen, none guessed or unexplained "
+                f"({self._emitted / frames:.1%} with as many rows){'; ' if wrong else ''}{wrong}."
             )
         )
         if self._guesses > self._rows / 2:
@@ -180,8 +180,8 @@ class Outcome:
             self._tell(Note(text=text, warning=True))
         if self._bad["no background"]:
             text = (
-                f"{name}: no background was learnt, since no frame shows a tank: nobody was found. "
-                "Give an image of the empty tank with --background."
+                f"{name}: no background was learnt, since no frame shows a tank: no animal "
+                "was found. Give an image of the empty tank with --background."
             )
             self._tell(Note(text=text, warning=True))
         self._tell(Result(value=self._numbers()))

@@ -177,12 +177,13 @@ def _check_robot(opened: OpenTrial, below: View | None, options: TrackOptions) -
     trial = opened.trial
     if trial.n_robots > 1:
         raise InputError(
-            f"{trial.config}: states {trial.n_robots} robots; one robot can be told by its LEDs."
+            f"{trial.config}: states {trial.n_robots} robots; "
+            "one robot can be recognised by its LEDs."
         )
     if trial.n_robots and below is None and not options.robot_as_fish:
         raise InputError(
-            f"{trial.config}: states a robot, and without the camera below it cannot be told from "
-            "the fish.",
+            f"{trial.config}: states a robot, and without the camera below it cannot be "
+            "distinguished from the fish.",
             hint="Give --below SRC; or --robot-as-fish, and it is tracked as one fish more.",
         )
     if not trial.n_robots and below is not None:

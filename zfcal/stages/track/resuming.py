@@ -59,7 +59,11 @@ def resume(root: Path, tell: Tell) -> Resumed:
     minutes = unfinished(root, tell, also=now_s)
     frames = [poses for part in minutes.values() for poses in part]
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(started_s))
-    tell(Note(text=f"{root}: goes on with the recording that began at {since}; anew with --force."))
+    tell(
+        Note(
+            text=f"{root}: goes on with the recording that began at {since}; --force begins again."
+        )
+    )
     return Resumed(
         started_unix_s=started_s,
         minutes=minutes,
