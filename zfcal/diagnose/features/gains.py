@@ -38,6 +38,9 @@ _MOST_TILT = 4.0
 _MOST_LEAVING = 6.0
 _MOST_TURN = 0.3
 
+_MOST_LESS = 1.0
+"""By how much less of a component there may be than in the model, where an effect is there."""
+
 _TRIED = (0.005, 0.02, 0.06)
 """Strengths of a component at which it is first asked for."""
 
@@ -414,7 +417,11 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
         for feature in effect.features(law.scene.arena):
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
             for each in chosen:
-                if isinstance(each, Component | Turned):
+                if isinstance(each, Component):
+                    # The model's form of it may have too much of this.
+                    low = min(each.low, -(each.high or _MOST_LESS))
+                    also.append(replace(each, low=low))
+                elif isinstance(each, Turned):
                     also.append(each)
                 elif isinstance(each, Tilt) or law.between:
                     law = _absorbed(law, each)
