@@ -16,6 +16,11 @@ _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
 @click.command("report")
 @takes_trials
 @click.option("-o", "--out", type=PLACE, help=_OUT)
+@click.option(
+    "--published",
+    is_flag=True,
+    help="Draw the published scores, which are of other fish, beside these.",
+)
 @makes_artifacts
 @speaks
 def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
@@ -30,10 +35,10 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
         zfcal report trial*/
         zfcal report day1 day2 day3 --out together
     """
-    from zfcal.api.reporting import write_page
+    from zfcal.api.reporting import how_of, write_page
     from zfcal.api.trials import task_of
 
     roots = roots_of(out, trials)
     if roots and not out.exit_code:
-        task = task_of(options)
-        out.attempt(lambda: write_page(roots, options["out"], out.tell, task=task))
+        task, how = task_of(options), how_of(options)
+        out.attempt(lambda: write_page(roots, options["out"], out.tell, task=task, how=how))

@@ -17,7 +17,15 @@ pytestmark = pytest.mark.usefixtures("quick_model")
 
 quickly = pytest.mark.usefixtures("quick_pictures")
 
-PICTURES = {"arena", "integration", "parameters", "scores", "statistics", "tracks"}
+PICTURES = {
+    "arena",
+    "integration",
+    "parameters",
+    "scores",
+    "social",
+    "statistics",
+    "tracks",
+}
 
 
 class Reader(html.parser.HTMLParser):
@@ -150,11 +158,11 @@ def test_a_report_is_up_to_date_until_something_changes(small_trial):
         ({"analysed": False, "calibrated": False}, {"arena", "tracks"}, "zfcal analyse trial"),
         (
             {"calibrated": False},
-            {"arena", "tracks", "statistics", "integration"},
+            {"arena", "tracks", "statistics", "integration", "social"},
             "zfcal calibrate trial",
         ),
         ({"minutes": 2}, PICTURES, "There is a single window"),
-        ({"n_robots": 0}, PICTURES - {"integration"}, "There is no robot in this trial."),
+        ({"n_robots": 0}, PICTURES - {"integration", "social"}, "There is no robot in this trial."),
     ],
     ids=["tracks only", "no model", "one window", "no robot"],
 )
@@ -219,6 +227,7 @@ def test_several_trials_make_one_report(small_trial, tmp_path):
     assert {path.stem for path in made if path.suffix == ".png"} == {
         "scores",
         "integration",
+        "social",
         "arena",
     }
     text = " ".join(read_page(out).text)

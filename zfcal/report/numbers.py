@@ -10,6 +10,7 @@ import numpy as np
 
 from zfcal.artifacts.lineage import to_json
 from zfcal.report.figures.parameters import outside_of, values_of
+from zfcal.report.standing import share_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _COMPARED = {
@@ -142,7 +143,8 @@ def _scores(view: TrialView) -> Table:
         numbers=range(2, 7),
         note="Similarities between 0 and 1: D distances between fish, W distances to the wall, "
         "O time in each zone, T moves between zones, S all together. Ceiling and interval are "
-        "those of the last window.",
+        "those of the last window. 100 % is the ceiling; above is a score above the interval, "
+        "which fits chance.",
     )
 
 
@@ -282,9 +284,8 @@ def mean_and_sd(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _cells(mark: Mark) -> tuple[str, str, str]:
-    share = mark.against_ceiling
-    percent = NONE if math.isnan(share) else f"{100 * share:.0f} %"
-    return number(mark.value), number(mark.ceiling), percent
+    share = NONE if math.isnan(mark.against_ceiling) else share_of(mark)
+    return number(mark.value), number(mark.ceiling), share
 
 
 def _short(text: str) -> str:

@@ -22,6 +22,7 @@ from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.labels import labels_of
+from zfcal.report.options import AS_USUAL, ReportOptions
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
 from zfcal.report.views import TrialView
@@ -41,7 +42,11 @@ class _Place:
 
 
 def write_report(
-    roots: Sequence[Path], out_dir: Path | None = None, *, on_damage: Damage | None = None
+    roots: Sequence[Path],
+    out_dir: Path | None = None,
+    *,
+    how: ReportOptions = AS_USUAL,
+    on_damage: Damage | None = None,
 ) -> list[Path]:
     """Write the report of a trial, or one over several trials.
 
@@ -52,6 +57,8 @@ def write_report(
     out_dir
         Where the report goes; None for ``report/`` in the trial. Several
         trials need one.
+    how
+        What it shows, and in which form.
     on_damage
         Hears of each file that is damaged and left out.
 
@@ -70,9 +77,13 @@ def write_report(
         The disk is full, or the place cannot be written.
     """
     place = _place(roots, out_dir)
-    lineage = _lineage(roots, place)
+    lineage = _lineage(roots, place, how)
     views = [
-        replace(gather(root, on_damage or _ignore, alone=len(roots) == 1), label=label)
+        replace(
+            gather(root, on_damage or _ignore, alone=len(roots) == 1),
+            label=label,
+            published=how.published,
+        )
         for root, label in zip(roots, labels_of(roots), strict=True)
     ]
     _check_one_arena(views)
@@ -96,12 +107,14 @@ def write_report(
     return [page, *written[:-1], numbers]
 
 
-def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | None:
+def report_reason(
+    roots: Sequence[Path], out_dir: Path | None = None, how: ReportOptions = AS_USUAL
+) -> str | None:
     """Return why a report must be made; None if it is up to date.
 
     Parameters
     ----------
-    roots, out_dir
+    roots, out_dir, how
         As for `write_report`.
 
     Returns
@@ -111,7 +124,7 @@ def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | N
     """
     place = _place(roots, out_dir)
     numbers = place.folder / _NUMBERS
-    reason = stale_reason([numbers], _lineage(roots, place))
+    reason = stale_reason([numbers], _lineage(roots, place, how))
     if reason is not None:
         return reason
     for name, digest in read_json(numbers)["files"].items():
@@ -157,14 +170,14 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
     return _Place(folder=out_dir, base=out_dir)
 
 
-def _lineage(roots: Sequence[Path], place: _Place) -> Lineage:
+def _lineage(roots: Sequence[Path], place: _Place, how: ReportOptions) -> Lineage:
     files = [path for root in roots for path in input_files(root)]
     # The order of the trials bears on the order of the tables.
     names: list[JSON] = [*labels_of(roots)]
     return Lineage(
         schema=SCHEMA,
         command="report",
-        options={"trials": names},
+        options={"trials": names, **how.as_lineage()},
         inputs=hash_inputs(place.base, files),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from zfcal.report.figures.arena import arena_picture
 from zfcal.report.figures.followed import followed_picture
@@ -38,13 +38,13 @@ def pictures_of_trials(views: Sequence[TrialView]) -> list[Picture]:
     return [picture for picture in made if picture is not None]
 
 
-def _scores(views: Sequence[TrialView]) -> tuple[Picture | None, Picture | None]:
-    return (
-        scores_picture(views, (MODEL,), name="scores", title="Model against fish", short="Model"),
-        scores_picture(
-            views, (SOCIAL, ROBOT), name="integration", title="Robot among the fish", short="Robot"
-        ),
-    )
+def _scores(views: Sequence[TrialView]) -> Iterator[Picture | None]:
+    for compared, name, title, short in (
+        (MODEL, "scores", "Model against fish", "Model"),
+        (ROBOT, "integration", "Robot against fish", "Robot"),
+        (SOCIAL, "social", "Fish with robot against fish alone", "Fish with robot"),
+    ):
+        yield scores_picture(views, compared, name=name, title=title, short=short)
 
 
 def _statistics(view: TrialView) -> Picture | None:

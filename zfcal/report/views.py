@@ -273,6 +273,8 @@ class TrialView:
         ``paper`` or ``legacy``, as the scores say.
     has_control_trials
         Whether the control group is the fish of other trials.
+    published
+        Whether the published scores, which are of other fish, are to stand beside its own.
     """
 
     root: Path
@@ -291,6 +293,7 @@ class TrialView:
     label: str = ""
     scoring: str = "paper"
     has_control_trials: bool = False
+    published: bool = False
 
     @property
     def name(self) -> str:

@@ -28,9 +28,19 @@ _COLOURS = MappingProxyType(
     {_FISH_CASE: theme.FISH, _MODEL_CASE: theme.MODEL, _ROBOT_CASE: theme.ROBOT}
 )
 _MANY_ZONES = 5
+FEW = 100
+"""A histogram of fewer observations, ten for each bin, is hardly more than chance."""
+
+_ROOM = 0.72
+"""Share of a panel's height that bars take; the words above them have the rest."""
+
+_GAP = 0.6
+"""How far a bin that holds all beyond stands apart, in its own widths."""
+
 _READING = (
-    "Each bar is the share of all observations in its zone; the last bin also holds what lies "
-    "beyond it. In the transition tables a row tells where an animal is one step later."
+    "Each bar is the share of all n observations of the fish in its zone. A last bin that holds "
+    "all that lies beyond, however far, stands apart and has a ≥. In the transition tables a row "
+    "tells where an animal is one step later."
 )
 
 
@@ -148,15 +158,24 @@ def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
         for case, counts in shown.counts.items()
         if not np.isnan(mean := histogram_mean(counts, shown.edges))
     )
+    said = f"{means or 'no observation'}; {_said_of_fish(shown)}"
     draw = partial(_draw_histogram, shown=shown)
     if shown.statistic.draw is not None:
         draw = partial(_draw_as_told, shown=shown)
     return Panel(
         title=title,
-        alt=f"Histogram, {title.lower()}: {means or 'no observation'}.",
+        alt=f"Histogram, {title.lower()}: {said}.",
         draw=draw,
         colour=colour,
     )
+
+
+def _said_of_fish(shown: _Histogram) -> str:
+    """Return of how many observations the fish's bars are, and how many lie beyond."""
+    fish = shown.counts[_FISH_CASE]
+    n = int(fish.sum())
+    beyond = "" if shown.statistic.bounded or not n else f", {fish[-1] / n:.0%} in the last bin"
+    return f"{n} observations of fish{beyond}"
 
 
 def histogram_mean(counts: Ints, edges: Floats) -> float:
@@ -190,11 +209,8 @@ def _draw_as_told(axes: Axes, *, shown: _Histogram) -> None:
 
 
 def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
-    widths = np.diff(shown.edges)
-    is_even = bool(np.allclose(widths, widths[0]))
-    # Bins of unequal width are drawn side by side: to scale the small ones could not be seen.
-    edges = shown.edges if is_even else np.arange(len(shown.edges), dtype=np.float64)
-    centres = _centres(edges)
+    places = _places(shown)
+    width, apart = places.width, places.apart
     top = 0.0
     for case, counts in shown.counts.items():
         share = frequencies(counts)
@@ -202,33 +218,112 @@ def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
             continue
         top = max(top, float(share.max()))
         if case == _FISH_CASE:
-            width = 0.92 * (edges[1] - edges[0])
-            axes.bar(centres, share, width=width, color=_COLOURS[case], alpha=0.45, lw=0)
+            bars = axes.bar(
+                places.centres, share, width=0.92 * width, color=_COLOURS[case], alpha=0.45, lw=0
+            )
+            if apart:
+                bars[-1].set(hatch="////", edgecolor=theme.GROUND)
         else:
             style = "-" if case == _MODEL_CASE else ":"
             marker = theme.MARKER_OF[_COLOURS[case]]
-            axes.plot(centres, share, color=_COLOURS[case], ls=style, marker=marker)
-    limits = (float(edges[0]), float(edges[-1]))
-    axes.set(xlabel=shown.axis, ylabel="share", xlim=limits, ylim=(0, top * 1.22 or 1))
-    if is_even:
-        axes.xaxis.set_major_locator(MaxNLocator(5))
-    else:
-        axes.set_xticks(edges[::2], [f"{edge:g}" for edge in shown.edges[::2]])
+            # What lies beyond is no neighbour of the last bin: no line leads there.
+            for part in (slice(0, -1), slice(-1, None)) if apart else (slice(None),):
+                axes.plot(
+                    places.centres[part], share[part], color=_COLOURS[case], ls=style, marker=marker
+                )
+    axes.set(xlabel=shown.axis, ylabel="share", xlim=places.limits)
+    _leave_room(axes, top, 1.0)
+    axes.set_xticks(places.ticks, places.labels)
+    if apart:
+        axes.axvline(
+            places.limits[1] - width * (1 + _GAP / 2), ymax=_ROOM, color=theme.MUTED, lw=0.8, ls=":"
+        )
     _remark(axes, shown.counts, shown.statistic)
 
 
+def _leave_room(axes: Axes, top: float, most: float) -> None:
+    """Let an axis of shares end above the bars, with no number that a share cannot have."""
+    end = top / _ROOM or most
+    ticks = np.asarray(MaxNLocator(5).tick_values(0.0, end))
+    axes.set_yticks(ticks[(ticks >= 0) & (ticks <= min(end, most))])
+    axes.set_ylim(0.0, end)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Places:
+    """Where bins are drawn along an axis.
+
+    Parameters
+    ----------
+    centres, width, limits
+        Of the bars, and the ends of the axis.
+    ticks, labels
+        Edges of bins, and the bin that stands apart.
+    apart
+        Whether the last bin holds all that lies beyond, and stands apart.
+    """
+
+    centres: Floats
+    width: float
+    limits: tuple[float, float]
+    ticks: Floats
+    labels: list[str]
+    apart: bool
+
+
+def _places(shown: _Histogram) -> _Places:
+    widths = np.diff(shown.edges)
+    is_even = bool(np.allclose(widths, widths[0]))
+    # Bins of unequal width are drawn side by side: to scale the small ones could not be seen.
+    edges = shown.edges if is_even else np.arange(len(shown.edges), dtype=np.float64)
+    width = float(edges[1] - edges[0])
+    centres, end, apart = _centres(edges), float(edges[-1]), not shown.statistic.bounded
+    if apart:
+        centres[-1] += _GAP * width
+        end += _GAP * width
+    ticks, labels = _ticks(shown.edges, edges, is_even=is_even)
+    if apart:
+        kept = ticks < edges[-2] - 0.5 * width
+        ticks = np.append(ticks[kept], centres[-1])
+        labels = [label for label, keep in zip(labels, kept, strict=True) if keep]
+        labels.append(f"≥ {shown.edges[-2]:.3g}")
+    return _Places(
+        centres=centres,
+        width=width,
+        limits=(float(edges[0]), end),
+        ticks=ticks,
+        labels=labels,
+        apart=apart,
+    )
+
+
+def _ticks(edges: Floats, at: Floats, *, is_even: bool) -> tuple[Floats, list[str]]:
+    """Return round numbers on an even axis, and every other edge on another."""
+    if not is_even:
+        return at[::2], [f"{edge:.2g}" for edge in edges[::2]]
+    ticks = np.asarray(MaxNLocator(4).tick_values(float(edges[0]), float(edges[-1])))
+    ticks = ticks[(ticks >= edges[0] - 1e-12) & (ticks <= edges[-1] + 1e-12)]
+    return ticks, [f"{round(float(tick), 9):g}" for tick in ticks]
+
+
 def _remark(axes: Axes, counts: Mapping[str, Ints], statistic: Statistic) -> None:
-    """Write how alike fish and model are, or who was never seen here."""
+    """Write how alike fish and model are and of how many observations, or who was never seen."""
     empty = [case for case, values in counts.items() if not values.sum()]
-    text = ""
+    n, lines = int(counts[_FISH_CASE].sum()), []
     if len(empty) == len(counts):
-        text = "none seen"
-    elif empty:
-        text = "none seen: " + ", ".join(empty)
-    elif {_FISH_CASE, _MODEL_CASE} <= counts.keys():
-        alike = float(statistic.compare(counts[_FISH_CASE], counts[_MODEL_CASE]))
-        text = f"similarity {alike:.2f}"
-    axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
+        lines = ["none seen"]
+    else:
+        if empty:
+            lines.append("none seen: " + ", ".join(empty))
+        if _MODEL_CASE in counts and not {_FISH_CASE, _MODEL_CASE} & set(empty):
+            alike = float(statistic.compare(counts[_FISH_CASE], counts[_MODEL_CASE]))
+            lines.append(f"similarity {alike:.2f}")
+        if n:
+            lines.append(f"few: n = {n}" if n < FEW else f"n = {n}")
+    colour = theme.WARN if 0 < n < FEW else theme.MUTED
+    axes.text(
+        0.98, 0.97, "\n".join(lines), ha="right", va="top", transform=axes.transAxes, color=colour
+    )
 
 
 def _occupation(statistic: Statistic, counts: Mapping[str, Ints], zones: Sequence[str]) -> Panel:
@@ -274,7 +369,8 @@ def _draw_occupation(
     colours = theme.zone_colours(zones)
     for label, zone in zip(axes.get_xticklabels(), zones, strict=True):
         label.set(color=colours[zone], fontweight="bold")
-    axes.set(ylabel="% of the time", ylim=(0, top * 1.22 or 1))
+    axes.set(ylabel="% of the time")
+    _leave_room(axes, top, 100.0)
     axes.grid(visible=False, axis="x")
     _remark(axes, counts, statistic)
 

@@ -31,8 +31,11 @@ INK = "#1b1f24"
 MUTED = "#59636e"
 _GRID = "#dde2e8"
 GROUND = "#ffffff"
+WARN = "#8a4b00"
+"""Of what is too little to be read."""
+
 BAND = "#8b95a1"
-"""The ceiling, its interval and the spread over trials."""
+"""The ceiling and its range, and nothing else."""
 
 FISH = "#16497a"
 MODEL = "#d55e00"
@@ -48,6 +51,7 @@ THEME: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         MUTED: ("muted", MUTED, "#a3adb8"),
         _GRID: ("grid", _GRID, "#343b43"),
         GROUND: ("ground", GROUND, "#16191d"),
+        WARN: ("warn", WARN, "#ffc069"),
         BAND: ("band", BAND, "#7d8793"),
         FISH: ("fish", FISH, "#a9cdec"),
         MODEL: ("model", MODEL, "#e8701a"),
