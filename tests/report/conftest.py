@@ -331,19 +331,19 @@ def quick_model(monkeypatch, stub_model):
 def quick_pictures(monkeypatch):
     """Draw nothing: for tests of what is written when, and of words."""
     monkeypatch.setattr(
-        "zfcal.report.page.write_picture",
-        lambda picture, path: path.write_text(picture.title, encoding="utf-8"),
+        "zfcal.report.page.write_printed",
+        lambda picture, kind, path, _: path.write_text(f"{picture.title}, {kind}", "utf-8"),
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
 
 
 @pytest.fixture(scope="session")
 def covered_texts():
-    """Return what finds texts of a picture that cover each other or leave it."""
+    """Return what finds texts of a picture, at a width on paper, that cover each other."""
 
-    def find(picture):
-        with theme.style():
-            figure = compose(picture)
+    def find(picture, width_mm=None):
+        with theme.style(on_paper=width_mm is not None):
+            figure = compose(picture, width_in=None if width_mm is None else width_mm / 25.4)
             figure.canvas.draw()
             renderer = figure.canvas.get_renderer()
             undrawn = {label for axes in figure.findobj(Axes) for label in _undrawn(axes)}

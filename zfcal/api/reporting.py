@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
-from zfcal.api.values import PathLike, flag, place, taken
+from zfcal.api.values import Names, PathLike, flag, formats, place, taken, width_mm
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.options import AS_USUAL, ReportOptions
+from zfcal.report.options import AS_USUAL, Printing, ReportOptions
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
@@ -21,7 +21,8 @@ _HINT = "Make it again, or copy it again from where it was made."
 
 def how_of(options: Mapping[str, Any]) -> ReportOptions:
     """Return how a report is made, from options with the names of `report`'s arguments."""
-    return ReportOptions(published=options["published"])
+    printing = Printing(formats=options["format"] or ("png",), width_mm=options["width"])
+    return ReportOptions(published=options["published"], printing=printing)
 
 
 def write_page(
@@ -94,6 +95,8 @@ def report(
     trials: TrialPath | Iterable[TrialPath],
     *,
     out: PathLike | None = None,
+    format: Names | None = None,
+    width: float | str | None = None,
     published: bool = False,
     dry_run: bool = False,
     force: bool = False,
@@ -101,7 +104,7 @@ def report(
 ) -> Path:
     """Write a page with figures, of one trial or of several in one report: ``zfcal report``.
 
-    The page holds its figures; they lie beside it as PNG too. Over several trials it shows mean
+    The page holds its figures; they lie beside it as files too. Over several trials it shows mean
     and standard deviation per window. What is up to date stays.
 
     Parameters
@@ -110,6 +113,11 @@ def report(
         One trial or several: directories, or their tables. One that is named twice counts once.
     out
         Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``.
+    format
+        Of the figures: ``png``, ``svg`` and ``pdf``, one or several; by default ``png``.
+    width
+        Of the figures on paper: ``single`` (85 mm), ``double`` (174 mm) or millimetres. None for
+        the screen.
     published
         Draw the published scores, which are of other fish, beside these.
     dry_run
@@ -142,5 +150,6 @@ def report(
     >>> print(zfcal.report("trial"))
     trial/report/index.html
     """
-    asked, hears = taken(locals(), {"out": place}, needed={"published": flag}), heard_by(tell)
+    how = {"out": place, "format": formats, "width": width_mm}
+    asked, hears = taken(locals(), how, needed={"published": flag}), heard_by(tell)
     return write_page(roots_of(trials), asked["out"], hears, task=task_of(asked), how=how_of(asked))

@@ -15,8 +15,7 @@ from zfcal.behaviour.features.registry import named
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.contents import Statement
-from zfcal.report.figures.statistics import FEW
-from zfcal.report.views import TrialView
+from zfcal.report.views import FEW, TrialView
 
 _MOSTLY = 0.5
 """From this share in one bin on, a histogram hardly tells anything apart."""

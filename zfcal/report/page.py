@@ -7,8 +7,9 @@ give the same bytes: nothing of the day or the machine is in it.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from zfcal.artifacts.atomic import storage_error, write_text_whole, write_whole
@@ -17,12 +18,13 @@ from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.figures.panels import Picture, write_picture
+from zfcal.report.figures.panels import Picture
+from zfcal.report.figures.printing import write_printed
 from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.labels import labels_of
-from zfcal.report.options import AS_USUAL, ReportOptions
+from zfcal.report.options import AS_USUAL, FORMATS, Printing, ReportOptions
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
 from zfcal.report.views import TrialView
@@ -31,6 +33,7 @@ _FOLDER = "report"
 PAGE = "index.html"
 _NUMBERS = "integration.json"
 _TABLE = "intervals.csv"
+_ENDINGS = (".csv", *(f".{kind}" for kind in FORMATS))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,14 +93,15 @@ def write_report(
     pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []
     for picture in pictures:
-        path = place.folder / f"{picture.name}.png"
-        write_whole(path, _drawer(picture))
-        written.append(path)
+        for kind in how.printing.formats:
+            path = place.folder / f"{picture.name}.{kind}"
+            write_whole(path, partial(_draw, picture, kind, how.printing))
+            written.append(path)
     if len(views) > 1:
         write_text_whole(place.folder / _TABLE, intervals_csv(views))
         written.append(place.folder / _TABLE)
     page = place.folder / PAGE
-    write_text_whole(page, render_page(views, pictures, lineage))
+    write_text_whole(page, render_page(views, pictures, lineage, how.printing.formats))
     written.append(page)
     numbers = place.folder / _NUMBERS
     _remove_outdated(place.folder, {path.name for path in written})
@@ -192,8 +196,8 @@ def _check_one_arena(views: Sequence[TrialView]) -> None:
             )
 
 
-def _drawer(picture: Picture) -> Callable[[Path], None]:
-    return lambda part: write_picture(picture, part)
+def _draw(picture: Picture, kind: str, printing: Printing, path: Path) -> None:
+    write_printed(picture, kind, path, printing)
 
 
 def _remove_outdated(folder: Path, made: set[str]) -> None:
@@ -203,7 +207,7 @@ def _remove_outdated(folder: Path, made: set[str]) -> None:
     except (DamagedError, InputError):
         return
     for name in set(before) - made:
-        if Path(name).name == name and name.endswith((".png", ".csv")):
+        if Path(name).name == name and name.endswith(_ENDINGS):
             try:
                 (folder / name).unlink(missing_ok=True)
             except OSError as error:

@@ -31,6 +31,9 @@ FEATURE_NAMES: Mapping[str, str] = MappingProxyType(
 )
 """The features, by the paper's letters, in its order."""
 
+FEW = 100
+"""A histogram of fewer observations, ten for each bin, is hardly more than chance."""
+
 PUBLISHED_S = ((180, 0.610), (300, 0.827), (360, 0.850))
 """Second and S of the published reference (mean of 10 trials); the last holds from then on."""
 
