@@ -24,7 +24,7 @@ from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
 from zfcal.report.followed import followed_from
 from zfcal.report.page import write_report
-from zfcal.report.seen import see
+from zfcal.report.seen import see, visits_of
 from zfcal.report.views import (
     FEATURE_NAMES,
     MODEL,
@@ -36,7 +36,7 @@ from zfcal.report.views import (
     Round,
     TrialView,
 )
-from zfcal.tracks import Samples, Tracks
+from zfcal.tracks import FISH, Samples, Tracks
 from zfcal.trial import Trial
 
 DT_S = 0.2
@@ -169,6 +169,7 @@ def make_view(two_rooms, course, rounds_of, wander):
             statistics={(540, "control"): fish, (540, "robot"): robot},
             rounds=rounds_of(two_rooms, n_windows),
             model_statistics=fish + robot,
+            model_visits=seen.visits[FISH],
             seen=seen,
             integration=Integration(
                 start_s=300,
@@ -220,11 +221,12 @@ def small_trial(tmp_path, write_small_trial):
 
 
 @pytest.fixture(scope="session")
-def drawn_trial(tmp_path_factory, write_small_trial, stub_model):
+def drawn_trial(tmp_path_factory, write_small_trial, stub_model, stub_visits):
     """A trial with its report, drawn once for all tests: look at it, or copy it."""
     root = write_small_trial(tmp_path_factory.mktemp("drawn") / "trial")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("zfcal.report.simulated.long_run", stub_model)
+        patch.setattr("zfcal.report.simulated.long_visits", stub_visits)
         write_report([root])
     return root
 
@@ -321,10 +323,18 @@ def stub_model(two_rooms, wander):
     return lambda *_, **__: statistics
 
 
+@pytest.fixture(scope="session")
+def stub_visits(two_rooms, wander):
+    """Return where agents wander for any model."""
+    visits = visits_of(locate(wander(two_rooms, seed=9, robot=False), two_rooms))
+    return lambda *_, **__: visits
+
+
 @pytest.fixture
-def quick_model(monkeypatch, stub_model):
+def quick_model(monkeypatch, stub_model, stub_visits):
     """Put wandering agents in the place of the long simulation."""
     monkeypatch.setattr("zfcal.report.simulated.long_run", stub_model)
+    monkeypatch.setattr("zfcal.report.simulated.long_visits", stub_visits)
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ PICTURES = {
     "arena",
     "integration",
     "parameters",
+    "presence",
     "scores",
     "social",
     "statistics",

@@ -29,7 +29,7 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.parameters import Parameters
 from zfcal.report.followed import Followed, followed_from
 from zfcal.report.integration import measure_integration
-from zfcal.report.seen import see
+from zfcal.report.seen import Seen, Visits, see
 from zfcal.report.views import (
     Course,
     CourseKey,
@@ -40,6 +40,7 @@ from zfcal.report.views import (
     Source,
     TrialView,
 )
+from zfcal.tracks import FISH
 from zfcal.trial import Trial
 
 Damage = Callable[[DamagedError], None]
@@ -159,6 +160,7 @@ def gather(
         statistics=counted,
         rounds=rounds,
         model_statistics=_simulated(calibrated, trial, arena, counted) if alone else None,
+        model_visits=_model_visits(calibrated, trial, arena, seen) if alone else None,
         seen=seen,
         integration=measure_integration(
             courses, seen, has_robot=trial.n_robots > 0, start_s=start_s
@@ -187,6 +189,16 @@ def _simulated(
     fish = counted.get((calibrated.second, "control"))
     names = () if fish is None else [name for name in fish.further if name in statistics()]
     return long_run(calibrated, trial, arena, further=names)
+
+
+def _model_visits(
+    calibrated: Round | None, trial: Trial, arena: Arena, seen: Seen | None
+) -> Visits | None:
+    if calibrated is None or seen is None or FISH not in seen.visits:
+        return None
+    from zfcal.report.simulated import long_visits
+
+    return long_visits(calibrated, trial, arena)
 
 
 def _courses(reader: _Reader) -> tuple[dict[CourseKey, Course], dict[str, Any]]:

@@ -8,11 +8,13 @@ from zfcal.report.figures.arena import arena_picture
 from zfcal.report.figures.followed import followed_picture
 from zfcal.report.figures.panels import Picture
 from zfcal.report.figures.parameters import parameters_picture
+from zfcal.report.figures.presence import presence_picture
 from zfcal.report.figures.rules import rules_picture
 from zfcal.report.figures.scores import scores_picture
 from zfcal.report.figures.statistics import statistics_picture
 from zfcal.report.figures.tracks import tracks_picture
 from zfcal.report.views import MODEL, ROBOT, SOCIAL, TrialView
+from zfcal.tracks import FISH
 from zfcal.units import WINDOW_S
 
 _ARENA_IN = 4.2
@@ -25,6 +27,7 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
         followed_picture(view.following),
         rules_picture(view.rule_scores),
         _statistics(view),
+        _presence(view),
         parameters_picture(view.rounds),
         None if view.seen is None else tracks_picture(view.seen),
         arena_picture(view.arena, width_in=_ARENA_IN),
@@ -45,6 +48,13 @@ def _scores(views: Sequence[TrialView]) -> Iterator[Picture | None]:
         (SOCIAL, "social", "Fish with robot against fish alone", "Fish with robot"),
     ):
         yield scores_picture(views, compared, name=name, title=title, short=short)
+
+
+def _presence(view: TrialView) -> Picture | None:
+    if view.seen is None:
+        return None
+    fish = view.seen.visits.get(FISH)
+    return presence_picture(fish, view.model_visits, view.arena, end_s=view.seen.end_s)
 
 
 def _statistics(view: TrialView) -> Picture | None:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from zfcal.arena import Arena
+from zfcal.behaviour.located import locate
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.group import Purpose, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.recorded import Runs, count_recorded
 from zfcal.calibrate.task import Settings
-from zfcal.model.simulate import pack, simulate_counts
+from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
+from zfcal.report.seen import Visits, visits_of
 from zfcal.report.views import Round
+from zfcal.tracks import FISH, Samples
 from zfcal.trial import Trial
+
+_MAP_RUNS = 4
+_MAP_RUN_S = 1800.0
 
 
 def long_run(
@@ -69,3 +77,48 @@ def long_run(
         recorded = count_recorded([model], arena, further, runs)
         found = {name: values[0].sum(axis=0) for name, values in recorded.items()}
     return replace(as_statistics(pool_runs(counts), 0, arena.zone_names), further=found)
+
+
+def long_visits(champion: Round, trial: Trial, arena: Arena) -> Visits:
+    """Simulate a round's model and return where its fish are.
+
+    Parameters
+    ----------
+    champion
+        The round; the seeds are the first of those of its confirmation.
+    trial
+        Gives the agents; all are driven by the model, and robots are not counted.
+    arena
+        Where they swim.
+
+    Returns
+    -------
+    Visits
+        Of four runs of half an hour.
+    """
+    source = SeedSource(trial_seed=trial.seed, window_end_s=champion.second)
+    seeds = source.seeds(Purpose.CONFIRMATION, _MAP_RUNS)
+    parts = [_visits_of_run(champion, trial, arena, int(seed)) for seed in seeds]
+    return functools.reduce(operator.add, parts)
+
+
+def _visits_of_run(champion: Round, trial: Trial, arena: Arena, seed: int) -> Visits:
+    n_steps = max(1, round(_MAP_RUN_S / trial.dt_s))
+    xy_m, _ = simulate_tracks(
+        champion.parameters,
+        arena,
+        n_agents=trial.n_agents,
+        n_steps=n_steps,
+        seed=seed,
+        n_robots=trial.n_robots,
+        clock_s=(float(champion.second), 1.0),
+    )
+    samples = Samples(
+        dt_s=trial.dt_s,
+        k=np.arange(n_steps),
+        agent=np.arange(trial.n_fish, dtype=np.int32),
+        kind=np.full(trial.n_fish, FISH, dtype=np.int8),
+        xy_m=xy_m[:, : trial.n_fish],
+        confidence=np.ones((n_steps, trial.n_fish), dtype=np.float32),
+    )
+    return visits_of(locate(samples, arena))

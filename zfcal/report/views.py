@@ -19,7 +19,7 @@ from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
 from zfcal.report.followed import Followed
-from zfcal.report.seen import Seen
+from zfcal.report.seen import Seen, Visits
 from zfcal.trial import Trial
 
 MODEL = "model-vs-control"
@@ -257,6 +257,8 @@ class TrialView:
     model_statistics
         What the last calibrated model does in a long simulation; None without
         one, and where it is not shown.
+    model_visits
+        Where that model's fish are in a long simulation; None as for its statistics.
     seen
         All agents; None without tracks.
     integration
@@ -290,6 +292,7 @@ class TrialView:
     seen: Seen | None
     integration: Integration
     sources: Sequence[Source]
+    model_visits: Visits | None = None
     rule_scores: Sequence[RuleScore] = ()
     following: Followed | None = None
     left_out: Sequence[str] = ()
