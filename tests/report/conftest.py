@@ -135,6 +135,7 @@ def rounds_of():
                 parameters=model,
                 intervals=dict.fromkeys(names, (0.1, 0.9)),
                 unidentified=frozenset(names[::3]),
+                hypervolume=(0.2, 0.3, 0.4 + 0.01 * number),
             )
             for number in range(n_rounds)
         ]
@@ -310,7 +311,11 @@ def _write_round(trial, arena, end_s):
     row = {"value": 0.5, "low": 0.1, "high": 0.9, "identified": True}
     parameters = {name: dict(row) for name in gene_names(arena.zone_names)}
     parameters["walls.alpha"]["identified"] = False
-    result = {"S": 0.7, "intervals": {"parameters": parameters}}
+    result = {
+        "S": 0.7,
+        "hypervolume": [0.2, 0.4],
+        "intervals": {"parameters": parameters},
+    }
     path = trial.path("models", end_s, ".toml")
     write_model(path, model, _lineage("model", "calibrate"), result)
     _write_scores(trial, ["model-vs-control"], end_s, ending="-model.parquet")

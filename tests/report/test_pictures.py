@@ -18,6 +18,7 @@ def test_a_whole_trial_is_told_from_the_scores_to_the_arena(make_view):
         "statistics",
         "presence",
         "parameters",
+        "search",
         "tracks",
         "arena",
     ]

@@ -24,6 +24,7 @@ PICTURES = {
     "parameters",
     "presence",
     "scores",
+    "search",
     "social",
     "statistics",
     "tracks",

@@ -5,6 +5,7 @@ A file that is damaged is left out and named; the rest is still shown.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -274,7 +275,16 @@ def round_of(second: int, model: Parameters, result: Mapping[str, Any]) -> Round
         published=_published(result.get("published")),
         score=score,
         score_of=names,
+        hypervolume=_numbers(result.get("hypervolume")),
     )
+
+
+def _numbers(said: Any) -> tuple[float, ...]:
+    """Return a list of finite numbers as it is; nothing where it is another thing."""
+    if not isinstance(said, list) or not all(isinstance(each, int | float) for each in said):
+        return ()
+    found = tuple(map(float, said))
+    return found if all(map(math.isfinite, found)) else ()
 
 
 def _published(said: Any) -> Published | None:

@@ -11,6 +11,7 @@ from zfcal.report.figures.parameters import parameters_picture
 from zfcal.report.figures.presence import presence_picture
 from zfcal.report.figures.rules import rules_picture
 from zfcal.report.figures.scores import scores_picture
+from zfcal.report.figures.search import search_picture
 from zfcal.report.figures.statistics import statistics_picture
 from zfcal.report.figures.tracks import tracks_picture
 from zfcal.report.views import MODEL, ROBOT, SOCIAL, TrialView
@@ -29,6 +30,7 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
         _statistics(view),
         _presence(view),
         parameters_picture(view.rounds),
+        search_picture(view.rounds),
         None if view.seen is None else tracks_picture(view.seen),
         arena_picture(view.arena, width_in=_ARENA_IN),
     )

@@ -186,6 +186,8 @@ class Round:
         The score of the statistics that it was calibrated on, with its ceiling; None for S.
     score_of
         Names of these statistics.
+    hypervolume
+        Of the population, generation by generation; empty where the file does not say.
     """
 
     second: int
@@ -196,6 +198,7 @@ class Round:
     published: Published | None = None
     score: Mark | None = None
     score_of: tuple[str, ...] = ()
+    hypervolume: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
