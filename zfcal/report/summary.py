@@ -27,6 +27,7 @@ from zfcal.report.standing import (
     sentence_of,
     share_of,
 )
+from zfcal.report.tracking_words import tracking_statement
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _NEAR = 0.97
@@ -55,6 +56,7 @@ def statements(view: TrialView) -> list[Statement]:
         distance_statement(view),
         _robot(view),
         followed_statement(view),
+        tracking_statement(view),
         _halves(view),
         _parameters(view),
     )
