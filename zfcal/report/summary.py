@@ -41,7 +41,7 @@ _NOTHING = 0.005
 """A score that is printed as 0.00 or below it."""
 
 _FEW = 4
-_LIKER = "above the range of a fish in its place, by chance"
+_LIKER = "above the range of a fish in its place"
 
 OVERFITTING = "the model fits what happened there by chance as well (overfitting)"
 """What it means to score more than a perfect model does."""

@@ -65,7 +65,7 @@ def _robots(views: Sequence[TrialView]) -> Statement | None:
         figure=_figure(
             known,
             "of what a fish in its place scores",
-            "above the range of a fish in its place, by chance",
+            "above the range of a fish in its place",
         ),
     )
 

@@ -136,7 +136,8 @@ def paint_walls(axes: Axes, arena: Arena, *, water: str = theme.GROUND) -> None:
     axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), aspect="equal")
     axes.set(xlabel="x (m)", ylabel="y (m)")
     for axis, length_m in ((axes.xaxis, x1 - x0), (axes.yaxis, y1 - y0)):
-        axis.set_major_locator(MaxNLocator(max(1, round(5 * length_m / arena.extent_m))))
+        steps = min(5, theme.letters_across(axes) // 7) * length_m / arena.extent_m
+        axis.set_major_locator(MaxNLocator(max(1, round(steps))))
 
 
 def paint_zones(axes: Axes, arena: Arena, *, alpha: float) -> None:

@@ -278,7 +278,7 @@ def _key(lines: Sequence[Line], shown: _Shown) -> tuple[Entry, ...]:
     if any(not np.isnan(line.low).all() for line in lines):
         entries.append(Entry(label=_RANGES[shown.compared], colour=theme.BAND, mark="band"))
     if any(_is_above(line).any() for line in lines):
-        label = "above that range: fits chance"
+        label = "above that range" + (": fits chance" if shown.compared == MODEL else "")
         entries.append(Entry(label=label, colour=colour, mark="hollow", marker=marker))
     if shown.published:
         entries.append(

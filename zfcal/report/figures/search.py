@@ -13,8 +13,6 @@ from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Entry, Panel, Picture
 from zfcal.report.views import Round
 
-_SIZE_IN = (5.6, 2.8)
-
 
 def search_picture(rounds: Sequence[Round]) -> Picture | None:
     """Return the hypervolume at the beginning and the end of each round's search.
@@ -48,7 +46,6 @@ def search_picture(rounds: Sequence[Round]) -> Picture | None:
                 alt=f"Hypervolume in {len(known)} rounds: from {first[-1]:.2f} to {last[-1]:.2f} "
                 f"in the last one, and {last.mean():.2f} on average at the end of a search.",
                 draw=draw,
-                size_in=_SIZE_IN,
             ),
         ),
         key=(
