@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.parameters import Parameters
+from zfcal.report.driven import closed_drives, driven_of
 from zfcal.report.followed import Followed, followed_from
 from zfcal.report.integration import measure_integration
 from zfcal.report.seen import Seen, Visits, see
@@ -109,7 +111,7 @@ def input_files(root: Path) -> list[Path]:
     for folder, ending in _ENDINGS:
         # What is no file is no input: it is named where it is read.
         files += [path for _, path in reader.files(folder, ending) if _can_be_opened(path)]
-    return files
+    return [*files, *closed_drives(root).values()]
 
 
 def _can_be_opened(path: Path) -> bool:
@@ -169,6 +171,7 @@ def gather(
         following=_followed(reader, start_s),
         sources=list(_sources(reader)),
         rule_scores=_rule_scores(reader),
+        driven=tuple(filter(None, starmap(driven_of, closed_drives(root).items()))),
         left_out=list(reader.damaged.values()),
         scoring=str(scored.get("scoring", "paper")),
         has_control_trials="control" in scored,
@@ -365,18 +368,18 @@ def _pooled_from(reader: _Reader) -> int:
 
 def _sources(reader: _Reader) -> Iterator[Source]:
     root = reader.trial.root
-    for folder, ending in _ENDINGS:
-        for _, path in reader.files(folder, ending):
-            lineage = reader.attempt(path, read_lineage)
-            if isinstance(lineage, Lineage):
-                (digest,) = hash_inputs(root, [path]).values()
-                # Of a day's recording the inputs of all scores would be a million.
-                yield Source(
-                    path=relative_to(root, path),
-                    sha256=digest,
-                    lineage=replace(lineage, inputs={}),
-                    n_inputs=len(lineage.inputs),
-                )
+    files = [path for folder, ending in _ENDINGS for _, path in reader.files(folder, ending)]
+    for path in [*files, *closed_drives(root).values()]:
+        lineage = reader.attempt(path, read_lineage)
+        if isinstance(lineage, Lineage):
+            (digest,) = hash_inputs(root, [path]).values()
+            # Of a day's recording the inputs of all scores would be a million.
+            yield Source(
+                path=relative_to(root, path),
+                sha256=digest,
+                lineage=replace(lineage, inputs={}),
+                n_inputs=len(lineage.inputs),
+            )
 
 
 def _ignore(_: DamagedError) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.artifacts.lineage import to_json
+from zfcal.report.driven import driven_rows
 from zfcal.report.figures.parameters import outside_of, values_of
 from zfcal.report.standing import share_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
@@ -66,6 +67,7 @@ def tables(view: TrialView) -> list[Table]:
         _published(view),
         _rules(view),
         _parameters(view),
+        _driven(view),
         lineage_table([view]),
     )
     return [table for table in made if table.rows]
@@ -249,6 +251,22 @@ def _published(view: TrialView) -> Table:
         wide=(3,),
         folded="1 model" if len(rows) == 1 else f"{len(rows)} models",
         note="Which model the robot was given at the end of each window, and by which rule.",
+    )
+
+
+def _driven(view: TrialView) -> Table:
+    heads = ["from (s)"]
+    for latency in ("frame to state", "tick to byte"):
+        heads += [f"{latency}, median (ms)", "95 %", "most"]
+    return Table(
+        name="drive",
+        title="How quick the robot was driven",
+        heads=[*heads, "steps missed", "ticks left out"],
+        rows=list(driven_rows(view.driven)),
+        numbers=range(9),
+        note="From the writing of a frame to the driver's own state, and from the moment a tick "
+        "was due to the return of the write of its last byte; not to what the radio sent. Aims: "
+        "20 ms (95 %) each, and no step missed.",
     )
 
 

@@ -18,6 +18,7 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
+from zfcal.report.driven import Driven
 from zfcal.report.followed import Followed
 from zfcal.report.seen import Seen, Visits
 from zfcal.trial import Trial
@@ -271,6 +272,8 @@ class TrialView:
     rule_scores
         Forward scores of the rules by which models are published, in the order of their windows;
         empty where rules were not judged.
+    driven
+        How quick the robot was driven, drive by drive; those that are closed.
     following
         Whether fish follow the robot; None where it was not measured.
     left_out
@@ -297,6 +300,7 @@ class TrialView:
     sources: Sequence[Source]
     model_visits: Visits | None = None
     rule_scores: Sequence[RuleScore] = ()
+    driven: tuple[Driven, ...] = ()
     following: Followed | None = None
     left_out: Sequence[str] = ()
     label: str = ""
