@@ -31,6 +31,11 @@ _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
     help="Of the figures on paper: single (85 mm), double (174 mm), or such as 120mm.",
 )
 @click.option(
+    "--film",
+    type=click.Choice(["mp4", "gif"]),
+    help="A film of the last window beside the calibrated model; of one trial.",
+)
+@click.option(
     "--published",
     is_flag=True,
     help="Draw the published scores, which are of other fish, beside these.",

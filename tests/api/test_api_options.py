@@ -439,6 +439,7 @@ WRONG = [
     ("simulate", {**MODEL, "video_file": 5}, "--video-file"),
     ("report", {"out": 3}, "--out"),
     *(("report", {"format": value}, "--format") for value in ("gif", 5, ["png", "jpg"])),
+    *(("report", {"film": value}, "--film") for value in ("avi", 5, ["mp4"])),
     *(("report", {"width": value}, "--width") for value in ("3cm", "59mm", 401, "wide", [85])),
     ("compare", {"against": "alone", "out": 3}, "--out"),
     *((name, {**FOR_NEEDED.get(name, {}), "tell": 5}, "tell: 5") for name in FUNCTIONS),

@@ -62,3 +62,17 @@ def test_the_map_of_a_model_is_of_its_fish_alone(two_rooms, rounds_of, tmp_path,
     assert found.cells.sum() == found.zones[1:].sum()
     assert np.array_equal(found.cells, again.cells)
     assert not np.array_equal(found.cells, other.cells)
+
+
+def test_a_window_of_the_model_has_all_agents(two_rooms, rounds_of, tmp_path):
+    """Two minutes of four fish and the robot."""
+    champion = rounds_of(two_rooms, 1)[-1]
+    trial = Trial(
+        root=tmp_path, arena="two-rooms", n_fish=4, n_robots=1, fps=15.0, dt_s=0.2, seed=3
+    )
+
+    found = module.window_run(champion, trial, two_rooms)
+
+    assert len(found) == 600 * 5
+    assert (found.kind == 1).sum() == 600
+    assert (found.zone > 0).all()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
-from zfcal.api.values import Names, PathLike, flag, formats, place, taken, width_mm
+from zfcal.api.values import Names, PathLike, flag, formats, one_of, place, taken, width_mm
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.options import AS_USUAL, Printing, ReportOptions
+from zfcal.report.options import AS_USUAL, FILMS, Printing, ReportOptions
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
@@ -22,7 +22,7 @@ _HINT = "Make it again, or copy it again from where it was made."
 def how_of(options: Mapping[str, Any]) -> ReportOptions:
     """Return how a report is made, from options with the names of `report`'s arguments."""
     printing = Printing(formats=options["format"] or ("png",), width_mm=options["width"])
-    return ReportOptions(published=options["published"], printing=printing)
+    return ReportOptions(published=options["published"], printing=printing, film=options["film"])
 
 
 def write_page(
@@ -97,6 +97,7 @@ def report(
     out: PathLike | None = None,
     format: Names | None = None,
     width: float | str | None = None,
+    film: Literal["mp4", "gif"] | None = None,
     published: bool = False,
     dry_run: bool = False,
     force: bool = False,
@@ -118,6 +119,9 @@ def report(
     width
         Of the figures on paper: ``single`` (85 mm), ``double`` (174 mm) or millimetres. None for
         the screen.
+    film
+        ``mp4`` or ``gif``: a film of the last window beside the model that was calibrated last,
+        ``film.mp4`` or ``film.gif`` in the report; of one trial.
     published
         Draw the published scores, which are of other fish, beside these.
     dry_run
@@ -150,6 +154,6 @@ def report(
     >>> print(zfcal.report("trial"))
     trial/report/index.html
     """
-    how = {"out": place, "format": formats, "width": width_mm}
+    how = {"out": place, "format": formats, "width": width_mm, "film": one_of(*FILMS)}
     asked, hears = taken(locals(), how, needed={"published": flag}), heard_by(tell)
     return write_page(roots_of(trials), asked["out"], hears, task=task_of(asked), how=how_of(asked))

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from zfcal.artifacts.lineage import JSON
 
 FORMATS = ("png", "svg", "pdf")
+FILMS = ("mp4", "gif")
 WIDTHS_MM: Mapping[str, float] = MappingProxyType({"single": 85.0, "double": 174.0})
 """Columns of a journal by their names, in millimetres."""
 
@@ -44,10 +45,13 @@ class ReportOptions:
         Whether the published scores, which are of other fish, stand beside the trials' own.
     printing
         In which form the figures are files.
+    film
+        Of `FILMS`; None for none.
     """
 
     published: bool = False
     printing: Printing = FOR_THE_SCREEN
+    film: str | None = None
 
     def as_lineage(self) -> dict[str, JSON]:
         """Return what differs from the usual, as a report's lineage holds it."""
@@ -58,6 +62,8 @@ class ReportOptions:
             said["format"] = list(self.printing.formats)
         if self.printing.width_mm is not None:
             said["width_mm"] = self.printing.width_mm
+        if self.film is not None:
+            said["film"] = self.film
         return said
 
 

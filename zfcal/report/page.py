@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from zfcal.artifacts.atomic import storage_error, write_text_whole, write_whole
+from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole, write_whole
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import sha256_of
@@ -24,16 +24,17 @@ from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.labels import labels_of
-from zfcal.report.options import AS_USUAL, FORMATS, Printing, ReportOptions
+from zfcal.report.options import AS_USUAL, FILMS, FORMATS, Printing, ReportOptions
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
-from zfcal.report.views import TrialView
+from zfcal.report.seen import Seen
+from zfcal.report.views import Round, TrialView
 
 _FOLDER = "report"
 PAGE = "index.html"
 _NUMBERS = "integration.json"
 _TABLE = "intervals.csv"
-_ENDINGS = (".csv", *(f".{kind}" for kind in FORMATS))
+_ENDINGS = (".csv", *(f".{kind}" for kind in (*FORMATS, *FILMS)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +91,7 @@ def write_report(
         for root, label in zip(roots, labels_of(roots), strict=True)
     ]
     _check_one_arena(views)
+    to_film = None if how.film is None else _to_film(views)
     pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []
     for picture in pictures:
@@ -97,6 +99,10 @@ def write_report(
             path = place.folder / f"{picture.name}.{kind}"
             write_whole(path, partial(_draw, picture, kind, how.printing))
             written.append(path)
+    if to_film is not None:
+        film = place.folder / f"film.{how.film}"
+        write_bytes_whole(film, _film(*to_film, str(how.film)))
+        written.append(film)
     if len(views) > 1:
         write_text_whole(place.folder / _TABLE, intervals_csv(views))
         written.append(place.folder / _TABLE)
@@ -194,6 +200,35 @@ def _check_one_arena(views: Sequence[TrialView]) -> None:
                 f"has {', '.join(views[0].arena.zone_names)}.",
                 hint="Only trials in the same arena make one figure; report them apart.",
             )
+
+
+def _film(view: TrialView, calibrated: Round, seen: Seen, kind: str) -> bytes:
+    # OpenCV, and the compiler, are for films alone.
+    from zfcal.report.figures import theme
+    from zfcal.report.film import Side, film_of
+    from zfcal.report.simulated import window_run
+
+    model = window_run(calibrated, view.trial, view.arena)
+    measured = Side(title="Measured, last window", colour=theme.FISH, located=seen.last)
+    return film_of(
+        (measured, Side(title="Model, simulated", colour=theme.MODEL, located=model)), kind
+    )
+
+
+def _to_film(views: Sequence[TrialView]) -> tuple[TrialView, Round, Seen]:
+    """Return the trial that is to be filmed, its model and its tracks."""
+    view, calibrated = views[0], views[0].calibrated
+    if len(views) > 1:
+        raise InputError(
+            f"A film is of one trial, got {len(views)}.",
+            hint="Make a report of each, with its film.",
+        )
+    if calibrated is None or view.seen is None or not view.seen.n_points:
+        raise InputError(
+            f"{view.root}: a film shows the tracks beside the calibrated model, and there is none.",
+            hint=f"Make them first: zfcal calibrate {view.name}",
+        )
+    return view, calibrated, view.seen
 
 
 def _draw(picture: Picture, kind: str, printing: Printing, path: Path) -> None:

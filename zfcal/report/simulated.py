@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.behaviour.located import locate
+from zfcal.behaviour.located import Located, locate
 from zfcal.behaviour.statistics import Statistics
 from zfcal.calibrate.group import Purpose, SeedSource, as_statistics, pool_runs
 from zfcal.calibrate.recorded import Runs, count_recorded
@@ -18,8 +18,9 @@ from zfcal.calibrate.task import Settings
 from zfcal.model.simulate import pack, simulate_counts, simulate_tracks
 from zfcal.report.seen import Visits, visits_of
 from zfcal.report.views import Round
-from zfcal.tracks import FISH, Samples
+from zfcal.tracks import FISH, ROBOT, Samples
 from zfcal.trial import Trial
+from zfcal.units import WINDOW_S
 
 _MAP_RUNS = 4
 _MAP_RUN_S = 1800.0
@@ -98,27 +99,40 @@ def long_visits(champion: Round, trial: Trial, arena: Arena) -> Visits:
     """
     source = SeedSource(trial_seed=trial.seed, window_end_s=champion.second)
     seeds = source.seeds(Purpose.CONFIRMATION, _MAP_RUNS)
-    parts = [_visits_of_run(champion, trial, arena, int(seed)) for seed in seeds]
+    runs = (_run(champion, trial, arena, int(seed), _MAP_RUN_S) for seed in seeds)
+    parts = [visits_of(locate(samples, arena).of_kind(FISH)) for samples in runs]
     return functools.reduce(operator.add, parts)
 
 
-def _visits_of_run(champion: Round, trial: Trial, arena: Arena, seed: int) -> Visits:
-    n_steps = max(1, round(_MAP_RUN_S / trial.dt_s))
+def window_run(champion: Round, trial: Trial, arena: Arena) -> Located:
+    """Simulate a round's model for one window and return where all agents are.
+
+    Parameters
+    ----------
+    champion, trial, arena
+        As for `long_visits`; robots are among the agents, driven by the model as fish are.
+    """
+    source = SeedSource(trial_seed=trial.seed, window_end_s=champion.second)
+    (seed,) = source.seeds(Purpose.CONFIRMATION, 1)
+    return locate(_run(champion, trial, arena, int(seed), WINDOW_S), arena)
+
+
+def _run(champion: Round, trial: Trial, arena: Arena, seed: int, length_s: float) -> Samples:
+    n_steps, n = max(1, round(length_s / trial.dt_s)), trial.n_agents
     xy_m, _ = simulate_tracks(
         champion.parameters,
         arena,
-        n_agents=trial.n_agents,
+        n_agents=n,
         n_steps=n_steps,
         seed=seed,
         n_robots=trial.n_robots,
         clock_s=(float(champion.second), 1.0),
     )
-    samples = Samples(
+    return Samples(
         dt_s=trial.dt_s,
         k=np.arange(n_steps),
-        agent=np.arange(trial.n_fish, dtype=np.int32),
-        kind=np.full(trial.n_fish, FISH, dtype=np.int8),
-        xy_m=xy_m[:, : trial.n_fish],
-        confidence=np.ones((n_steps, trial.n_fish), dtype=np.float32),
+        agent=np.arange(n, dtype=np.int32),
+        kind=np.where(np.arange(n) < trial.n_fish, FISH, ROBOT).astype(np.int8),
+        xy_m=xy_m,
+        confidence=np.ones((n_steps, n), dtype=np.float32),
     )
-    return visits_of(locate(samples, arena))

@@ -259,9 +259,7 @@ def _draw_published(axes: Axes, ends_s: Ints) -> None:
     seconds, values = zip(*PUBLISHED_S, strict=True)
     minutes = [second / _S_PER_MIN for second in seconds]
     axes.plot([minutes[-1], last_s / _S_PER_MIN], [values[-1]] * 2, color=theme.INK, ls=":")
-    axes.plot(
-        minutes, values, color=theme.INK, ls="none", marker="D", mfc=theme.GROUND, ms=5, zorder=5
-    )
+    axes.plot(minutes, values, color=theme.INK, ls="none", marker="D", mfc=theme.GROUND, zorder=5)
 
 
 def _key(lines: Sequence[Line], shown: _Shown) -> tuple[Entry, ...]:
