@@ -53,12 +53,20 @@ class _Fours(click.IntRange):
 POSITIVE = FiniteRange(min=0, min_open=True)
 
 
-def names(text: str) -> tuple[str, ...]:
-    """Return the names that stand between commas."""
-    try:
-        return values.names(text)
-    except OptionError as error:
-        raise click.BadParameter(str(error)) from None
+def checked(take: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return what takes an option's text as Python's argument of the name does."""
+
+    @functools.wraps(take)
+    def taken(text: str) -> Any:
+        try:
+            return take(text)
+        except OptionError as error:
+            raise click.BadParameter(str(error)) from None
+
+    return taken
+
+
+names = checked(values.names)
 
 
 def adds(*options: Decorator) -> Decorator:

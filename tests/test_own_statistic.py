@@ -98,7 +98,9 @@ def test_it_is_computed_compared_and_drawn(make_trial, heard):
         alike = named("direction").compare(
             *(shown[c].of("direction")[row] for c in list(shown)[:2])
         )
-        assert [text.get_text() for text in axes.texts] == [f"similarity {float(alike):.2f}"]
+        assert [text.get_text() for text in axes.texts] == [
+            f"similarity {float(alike):.2f}\nn = {shown['fish'].of('direction')[row].sum()}"
+        ]
         assert axes.get_xlabel() == "direction (rad)"
 
 

@@ -208,7 +208,7 @@ def test_the_example_of_a_function_gives_what_it_shows(name, here):
 def test_examples_of_values_give_what_they_show():
     """Of the forms that people may give them in."""
     found = doctest.testmod(values)
-    assert (found.failed, found.attempted) == (0, 4)
+    assert (found.failed, found.attempted) == (0, 6)
 
 
 SCRIPT = """

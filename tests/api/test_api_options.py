@@ -341,7 +341,7 @@ FLAGS = {
     "diagnose": ("quick", "dry_run", "force"),
     "extend": ("dry_run", "force"),
     "simulate": ("robot", "video", "dry_run", "force"),
-    "report": ("dry_run", "force"),
+    "report": ("published", "dry_run", "force"),
     "compare": ("dry_run", "force"),
 }
 """Of each function what is yes or no."""
@@ -438,6 +438,9 @@ WRONG = [
     ("simulate", {**MODEL, "arena": ["ring"]}, "--arena"),
     ("simulate", {**MODEL, "video_file": 5}, "--video-file"),
     ("report", {"out": 3}, "--out"),
+    *(("report", {"format": value}, "--format") for value in ("gif", 5, ["png", "jpg"])),
+    *(("report", {"film": value}, "--film") for value in ("avi", 5, ["mp4"])),
+    *(("report", {"width": value}, "--width") for value in ("3cm", "59mm", 401, "wide", [85])),
     ("compare", {"against": "alone", "out": 3}, "--out"),
     *((name, {**FOR_NEEDED.get(name, {}), "tell": 5}, "tell: 5") for name in FUNCTIONS),
 ]

@@ -248,9 +248,10 @@ def quick(make_diagnosis):
         return KnownNoise(sd_m=stated_m, source=source)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "_drawer", lambda _: lambda part: part.write_bytes(b"drawn"))
+        patch.setattr(page, "write_printed", lambda _p, _k, part, _: part.write_bytes(b"drawn"))
         patch.setattr(page, "render_page", lambda *_: "drawn")
         patch.setattr(gather, "_simulated", lambda *_: None)
+        patch.setattr(gather, "_model_visits", lambda *_: None)
         patch.setattr(arena_figure, "_GRID_POINTS", 8)
         patch.setattr("zfcal.stages.diagnose.diagnose._engine", answer)
         patch.setattr("zfcal.stages.diagnose.diagnose._estimate", estimate)

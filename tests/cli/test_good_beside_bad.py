@@ -184,7 +184,7 @@ def test_every_command_that_refuses_a_link_says_what_to_do(
     zfcal, trial, tmp_path, monkeypatch, command
 ):
     """With where the file lies, for what may be named there, or how to put it into the trial."""
-    monkeypatch.setattr(page, "_drawer", lambda _: lambda part: part.write_bytes(b"drawn"))
+    monkeypatch.setattr(page, "write_printed", lambda _p, _k, part, _: part.write_bytes(b"drawn"))
     monkeypatch.setattr(page, "render_page", lambda *_: "drawn")
     assert zfcal("analyse", "trial").code == 0
     place, theirs = trial / LINKED[command], tmp_path / "theirs"

@@ -7,9 +7,9 @@ import pytest
 
 from zfcal.diagnose.naming import refit
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.tracing import trace
+from zfcal.diagnose.tracing import _last_turn_deg, trace
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.state import X, Y
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, X, Y
 from zfcal.model.scene import make_scene
 
 
@@ -66,14 +66,21 @@ def test_the_curve_has_twelve_points_and_its_mean_is_that_of_the_scores(traced):
         ("place-preference", {"strength": 1.0}, {"n_fish": 1}, "distance to the wall (cm)"),
         ("fatigue", {"per_hour": 3.0}, {}, "time (min)"),
         ("burst-and-coast", {"exponent": 0.3}, {}, "speed of the step before (cm/s)"),
+        (
+            "generic:heading:own-turn",
+            {"strength": 2.0},
+            {},
+            "the last turn (degrees to the left)",
+        ),
     ],
 )
 def test_the_cue_is_what_the_effect_responds_to(traced, name, values, company, cue):
     """In the units of its name."""
     own, found = traced(name, values, minutes=4.0, **company)
     assert found.cue_name == cue
-    reach = {"time (min)": 4.0, "speed of the step before (cm/s)": 60.0}.get(cue, 130.0)
-    assert 0 <= found.cue[0] < found.cue[-1] < reach
+    low = -180.0 if "turn" in cue else 0.0
+    reach = {"time (min)": 4.0, "speed of the step before (cm/s)": 60.0}.get(cue, 180.0)
+    assert low <= found.cue[0] < found.cue[-1] < reach
     moves = own.scene.moves if name in {"fatigue", "burst-and-coast"} else own.scene.turns
     assert len(found.time_s) == len(moves)
 
@@ -90,3 +97,12 @@ def test_neighbours_that_were_lost_are_not_near(record, candidate, tank, fish):
     together = scene.turns.at < 600
     assert found.observed.mean() == pytest.approx(found.before[together].mean(), rel=0.05, abs=0.01)
     assert np.isfinite(found.cue).all()
+
+
+def test_the_last_turn_by_hand():
+    """From east to north is 90 degrees to the left; who has not moved before has none."""
+    states = np.zeros((3, STATES))
+    states[:2, [PAST_HX, PAST_HY]] = [[1.0, 0.0], [0.0, 1.0]]
+    states[:, [HX, HY]] = [[0.0, 1.0], [1.0, 0.0], [1.0, 0.0]]
+
+    assert _last_turn_deg(states) == pytest.approx([90.0, -90.0, np.nan], nan_ok=True)

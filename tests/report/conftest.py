@@ -24,7 +24,7 @@ from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
 from zfcal.report.followed import followed_from
 from zfcal.report.page import write_report
-from zfcal.report.seen import see
+from zfcal.report.seen import see, visits_of
 from zfcal.report.views import (
     FEATURE_NAMES,
     MODEL,
@@ -36,7 +36,7 @@ from zfcal.report.views import (
     Round,
     TrialView,
 )
-from zfcal.tracks import Samples, Tracks
+from zfcal.tracks import FISH, Samples, Tracks
 from zfcal.trial import Trial
 
 DT_S = 0.2
@@ -135,6 +135,7 @@ def rounds_of():
                 parameters=model,
                 intervals=dict.fromkeys(names, (0.1, 0.9)),
                 unidentified=frozenset(names[::3]),
+                hypervolume=(0.2, 0.3, 0.4 + 0.01 * number),
             )
             for number in range(n_rounds)
         ]
@@ -169,6 +170,7 @@ def make_view(two_rooms, course, rounds_of, wander):
             statistics={(540, "control"): fish, (540, "robot"): robot},
             rounds=rounds_of(two_rooms, n_windows),
             model_statistics=fish + robot,
+            model_visits=seen.visits[FISH],
             seen=seen,
             integration=Integration(
                 start_s=300,
@@ -220,11 +222,12 @@ def small_trial(tmp_path, write_small_trial):
 
 
 @pytest.fixture(scope="session")
-def drawn_trial(tmp_path_factory, write_small_trial, stub_model):
+def drawn_trial(tmp_path_factory, write_small_trial, stub_model, stub_visits):
     """A trial with its report, drawn once for all tests: look at it, or copy it."""
     root = write_small_trial(tmp_path_factory.mktemp("drawn") / "trial")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("zfcal.report.simulated.long_run", stub_model)
+        patch.setattr("zfcal.report.simulated.long_visits", stub_visits)
         write_report([root])
     return root
 
@@ -308,7 +311,11 @@ def _write_round(trial, arena, end_s):
     row = {"value": 0.5, "low": 0.1, "high": 0.9, "identified": True}
     parameters = {name: dict(row) for name in gene_names(arena.zone_names)}
     parameters["walls.alpha"]["identified"] = False
-    result = {"S": 0.7, "intervals": {"parameters": parameters}}
+    result = {
+        "S": 0.7,
+        "hypervolume": [0.2, 0.4],
+        "intervals": {"parameters": parameters},
+    }
     path = trial.path("models", end_s, ".toml")
     write_model(path, model, _lineage("model", "calibrate"), result)
     _write_scores(trial, ["model-vs-control"], end_s, ending="-model.parquet")
@@ -321,29 +328,37 @@ def stub_model(two_rooms, wander):
     return lambda *_, **__: statistics
 
 
+@pytest.fixture(scope="session")
+def stub_visits(two_rooms, wander):
+    """Return where agents wander for any model."""
+    visits = visits_of(locate(wander(two_rooms, seed=9, robot=False), two_rooms))
+    return lambda *_, **__: visits
+
+
 @pytest.fixture
-def quick_model(monkeypatch, stub_model):
+def quick_model(monkeypatch, stub_model, stub_visits):
     """Put wandering agents in the place of the long simulation."""
     monkeypatch.setattr("zfcal.report.simulated.long_run", stub_model)
+    monkeypatch.setattr("zfcal.report.simulated.long_visits", stub_visits)
 
 
 @pytest.fixture
 def quick_pictures(monkeypatch):
     """Draw nothing: for tests of what is written when, and of words."""
     monkeypatch.setattr(
-        "zfcal.report.page.write_picture",
-        lambda picture, path: path.write_text(picture.title, encoding="utf-8"),
+        "zfcal.report.page.write_printed",
+        lambda picture, kind, path, _: path.write_text(f"{picture.title}, {kind}", "utf-8"),
     )
     monkeypatch.setattr("zfcal.report.render.panel_svg", lambda *_: "<svg></svg>")
 
 
 @pytest.fixture(scope="session")
 def covered_texts():
-    """Return what finds texts of a picture that cover each other or leave it."""
+    """Return what finds texts of a picture, at a width on paper, that cover each other."""
 
-    def find(picture):
-        with theme.style():
-            figure = compose(picture)
+    def find(picture, width_mm=None):
+        with theme.style(on_paper=width_mm is not None):
+            figure = compose(picture, width_in=None if width_mm is None else width_mm / 25.4)
             figure.canvas.draw()
             renderer = figure.canvas.get_renderer()
             undrawn = {label for axes in figure.findobj(Axes) for label in _undrawn(axes)}

@@ -26,6 +26,7 @@ def test_a_trial_is_read_whole(small_trial):
     assert [r.second for r in view.rounds] == [120, 180, 240]
     assert view.calibrated.unidentified == {"walls.alpha"}
     assert view.calibrated.intervals["walls.alpha"] == (0.1, 0.9)
+    assert [r.hypervolume for r in view.rounds] == [(0.2, 0.4)] * 3
     assert set(view.statistics) == {(240, "control"), (240, "robot")}
     assert view.seen.n_points == 1200 * 5
     assert view.tracked_s == pytest.approx(240)

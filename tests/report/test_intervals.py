@@ -22,7 +22,7 @@ def three(make_view, course):
     for name, own in zip("abc", values, strict=True):
         view = make_view(name, n_windows=len(own))
         courses = dict(view.courses) | {(MODEL, "S", None): course(own, ceiling=0.9)}
-        views.append(make_view(name, courses=courses))
+        views.append(make_view(name, courses=courses, published=True))
     return views
 
 
@@ -88,6 +88,15 @@ def test_the_page_has_a_table_per_comparison(three):
     assert rows["180"][-3:] == ["0.730 ± 0.026", "0.900 ± 0.000", "0.610"]
     assert robot.heads[-1] == social.heads[-1] == "ceiling of S"
     assert {len(row) for row in robot.rows} == {len(robot.heads)}
+
+
+def test_nothing_published_stands_beside_unasked(make_view):
+    """Neither a column of the page nor a number in the file."""
+    view = make_view()
+    model, *_ = interval_tables([view])
+    assert model.heads[-1] == "ceiling of S"
+    rows = csv.DictReader(io.StringIO(intervals_csv([view])))
+    assert {row["published"] for row in rows} == {""}
 
 
 def test_the_file_has_a_row_for_each_interval(three):

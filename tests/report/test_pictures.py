@@ -10,16 +10,25 @@ def names(pictures):
 
 def test_a_whole_trial_is_told_from_the_scores_to_the_arena(make_view):
     """What matters most comes first."""
-    order = ["scores", "integration", "following", "statistics", "parameters", "tracks", "arena"]
-
-    assert names(pictures_of_trial(make_view())) == order
+    assert names(pictures_of_trial(make_view())) == [
+        "scores",
+        "integration",
+        "social",
+        "following",
+        "statistics",
+        "presence",
+        "parameters",
+        "search",
+        "tracks",
+        "arena",
+    ]
 
 
 def test_several_trials_share_scores_and_arena(make_view):
     """What is of one trial alone stands in its own report."""
     views = [make_view("a"), make_view("b")]
 
-    assert names(pictures_of_trials(views)) == ["scores", "integration", "arena"]
+    assert names(pictures_of_trials(views)) == ["scores", "integration", "social", "arena"]
 
 
 def test_a_model_stands_beside_its_own_window_only(make_view):

@@ -11,13 +11,24 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import InputError, StorageError
 from zfcal.report import page
+from zfcal.report.options import Printing, ReportOptions
 from zfcal.report.page import report_files, report_left_out, report_reason, write_report
 
 pytestmark = pytest.mark.usefixtures("quick_model")
 
 quickly = pytest.mark.usefixtures("quick_pictures")
 
-PICTURES = {"arena", "integration", "parameters", "scores", "statistics", "tracks"}
+PICTURES = {
+    "arena",
+    "integration",
+    "parameters",
+    "presence",
+    "scores",
+    "search",
+    "social",
+    "statistics",
+    "tracks",
+}
 
 
 class Reader(html.parser.HTMLParser):
@@ -150,11 +161,11 @@ def test_a_report_is_up_to_date_until_something_changes(small_trial):
         ({"analysed": False, "calibrated": False}, {"arena", "tracks"}, "zfcal analyse trial"),
         (
             {"calibrated": False},
-            {"arena", "tracks", "statistics", "integration"},
+            {"arena", "tracks", "statistics", "integration", "social"},
             "zfcal calibrate trial",
         ),
         ({"minutes": 2}, PICTURES, "There is a single window"),
-        ({"n_robots": 0}, PICTURES - {"integration"}, "There is no robot in this trial."),
+        ({"n_robots": 0}, PICTURES - {"integration", "social"}, "There is no robot in this trial."),
     ],
     ids=["tracks only", "no model", "one window", "no robot"],
 )
@@ -219,6 +230,7 @@ def test_several_trials_make_one_report(small_trial, tmp_path):
     assert {path.stem for path in made if path.suffix == ".png"} == {
         "scores",
         "integration",
+        "social",
         "arena",
     }
     text = " ".join(read_page(out).text)
@@ -329,3 +341,44 @@ def test_names_of_people_are_text(small_trial):
     text = (root / "report" / "index.html").read_text(encoding="utf-8")
     assert text.count("<script") == 1
     assert "\\u003cimg" in text.split('id="provenance">')[1]
+
+
+@pytest.mark.usefixtures("quick_model", "quick_pictures")
+def test_figures_have_the_formats_that_are_asked_for(small_trial):
+    """Each in each format, all known to the report; another set takes the place of the first."""
+    root = small_trial()
+    how = ReportOptions(printing=Printing(formats=("svg", "pdf"), width_mm=85.0))
+
+    made = write_report([root], how=how)
+
+    assert {path.suffix for path in made} == {".html", ".json", ".svg", ".pdf"}
+    assert report_reason([root], how=how) is None
+    assert report_reason([root]) is not None
+    text = (root / "report" / "index.html").read_text()
+    assert "<code>scores.svg</code>, <code>scores.pdf</code>" in text
+    write_report([root])
+    assert not list((root / "report").glob("*.svg"))
+
+
+def test_a_page_has_no_link_that_leaves_it(drawn_trial):
+    """It can be sent by itself: what it names is in it, and each picture has a text."""
+    text = (drawn_trial / "report" / "index.html").read_text()
+
+    assert not re.findall(r'(?:src|href)="(?!#|data:)', text)
+    assert "http" not in re.sub(r'xmlns(?::xlink)?="[^"]*"', "", text.split("</style>", 1)[1])
+    drawn = re.findall(r"<svg (?![^>]*aria-hidden)[^>]*>", text)
+    assert len(drawn) > 20
+    assert all(re.search(r'role="img" aria-label="[^"]{20,}"', element) for element in drawn)
+
+
+@pytest.mark.usefixtures("quick_model", "quick_pictures")
+def test_published_scores_are_shown_where_asked_for(small_trial):
+    """And an older report without them is not up to date then."""
+    root = small_trial()
+    write_report([root])
+    how = ReportOptions(published=True)
+    assert report_reason([root], how=how) is not None
+    write_report([root], how=how)
+    assert "published S (10 trials)" in (root / "report" / "index.html").read_text()
+    write_report([root])
+    assert "published S (10 trials)" not in (root / "report" / "index.html").read_text()

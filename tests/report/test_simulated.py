@@ -8,6 +8,7 @@ from zfcal.behaviour.statistics import measure
 from zfcal.calibrate.group import Group, SeedSource, express
 from zfcal.calibrate.task import Settings, Task
 from zfcal.parameters import to_genes
+from zfcal.report import simulated as module
 from zfcal.report.simulated import long_run
 from zfcal.trial import Trial
 
@@ -43,3 +44,35 @@ def test_the_model_is_simulated_as_the_round_confirmed_it(two_rooms, rounds_of, 
     for name in names:
         assert np.array_equal(found.of(name), recorded[name].sum(axis=(0, 1))), name
     assert found.of("neighbour").sum() == 2 * 100 * 5
+
+
+def test_the_map_of_a_model_is_of_its_fish_alone(two_rooms, rounds_of, tmp_path, monkeypatch):
+    """Four runs of so many steps, of four fish and no robot; the same every time."""
+    monkeypatch.setattr(module, "_MAP_RUN_S", 20.0)
+    champion = rounds_of(two_rooms, 1)[-1]
+    trial = Trial(
+        root=tmp_path, arena="two-rooms", n_fish=4, n_robots=1, fps=15.0, dt_s=0.2, seed=3
+    )
+
+    found = module.long_visits(champion, trial, two_rooms)
+    again = module.long_visits(champion, trial, two_rooms)
+    other = module.long_visits(champion, replace(trial, seed=4), two_rooms)
+
+    assert found.zones.sum() == 4 * 100 * 4
+    assert found.cells.sum() == found.zones[1:].sum()
+    assert np.array_equal(found.cells, again.cells)
+    assert not np.array_equal(found.cells, other.cells)
+
+
+def test_a_window_of_the_model_has_all_agents(two_rooms, rounds_of, tmp_path):
+    """Two minutes of four fish and the robot."""
+    champion = rounds_of(two_rooms, 1)[-1]
+    trial = Trial(
+        root=tmp_path, arena="two-rooms", n_fish=4, n_robots=1, fps=15.0, dt_s=0.2, seed=3
+    )
+
+    found = module.window_run(champion, trial, two_rooms)
+
+    assert len(found) == 600 * 5
+    assert (found.kind == 1).sum() == 600
+    assert (found.zone > 0).all()

@@ -231,7 +231,9 @@ def test_several_trials_by_hand(make_view):
 
     assert "In 2 of 2 trials, from 6 min on" in said
     assert "S = 0.82 ± 0.00" in said
-    assert "0.850" in said
+    assert "published" not in said
+    beside = [replace(view, published=True) for view in views]
+    assert "0.850" in statements_of_trials(beside)[0].answer
 
 
 def test_robots_of_several_trials_are_counted(make_view):
@@ -265,7 +267,60 @@ def test_more_than_a_perfect_model_is_overfitting(make_view, course):
     assert "In 3 of 3 windows S lies above it" in said.answer
     assert "overfitting" in said.answer
     assert "In 0 of 3 windows S lies where" in said.answer
-    assert said.figure == ("121 %", "of what a perfect model would score: overfitting")
+    assert said.figure == (
+        "0.97",
+        "above the range of a perfect model: it fits chance (overfitting)",
+    )
+    assert "%" not in said.answer.split(" In the last window")[0]
+
+
+def test_no_score_is_said_to_reach_more_than_its_ceiling(make_view, course):
+    """0.9 where the ceiling is 0.8 (0.65 to 0.95): as good as can be, and no 113 %."""
+    courses = {(MODEL, "S", None): course([0.9] * 3, ceiling=0.8, half_width=0.15)}
+    view = make_view(courses=courses)
+    said = answer_to(view, "Does the model")
+
+    assert said.figure == ("100 %", "of what a perfect model would score")
+    assert "S cannot tell the two apart" in said.answer
+    assert "112 %" not in said.answer
+    assert "113 %" not in said.answer
+
+
+def test_several_trials_above_their_ceilings_are_no_praise(make_view, course):
+    """The score stands out, not a percentage."""
+    courses = {(MODEL, "S", None): course([0.97] * 8, ceiling=0.8)}
+    views = [make_view(name, courses=courses) for name in "ab"]
+
+    assert statements_of_trials(views)[0].figure[0] == "0.97"
+    assert "fits chance" in statements_of_trials(views)[0].figure[1]
+
+
+def test_few_pairs_and_pairs_beyond_the_bins_are_said(make_view):
+    """12 pairs in the corridor, and 740 of 1000 in the last bin of the walls."""
+    view = make_view()
+    fish = view.statistics[540, "control"]
+    distance = np.zeros_like(fish.of("D"))
+    distance[0, 0] = 12
+    distance[1, 2], distance[1, -1] = 260, 740
+    distance[2, 3] = 500
+    fish = replace(fish, distance=distance)
+    said = answer_to(replace(view, statistics={(540, "control"): fish}), "How much do distances")
+
+    assert said.figure == ("74 %", "of the pairs in walls are in one bin of D")
+    assert "few pairs in corridor (12)" in said.answer
+    assert "Farther apart than 0.198 m" in said.answer
+    assert "zfcal analyse trial --features separation" in said.answer
+    assert "is not S" in said.answer
+
+
+def test_enough_pairs_within_the_bins_need_no_word(make_view):
+    """Nothing is said of D where it is of many pairs that it can tell apart."""
+    view = make_view()
+    fish = view.statistics[540, "control"]
+    fish = replace(fish, distance=np.full_like(fish.of("D"), 50))
+    found = statements(replace(view, statistics={(540, "control"): fish}))
+
+    assert not [s for s in found if "distances" in s.question]
 
 
 def test_a_model_of_another_window_does_not_overfit(make_view, course):
@@ -283,7 +338,7 @@ def test_a_model_of_another_window_does_not_overfit(make_view, course):
     assert (
         "In 2 of 3 windows S of a model that was made of another window lies above" in said.answer
     )
-    assert said.figure == ("121 %", "of what a perfect model would score")
+    assert said.figure == ("0.97", "above the range of a perfect model, by chance")
 
 
 def test_a_published_value_outside_the_interval_of_the_likelihood_is_named(make_view):

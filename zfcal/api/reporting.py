@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, Literal
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
-from zfcal.api.values import PathLike, place, taken
+from zfcal.api.values import Names, PathLike, flag, formats, one_of, place, taken, width_mm
 from zfcal.errors import DamagedError, InputError
+from zfcal.report.options import AS_USUAL, FILMS, Printing, ReportOptions
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
@@ -17,7 +19,20 @@ _TOGETHER = Path("report")
 _HINT = "Make it again, or copy it again from where it was made."
 
 
-def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Task) -> Path:
+def how_of(options: Mapping[str, Any]) -> ReportOptions:
+    """Return how a report is made, from options with the names of `report`'s arguments."""
+    printing = Printing(formats=options["format"] or ("png",), width_mm=options["width"])
+    return ReportOptions(published=options["published"], printing=printing, film=options["film"])
+
+
+def write_page(
+    roots: Sequence[Path],
+    out: Path | None,
+    tell: Tell,
+    *,
+    task: Task,
+    how: ReportOptions = AS_USUAL,
+) -> Path:
     """Write the report of trials, unless it is up to date.
 
     Parameters
@@ -30,6 +45,8 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
         Hears of every file, and of what is left out.
     task
         How to go about it.
+    how
+        What the report shows, and in which form.
 
     Returns
     -------
@@ -47,7 +64,7 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
     folder = _TOGETHER if out is None and len(roots) > 1 else out
 
     def work() -> None:
-        reason = report_reason(roots, folder) or ("forced" if task.force else None)
+        reason = report_reason(roots, folder, how) or ("forced" if task.force else None)
         if reason is None:
             for path in report_files(roots, folder):
                 tell(UpToDate(path=path))
@@ -56,7 +73,7 @@ def write_page(roots: Sequence[Path], out: Path | None, tell: Tell, *, task: Tas
         elif task.dry_run:
             tell(Planned(path=(folder or roots[0] / "report") / PAGE, reason=reason))
         else:
-            for path in write_report(roots, folder, on_damage=tell_damage(tell)):
+            for path in write_report(roots, folder, how=how, on_damage=tell_damage(tell)):
                 tell(Made(path=path, reason=reason))
 
     with at_work(roots[0], "report", task):
@@ -78,13 +95,17 @@ def report(
     trials: TrialPath | Iterable[TrialPath],
     *,
     out: PathLike | None = None,
+    format: Names | None = None,
+    width: float | str | None = None,
+    film: Literal["mp4", "gif"] | None = None,
+    published: bool = False,
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
 ) -> Path:
     """Write a page with figures, of one trial or of several in one report: ``zfcal report``.
 
-    The page holds its figures; they lie beside it as PNG too. Over several trials it shows mean
+    The page holds its figures; they lie beside it as files too. Over several trials it shows mean
     and standard deviation per window. What is up to date stays.
 
     Parameters
@@ -93,6 +114,16 @@ def report(
         One trial or several: directories, or their tables. One that is named twice counts once.
     out
         Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``.
+    format
+        Of the figures: ``png``, ``svg`` and ``pdf``, one or several; by default ``png``.
+    width
+        Of the figures on paper: ``single`` (85 mm), ``double`` (174 mm) or millimetres. None for
+        the screen.
+    film
+        ``mp4`` or ``gif``: a film of the last window beside the model that was calibrated last,
+        ``film.mp4`` or ``film.gif`` in the report; of one trial.
+    published
+        Draw the published scores, which are of other fish, beside these.
     dry_run
         Write nothing; `tell` hears whether it would be made, and why.
     force
@@ -123,5 +154,6 @@ def report(
     >>> print(zfcal.report("trial"))
     trial/report/index.html
     """
-    asked, hears = taken(locals(), {"out": place}), heard_by(tell)
-    return write_page(roots_of(trials), asked["out"], hears, task=task_of(asked))
+    how = {"out": place, "format": formats, "width": width_mm, "film": one_of(*FILMS)}
+    asked, hears = taken(locals(), how, needed={"published": flag}), heard_by(tell)
+    return write_page(roots_of(trials), asked["out"], hears, task=task_of(asked), how=how_of(asked))

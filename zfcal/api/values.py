@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from zfcal.errors import OptionError
+from zfcal.report.options import FORMATS, NARROWEST_MM, WIDEST_MM, WIDTHS_MM
 
 T = TypeVar("T")
 
@@ -111,6 +112,40 @@ def several(value: Names) -> tuple[str, ...]:
     (('alignment',), ('a', 'b'), ('a', 'b'))
     """
     return tuple(dict.fromkeys(names(value)))
+
+
+def formats(value: Names) -> tuple[str, ...]:
+    """Return the formats of figures, each once.
+
+    >>> formats("png,pdf"), formats(["svg"])
+    (('png', 'pdf'), ('svg',))
+    """
+    found = several(value)
+    for each in found:
+        if each not in FORMATS:
+            raise OptionError(f"{shown(each)} is not one of {', '.join(map(repr, FORMATS))}.")
+    return found
+
+
+def width_mm(value: float | str) -> float:
+    """Return the width of figures on paper, in millimetres.
+
+    >>> width_mm("single"), width_mm("120mm"), width_mm(120)
+    (85.0, 120.0, 120.0)
+    """
+    if isinstance(value, str) and value in WIDTHS_MM:
+        return WIDTHS_MM[value]
+    plain = value.removesuffix("mm").strip() if isinstance(value, str) else value
+    try:
+        found = number(low=NARROWEST_MM)(plain)
+    except OptionError:
+        found = math.inf
+    if not found <= WIDEST_MM:
+        raise OptionError(
+            f"{shown(value)} is no width: single (85 mm), double (174 mm), or millimetres from "
+            f"{NARROWEST_MM:g} to {WIDEST_MM:g}, such as 120mm."
+        )
+    return found
 
 
 def text(value: str) -> str:

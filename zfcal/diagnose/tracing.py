@@ -12,7 +12,7 @@ from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import Effect
-from zfcal.model.kernels.state import SPEED, WALL, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, SPEED, WALL, ZONE, X, Y
 from zfcal.model.scene import Moves, Scene
 
 _BINS = 12
@@ -72,9 +72,20 @@ def _cue(effect: Effect, scene: Scene, steps: Moves) -> _Cue:
         return _Cue(name="time (min)", values=scene.time_s(steps) / 60)
     if effect.shown_against == "speed":
         return _Cue(name="speed of the step before (cm/s)", values=100 * states[:, SPEED])
+    if effect.shown_against == "turn":
+        return _Cue(name="the last turn (degrees to the left)", values=_last_turn_deg(states))
     if effect.shown_against == "wall" or scene.n_fish + scene.n_robots < 2:
         return _Cue(name="distance to the wall (cm)", values=100 * states[:, WALL])
     return _Cue(name="distance to the nearest neighbour (cm)", values=100 * _nearest(scene, steps))
+
+
+def _last_turn_deg(states: Floats) -> Floats:
+    """Return by how much each turned in the step before, in degrees; NaN without a step before."""
+    now, before = states[:, [HX, HY]], states[:, [PAST_HX, PAST_HY]]
+    sine = before[:, 0] * now[:, 1] - before[:, 1] * now[:, 0]
+    turn = np.degrees(np.arctan2(sine, (now * before).sum(axis=1)))
+    known = (now != 0).any(axis=1) & (before != 0).any(axis=1)
+    return np.where(known, turn, np.nan)
 
 
 def _nearest(scene: Scene, steps: Moves) -> Floats:

@@ -5,8 +5,10 @@ A file that is damaged is left out and named; the rest is still shown.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +29,10 @@ from zfcal.behaviour.rows import statistics_from_rows
 from zfcal.behaviour.statistics import Statistics
 from zfcal.errors import DamagedError, InputError
 from zfcal.parameters import Parameters
+from zfcal.report.driven import closed_drives, driven_of
 from zfcal.report.followed import Followed, followed_from
 from zfcal.report.integration import measure_integration
-from zfcal.report.seen import see
+from zfcal.report.seen import Seen, Visits, see
 from zfcal.report.views import (
     Course,
     CourseKey,
@@ -40,6 +43,7 @@ from zfcal.report.views import (
     Source,
     TrialView,
 )
+from zfcal.tracks import FISH
 from zfcal.trial import Trial
 
 Damage = Callable[[DamagedError], None]
@@ -107,7 +111,7 @@ def input_files(root: Path) -> list[Path]:
     for folder, ending in _ENDINGS:
         # What is no file is no input: it is named where it is read.
         files += [path for _, path in reader.files(folder, ending) if _can_be_opened(path)]
-    return files
+    return [*files, *closed_drives(root).values()]
 
 
 def _can_be_opened(path: Path) -> bool:
@@ -159,6 +163,7 @@ def gather(
         statistics=counted,
         rounds=rounds,
         model_statistics=_simulated(calibrated, trial, arena, counted) if alone else None,
+        model_visits=_model_visits(calibrated, trial, arena, seen) if alone else None,
         seen=seen,
         integration=measure_integration(
             courses, seen, has_robot=trial.n_robots > 0, start_s=start_s
@@ -166,6 +171,7 @@ def gather(
         following=_followed(reader, start_s),
         sources=list(_sources(reader)),
         rule_scores=_rule_scores(reader),
+        driven=tuple(filter(None, starmap(driven_of, closed_drives(root).items()))),
         left_out=list(reader.damaged.values()),
         scoring=str(scored.get("scoring", "paper")),
         has_control_trials="control" in scored,
@@ -187,6 +193,16 @@ def _simulated(
     fish = counted.get((calibrated.second, "control"))
     names = () if fish is None else [name for name in fish.further if name in statistics()]
     return long_run(calibrated, trial, arena, further=names)
+
+
+def _model_visits(
+    calibrated: Round | None, trial: Trial, arena: Arena, seen: Seen | None
+) -> Visits | None:
+    if calibrated is None or seen is None or FISH not in seen.visits:
+        return None
+    from zfcal.report.simulated import long_visits
+
+    return long_visits(calibrated, trial, arena)
 
 
 def _courses(reader: _Reader) -> tuple[dict[CourseKey, Course], dict[str, Any]]:
@@ -262,7 +278,16 @@ def round_of(second: int, model: Parameters, result: Mapping[str, Any]) -> Round
         published=_published(result.get("published")),
         score=score,
         score_of=names,
+        hypervolume=_numbers(result.get("hypervolume")),
     )
+
+
+def _numbers(said: Any) -> tuple[float, ...]:
+    """Return a list of finite numbers as it is; nothing where it is another thing."""
+    if not isinstance(said, list) or not all(isinstance(each, int | float) for each in said):
+        return ()
+    found = tuple(map(float, said))
+    return found if all(map(math.isfinite, found)) else ()
 
 
 def _published(said: Any) -> Published | None:
@@ -343,18 +368,18 @@ def _pooled_from(reader: _Reader) -> int:
 
 def _sources(reader: _Reader) -> Iterator[Source]:
     root = reader.trial.root
-    for folder, ending in _ENDINGS:
-        for _, path in reader.files(folder, ending):
-            lineage = reader.attempt(path, read_lineage)
-            if isinstance(lineage, Lineage):
-                (digest,) = hash_inputs(root, [path]).values()
-                # Of a day's recording the inputs of all scores would be a million.
-                yield Source(
-                    path=relative_to(root, path),
-                    sha256=digest,
-                    lineage=replace(lineage, inputs={}),
-                    n_inputs=len(lineage.inputs),
-                )
+    files = [path for folder, ending in _ENDINGS for _, path in reader.files(folder, ending)]
+    for path in [*files, *closed_drives(root).values()]:
+        lineage = reader.attempt(path, read_lineage)
+        if isinstance(lineage, Lineage):
+            (digest,) = hash_inputs(root, [path]).values()
+            # Of a day's recording the inputs of all scores would be a million.
+            yield Source(
+                path=relative_to(root, path),
+                sha256=digest,
+                lineage=replace(lineage, inputs={}),
+                n_inputs=len(lineage.inputs),
+            )
 
 
 def _ignore(_: DamagedError) -> None:

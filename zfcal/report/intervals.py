@@ -37,7 +37,8 @@ class Interval:
     ceiling_mean, ceiling_sd
         The same of what a perfect match would score.
     published
-        Mean of the 10 published trials, on the authors' own data.
+        Mean of the 10 published trials, on the authors' own data; NaN unless one of the
+        trials asks for it.
     """
 
     compared: str
@@ -69,6 +70,7 @@ def intervals_of(views: Sequence[TrialView]) -> list[Interval]:
 
 def _course_of(views: Sequence[TrialView], compared: str, feature: str) -> Iterator[Interval]:
     courses = [view.course(compared, feature) for view in views]
+    asked = any(view.published for view in views)
     for end in sorted({int(end) for course in courses for end in course.end_s}):
         marks = [
             course.mark(int(i))
@@ -79,7 +81,7 @@ def _course_of(views: Sequence[TrialView], compared: str, feature: str) -> Itera
             continue
         mean, sd = mean_and_sd([mark.value for mark in marks])
         ceiling_mean, ceiling_sd = mean_and_sd([mark.ceiling for mark in marks])
-        is_published = (compared, feature) == (MODEL, "S")
+        is_published = (compared, feature) == (MODEL, "S") and asked
         yield Interval(
             compared=compared,
             feature=feature,
@@ -117,16 +119,20 @@ def intervals_csv(views: Sequence[TrialView]) -> str:
 def interval_tables(views: Sequence[TrialView]) -> list[Table]:
     """Return a table per comparison, a row per interval; those without a row left out."""
     found = intervals_of(views)
-    made = [_table(compared, [i for i in found if i.compared == compared]) for compared in _TITLES]
+    published = any(view.published for view in views)
+    made = [
+        _table(compared, [i for i in found if i.compared == compared], published=published)
+        for compared in _TITLES
+    ]
     return [table for table in made if table.rows]
 
 
-def _table(compared: str, found: Sequence[Interval]) -> Table:
+def _table(compared: str, found: Sequence[Interval], *, published: bool) -> Table:
     at = {(each.end_s, each.feature): each for each in found}
     ends = sorted({each.end_s for each in found})
     rows = [[str(end), *_row([at.get((end, name)) for name in FEATURE_NAMES])] for end in ends]
     heads = ["end (s)", "trials", *FEATURE_NAMES, "ceiling of S"]
-    if compared == MODEL:
+    if compared == MODEL and published:
         heads.append("published S")
         for row, end in zip(rows, ends, strict=True):
             row.append(number(published_s(end)))

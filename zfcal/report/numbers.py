@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.artifacts.lineage import to_json
+from zfcal.report.driven import driven_rows
 from zfcal.report.figures.parameters import outside_of, values_of
+from zfcal.report.standing import share_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _COMPARED = {
@@ -65,6 +67,7 @@ def tables(view: TrialView) -> list[Table]:
         _published(view),
         _rules(view),
         _parameters(view),
+        _driven(view),
         lineage_table([view]),
     )
     return [table for table in made if table.rows]
@@ -142,7 +145,8 @@ def _scores(view: TrialView) -> Table:
         numbers=range(2, 7),
         note="Similarities between 0 and 1: D distances between fish, W distances to the wall, "
         "O time in each zone, T moves between zones, S all together. Ceiling and interval are "
-        "those of the last window.",
+        "those of the last window. 100 % is the ceiling; above is a score above the interval, "
+        "which fits chance.",
     )
 
 
@@ -250,6 +254,22 @@ def _published(view: TrialView) -> Table:
     )
 
 
+def _driven(view: TrialView) -> Table:
+    heads = ["from (s)"]
+    for latency in ("frame to state", "tick to byte"):
+        heads += [f"{latency}, median (ms)", "95 %", "most"]
+    return Table(
+        name="drive",
+        title="How quick the robot was driven",
+        heads=[*heads, "steps missed", "ticks left out"],
+        rows=list(driven_rows(view.driven)),
+        numbers=range(9),
+        note="From the writing of a frame to the driver's own state, and from the moment a tick "
+        "was due to the return of the write of its last byte; not to what the radio sent. Aims: "
+        "20 ms (95 %) each, and no step missed.",
+    )
+
+
 def _rules(view: TrialView) -> Table:
     rules = dict.fromkeys(each.rule for each in view.rule_scores)
     rows = []
@@ -282,9 +302,8 @@ def mean_and_sd(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _cells(mark: Mark) -> tuple[str, str, str]:
-    share = mark.against_ceiling
-    percent = NONE if math.isnan(share) else f"{100 * share:.0f} %"
-    return number(mark.value), number(mark.ceiling), percent
+    share = NONE if math.isnan(mark.against_ceiling) else share_of(mark)
+    return number(mark.value), number(mark.ceiling), share
 
 
 def _short(text: str) -> str:

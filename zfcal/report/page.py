@@ -7,29 +7,34 @@ give the same bytes: nothing of the day or the machine is in it.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-from zfcal.artifacts.atomic import storage_error, write_text_whole, write_whole
+from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole, write_whole
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
-from zfcal.report.figures.panels import Picture, write_picture
+from zfcal.report.figures.panels import Picture
+from zfcal.report.figures.printing import write_printed
 from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.labels import labels_of
+from zfcal.report.options import AS_USUAL, FILMS, FORMATS, Printing, ReportOptions
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
-from zfcal.report.views import TrialView
+from zfcal.report.seen import Seen
+from zfcal.report.views import Round, TrialView
 
 _FOLDER = "report"
 PAGE = "index.html"
 _NUMBERS = "integration.json"
 _TABLE = "intervals.csv"
+_ENDINGS = (".csv", *(f".{kind}" for kind in (*FORMATS, *FILMS)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +46,11 @@ class _Place:
 
 
 def write_report(
-    roots: Sequence[Path], out_dir: Path | None = None, *, on_damage: Damage | None = None
+    roots: Sequence[Path],
+    out_dir: Path | None = None,
+    *,
+    how: ReportOptions = AS_USUAL,
+    on_damage: Damage | None = None,
 ) -> list[Path]:
     """Write the report of a trial, or one over several trials.
 
@@ -52,6 +61,8 @@ def write_report(
     out_dir
         Where the report goes; None for ``report/`` in the trial. Several
         trials need one.
+    how
+        What it shows, and in which form.
     on_damage
         Hears of each file that is damaged and left out.
 
@@ -70,23 +81,33 @@ def write_report(
         The disk is full, or the place cannot be written.
     """
     place = _place(roots, out_dir)
-    lineage = _lineage(roots, place)
+    lineage = _lineage(roots, place, how)
     views = [
-        replace(gather(root, on_damage or _ignore, alone=len(roots) == 1), label=label)
+        replace(
+            gather(root, on_damage or _ignore, alone=len(roots) == 1),
+            label=label,
+            published=how.published,
+        )
         for root, label in zip(roots, labels_of(roots), strict=True)
     ]
     _check_one_arena(views)
+    to_film = None if how.film is None else _to_film(views)
     pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []
     for picture in pictures:
-        path = place.folder / f"{picture.name}.png"
-        write_whole(path, _drawer(picture))
-        written.append(path)
+        for kind in how.printing.formats:
+            path = place.folder / f"{picture.name}.{kind}"
+            write_whole(path, partial(_draw, picture, kind, how.printing))
+            written.append(path)
+    if to_film is not None:
+        film = place.folder / f"film.{how.film}"
+        write_bytes_whole(film, _film(*to_film, str(how.film)))
+        written.append(film)
     if len(views) > 1:
         write_text_whole(place.folder / _TABLE, intervals_csv(views))
         written.append(place.folder / _TABLE)
     page = place.folder / PAGE
-    write_text_whole(page, render_page(views, pictures, lineage))
+    write_text_whole(page, render_page(views, pictures, lineage, how.printing.formats))
     written.append(page)
     numbers = place.folder / _NUMBERS
     _remove_outdated(place.folder, {path.name for path in written})
@@ -96,12 +117,14 @@ def write_report(
     return [page, *written[:-1], numbers]
 
 
-def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | None:
+def report_reason(
+    roots: Sequence[Path], out_dir: Path | None = None, how: ReportOptions = AS_USUAL
+) -> str | None:
     """Return why a report must be made; None if it is up to date.
 
     Parameters
     ----------
-    roots, out_dir
+    roots, out_dir, how
         As for `write_report`.
 
     Returns
@@ -111,7 +134,7 @@ def report_reason(roots: Sequence[Path], out_dir: Path | None = None) -> str | N
     """
     place = _place(roots, out_dir)
     numbers = place.folder / _NUMBERS
-    reason = stale_reason([numbers], _lineage(roots, place))
+    reason = stale_reason([numbers], _lineage(roots, place, how))
     if reason is not None:
         return reason
     for name, digest in read_json(numbers)["files"].items():
@@ -157,14 +180,14 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
     return _Place(folder=out_dir, base=out_dir)
 
 
-def _lineage(roots: Sequence[Path], place: _Place) -> Lineage:
+def _lineage(roots: Sequence[Path], place: _Place, how: ReportOptions) -> Lineage:
     files = [path for root in roots for path in input_files(root)]
     # The order of the trials bears on the order of the tables.
     names: list[JSON] = [*labels_of(roots)]
     return Lineage(
         schema=SCHEMA,
         command="report",
-        options={"trials": names},
+        options={"trials": names, **how.as_lineage()},
         inputs=hash_inputs(place.base, files),
     )
 
@@ -179,8 +202,37 @@ def _check_one_arena(views: Sequence[TrialView]) -> None:
             )
 
 
-def _drawer(picture: Picture) -> Callable[[Path], None]:
-    return lambda part: write_picture(picture, part)
+def _film(view: TrialView, calibrated: Round, seen: Seen, kind: str) -> bytes:
+    # OpenCV, and the compiler, are for films alone.
+    from zfcal.report.figures import theme
+    from zfcal.report.film import Side, film_of
+    from zfcal.report.simulated import window_run
+
+    model = window_run(calibrated, view.trial, view.arena)
+    measured = Side(title="Measured, last window", colour=theme.FISH, located=seen.last)
+    return film_of(
+        (measured, Side(title="Model, simulated", colour=theme.MODEL, located=model)), kind
+    )
+
+
+def _to_film(views: Sequence[TrialView]) -> tuple[TrialView, Round, Seen]:
+    """Return the trial that is to be filmed, its model and its tracks."""
+    view, calibrated = views[0], views[0].calibrated
+    if len(views) > 1:
+        raise InputError(
+            f"A film is of one trial, got {len(views)}.",
+            hint="Make a report of each, with its film.",
+        )
+    if calibrated is None or view.seen is None or not view.seen.n_points:
+        raise InputError(
+            f"{view.root}: a film shows the tracks beside the calibrated model, and there is none.",
+            hint=f"Make them first: zfcal calibrate {view.name}",
+        )
+    return view, calibrated, view.seen
+
+
+def _draw(picture: Picture, kind: str, printing: Printing, path: Path) -> None:
+    write_printed(picture, kind, path, printing)
 
 
 def _remove_outdated(folder: Path, made: set[str]) -> None:
@@ -190,7 +242,7 @@ def _remove_outdated(folder: Path, made: set[str]) -> None:
     except (DamagedError, InputError):
         return
     for name in set(before) - made:
-        if Path(name).name == name and name.endswith((".png", ".csv")):
+        if Path(name).name == name and name.endswith(_ENDINGS):
             try:
                 (folder / name).unlink(missing_ok=True)
             except OSError as error:

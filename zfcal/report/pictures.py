@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from zfcal.report.figures.arena import arena_picture
 from zfcal.report.figures.followed import followed_picture
 from zfcal.report.figures.panels import Picture
 from zfcal.report.figures.parameters import parameters_picture
+from zfcal.report.figures.presence import presence_picture
 from zfcal.report.figures.rules import rules_picture
 from zfcal.report.figures.scores import scores_picture
+from zfcal.report.figures.search import search_picture
 from zfcal.report.figures.statistics import statistics_picture
 from zfcal.report.figures.tracks import tracks_picture
 from zfcal.report.views import MODEL, ROBOT, SOCIAL, TrialView
+from zfcal.tracks import FISH
 from zfcal.units import WINDOW_S
 
 _ARENA_IN = 4.2
@@ -25,7 +28,9 @@ def pictures_of_trial(view: TrialView) -> list[Picture]:
         followed_picture(view.following),
         rules_picture(view.rule_scores),
         _statistics(view),
+        _presence(view),
         parameters_picture(view.rounds),
+        search_picture(view.rounds),
         None if view.seen is None else tracks_picture(view.seen),
         arena_picture(view.arena, width_in=_ARENA_IN),
     )
@@ -38,13 +43,20 @@ def pictures_of_trials(views: Sequence[TrialView]) -> list[Picture]:
     return [picture for picture in made if picture is not None]
 
 
-def _scores(views: Sequence[TrialView]) -> tuple[Picture | None, Picture | None]:
-    return (
-        scores_picture(views, (MODEL,), name="scores", title="Model against fish", short="Model"),
-        scores_picture(
-            views, (SOCIAL, ROBOT), name="integration", title="Robot among the fish", short="Robot"
-        ),
-    )
+def _scores(views: Sequence[TrialView]) -> Iterator[Picture | None]:
+    for compared, name, title, short in (
+        (MODEL, "scores", "Model against fish", "Model"),
+        (ROBOT, "integration", "Robot against fish", "Robot"),
+        (SOCIAL, "social", "Fish with robot against fish alone", "Fish with robot"),
+    ):
+        yield scores_picture(views, compared, name=name, title=title, short=short)
+
+
+def _presence(view: TrialView) -> Picture | None:
+    if view.seen is None:
+        return None
+    fish = view.seen.visits.get(FISH)
+    return presence_picture(fish, view.model_visits, view.arena, end_s=view.seen.end_s)
 
 
 def _statistics(view: TrialView) -> Picture | None:

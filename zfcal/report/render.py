@@ -1,4 +1,4 @@
-"""The page as text: summary, figures and tables, with nothing outside it but links to PNGs."""
+"""The page as text: summary, figures and tables, with nothing outside it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,12 @@ from zfcal.report.trials_summary import gaps_of_trials, statements_of_trials
 from zfcal.report.views import TrialView
 
 
-def render_page(views: Sequence[TrialView], pictures: Sequence[Picture], lineage: Lineage) -> str:
+def render_page(
+    views: Sequence[TrialView],
+    pictures: Sequence[Picture],
+    lineage: Lineage,
+    formats: Sequence[str] = ("png",),
+) -> str:
     """Return the page of a trial, or of several, as HTML.
 
     Parameters
@@ -29,14 +34,19 @@ def render_page(views: Sequence[TrialView], pictures: Sequence[Picture], lineage
         In the order in which they are shown.
     lineage
         Of the report, which stands in the page as well.
+    formats
+        Endings of the files that the pictures are beside the page.
     """
     content = _of_one(views[0]) if len(views) == 1 else _of_several(views)
     content["left_out"] = [line for view in views for line in view.left_out]
-    return render(content, list(map(section_of, pictures)), lineage.as_dict())
+    return render(content, list(map(section_of, pictures)), lineage.as_dict(), formats)
 
 
 def render(
-    content: Mapping[str, Any], sections: Sequence[Section], provenance: Mapping[str, Any]
+    content: Mapping[str, Any],
+    sections: Sequence[Section],
+    provenance: Mapping[str, Any],
+    formats: Sequence[str] = ("png",),
 ) -> str:
     """Return a page as HTML.
 
@@ -49,6 +59,8 @@ def render(
     provenance
         Where the page comes from, with the ``version`` that made it; it stands in the
         page as JSON.
+    formats
+        As for `render_page`.
     """
     environment = Environment(
         loader=PackageLoader("zfcal.report"), autoescape=True, undefined=StrictUndefined
@@ -57,6 +69,7 @@ def render(
     text = environment.get_template("page.html.j2").render(
         **content,
         sections=sections,
+        formats=formats,
         version=provenance["version"],
         lineage=_embedded(provenance),
         light=_colours(1),

@@ -14,10 +14,20 @@ from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.contents import Gap, Statement
+from zfcal.report.distance_words import distance_statement
 from zfcal.report.figures.parameters import outside_of
 from zfcal.report.figures.statistics import histogram_mean
 from zfcal.report.followed_words import followed_gap, followed_statement
 from zfcal.report.integration import NOT_COMPARED
+from zfcal.report.standing import (
+    ABOVE,
+    FITS_CHANCE,
+    figure_of,
+    is_above,
+    sentence_of,
+    share_of,
+)
+from zfcal.report.tracking_words import tracking_statement
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _NEAR = 0.97
@@ -31,9 +41,8 @@ _NOTHING = 0.005
 """A score that is printed as 0.00 or below it."""
 
 _FEW = 4
+_LIKER = "above the range of a fish in its place"
 
-_OF_PERFECT = "of what a perfect model would score"
-_TOO_MUCH = ": overfitting"
 OVERFITTING = "the model fits what happened there by chance as well (overfitting)"
 """What it means to score more than a perfect model does."""
 
@@ -44,8 +53,10 @@ def statements(view: TrialView) -> list[Statement]:
         _model(view),
         _named(view),
         _worst(view),
+        distance_statement(view),
         _robot(view),
         followed_statement(view),
+        tracking_statement(view),
         _halves(view),
         _parameters(view),
     )
@@ -105,12 +116,7 @@ def _model(view: TrialView) -> Statement | None:
     known = ~np.isnan(course.value)
     mean, last, n = course.mean(), course.mark(course.last), int(known.sum())
     above, elsewhere, within = _against_band(course, view.made_elsewhere)
-    overfits = _is_above(mean) and above >= elsewhere
-    reaches = (
-        f"It reaches {_percent(mean)} of its ceiling."
-        if not _is_above(mean)
-        else f"That is {_percent(mean)} of its ceiling, and above the range of a perfect model."
-    )
+    reaches = sentence_of(mean)
     parts = [
         f"Over {_windows(n)} the calibrated model scores S = {mean.value:.2f}; a perfect model "
         f"would score {mean.ceiling:.2f}, since windows of two minutes are too short for two of "
@@ -143,7 +149,7 @@ def _model(view: TrialView) -> Statement | None:
     return Statement(
         question="Does the model behave like these fish?",
         answer=" ".join(parts),
-        figure=(_percent(mean), _OF_PERFECT + (_TOO_MUCH if overfits else "")),
+        figure=figure_of(mean, above=FITS_CHANCE if above >= elsewhere else ABOVE),
     )
 
 
@@ -160,11 +166,6 @@ def _against_band(course: Course, elsewhere: frozenset[int]) -> tuple[int, int, 
     return int((above & ~other).sum()), int((above & other).sum()), int(within.sum())
 
 
-def _is_above(mark: Mark) -> bool:
-    """Return whether a score is higher than what chance gives a perfect model."""
-    return mark.value > mark.high
-
-
 def _named(view: TrialView) -> Statement | None:
     """Say what was calibrated on, where it is not S, and how far that came."""
     last = view.calibrated
@@ -176,9 +177,9 @@ def _named(view: TrialView) -> Statement | None:
         answer=f"On the score of {', '.join(last.score_of)}, which is not S and not to be "
         f"compared with it. In the last window it is {mark.value:.2f}; a perfect model would score "
         f"{mark.ceiling:.2f} (95 % of its windows between {mark.low:.2f} and {mark.high:.2f}). "
-        + (f"It lies above these: {OVERFITTING}. " if _is_above(mark) else "")
+        + (f"It lies above these: {OVERFITTING}. " if is_above(mark) else "")
         + "S above is of D, W, O and T alone, and was not optimised.",
-        figure=(_percent(mark), _OF_PERFECT + (_TOO_MUCH if _is_above(mark) else "")),
+        figure=figure_of(mark),
     )
 
 
@@ -223,10 +224,12 @@ def _worst(view: TrialView) -> Statement | None:
     what = named(feature).phrase
     where = f" in the zone {zone}" if zone else ""
     if _shortfall(mark) < _NOTICED:
-        answer = (
-            f"Nothing stands out: the least alike are {what}{where}, and they still "
-            f"reach {_percent(mark)} of their ceiling."
+        reached = (
+            "lie above the range of their ceiling, by chance"
+            if is_above(mark)
+            else f"still reach {share_of(mark)} of their ceiling"
         )
+        answer = f"Nothing stands out: the least alike are {what}{where}, and they {reached}."
     else:
         answer = (
             f"Most of all {what}{where}: {mark.value:.2f} where a perfect model would "
@@ -321,7 +324,7 @@ def _robot(view: TrialView) -> Statement | None:
     return Statement(
         question="Does the robot move like a fish?",
         answer=answer,
-        figure=(_percent(mark), "of what a fish in its place scores"),
+        figure=figure_of(mark, "of what a fish in its place scores", _LIKER),
     )
 
 
@@ -367,11 +370,6 @@ def _parameters(view: TrialView) -> Statement | None:
 
 def _windows(n: int) -> str:
     return "1 window" if n == 1 else f"{n} windows"
-
-
-def _percent(mark: Mark) -> str:
-    share = mark.against_ceiling
-    return "no ceiling" if math.isnan(share) else f"{100 * share:.0f} %"
 
 
 def _shortfall(mark: Mark) -> float:

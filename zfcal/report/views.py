@@ -18,8 +18,9 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.behaviour.features.registry import SCORED, named
 from zfcal.behaviour.statistics import Statistics
 from zfcal.parameters import Parameters
+from zfcal.report.driven import Driven
 from zfcal.report.followed import Followed
-from zfcal.report.seen import Seen
+from zfcal.report.seen import Seen, Visits
 from zfcal.trial import Trial
 
 MODEL = "model-vs-control"
@@ -30,6 +31,9 @@ FEATURE_NAMES: Mapping[str, str] = MappingProxyType(
     {name: named(name).label for name in SCORED} | {"S": "Biomimetic score S"}
 )
 """The features, by the paper's letters, in its order."""
+
+FEW = 100
+"""A histogram of fewer observations, ten for each bin, is hardly more than chance."""
 
 PUBLISHED_S = ((180, 0.610), (300, 0.827), (360, 0.850))
 """Second and S of the published reference (mean of 10 trials); the last holds from then on."""
@@ -183,6 +187,8 @@ class Round:
         The score of the statistics that it was calibrated on, with its ceiling; None for S.
     score_of
         Names of these statistics.
+    hypervolume
+        Of the population, generation by generation; empty where the file does not say.
     """
 
     second: int
@@ -193,6 +199,7 @@ class Round:
     published: Published | None = None
     score: Mark | None = None
     score_of: tuple[str, ...] = ()
+    hypervolume: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,6 +261,8 @@ class TrialView:
     model_statistics
         What the last calibrated model does in a long simulation; None without
         one, and where it is not shown.
+    model_visits
+        Where that model's fish are in a long simulation; None as for its statistics.
     seen
         All agents; None without tracks.
     integration
@@ -263,6 +272,8 @@ class TrialView:
     rule_scores
         Forward scores of the rules by which models are published, in the order of their windows;
         empty where rules were not judged.
+    driven
+        How quick the robot was driven, drive by drive; those that are closed.
     following
         Whether fish follow the robot; None where it was not measured.
     left_out
@@ -273,6 +284,8 @@ class TrialView:
         ``paper`` or ``legacy``, as the scores say.
     has_control_trials
         Whether the control group is the fish of other trials.
+    published
+        Whether the published scores, which are of other fish, are to stand beside its own.
     """
 
     root: Path
@@ -285,12 +298,15 @@ class TrialView:
     seen: Seen | None
     integration: Integration
     sources: Sequence[Source]
+    model_visits: Visits | None = None
     rule_scores: Sequence[RuleScore] = ()
+    driven: tuple[Driven, ...] = ()
     following: Followed | None = None
     left_out: Sequence[str] = ()
     label: str = ""
     scoring: str = "paper"
     has_control_trials: bool = False
+    published: bool = False
 
     @property
     def name(self) -> str:

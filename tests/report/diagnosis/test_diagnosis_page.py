@@ -563,6 +563,7 @@ def test_a_candidate_that_needs_more_minutes_is_hollow(make_sheet):
         "distance to the wall (cm)",
         "speed of the step before (cm/s)",
         "time (min)",
+        "the last turn (degrees to the left)",
     ],
 )
 def test_the_curve_is_called_after_what_it_goes_by(make_sheet, two_rooms, covered_texts, cue):
@@ -575,6 +576,24 @@ def test_the_curve_is_called_after_what_it_goes_by(make_sheet, two_rooms, covere
     assert not covered_texts(picture)
     # As on the page, where each panel has a place of its own.
     assert not covered_texts(replace(picture, panels=picture.panels[2:3], key=()))
+
+
+def test_all_panels_show_one_score_in_the_same_marks(make_sheet, two_rooms):
+    """By what the effect responds to as by minute: what is left, near zero for a right model."""
+    pictured = make_sheet().findings.pictured[0]
+    curve = pictured.curve
+    picture = finding_picture("alignment", 1, pictured, two_rooms)
+    figure = compose(picture)
+    by_minute, by_cue = figure.axes[1], figure.axes[2]
+
+    for axes in (by_minute, by_cue):
+        assert axes.get_ylabel() == "score"
+        assert [line.get_marker() for line in axes.get_lines()][-2:] == ["^", "D"]
+        assert axes.collections
+    without, with_it = by_cue.get_lines()[-2:]
+    assert without.get_ydata() == pytest.approx(curve.observed - curve.before)
+    assert with_it.get_ydata() == pytest.approx(curve.observed - curve.after)
+    assert not [entry for entry in picture.key if entry.label == "measured"]
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_every_colour_stands_out_from_its_ground(mode):
     (ground,) = shown([theme.GROUND], mode)
 
     assert min(contrast(c, ground) for c in shown((*CASES, *theme.ZONES), mode)) > 3
-    assert min(contrast(c, ground) for c in shown((theme.INK, theme.MUTED), mode)) > 4.5
+    assert min(contrast(c, ground) for c in shown((theme.INK, theme.MUTED, theme.WARN), mode)) > 4.5
 
 
 def test_a_contrast_by_hand():

@@ -59,6 +59,8 @@ STATISTICS = (
         phrase="the times of stay in a zone",
         observe=observe,
         edges=lambda _: np.array(_EDGES_S),
+        # Time is cut into windows of that length.
+        bounded=True,
         unit="s",
         title="Time of a stay",
         axis="time of a stay",

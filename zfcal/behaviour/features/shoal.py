@@ -96,6 +96,7 @@ STATISTICS = (
         phrase="the polarisation of the group",
         observe=observe_polarisation,
         edges=lambda _: bin_edges((0.0, 1.0)),
+        bounded=True,
         per_zone=False,
         title="Polarisation of the group",
         axis="length of the mean direction",

@@ -118,6 +118,9 @@ class Statistic:
         For ``bins``: gives the edges of the bins in an arena, ascending; at most ten bins.
         A bin holds its lower edge, the last one what lies beyond as well, and the first
         what lies below.
+    bounded
+        For ``bins``: whether nothing can lie beyond the last edge. Where something can,
+        pictures set the last bin apart.
     per_zone
         For ``bins``: whether each zone has a histogram, rather than the group.
     unit
@@ -142,6 +145,7 @@ class Statistic:
     observe: Observe = field(repr=False)
     form: Form = "bins"
     edges: Callable[[Arena], Floats] | None = None
+    bounded: bool = False
     per_zone: bool = True
     unit: str = ""
     title: str = ""

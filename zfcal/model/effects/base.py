@@ -195,7 +195,7 @@ class Effect:
         eight times as much.
     shown_against
         What pictures show its statistic against: the ``time``, the ``speed`` of the step before,
-        the distance to the ``wall`` or to the nearest ``neighbour``.
+        the last ``turn``, the distance to the ``wall`` or to the nearest ``neighbour``.
     generic
         Whether it is of the generic family, which names no mechanism.
     other_forms
@@ -238,7 +238,7 @@ class Effect:
     by_trait: bool = False
     by_place: bool = False
     per_hour: bool = False
-    shown_against: Literal["time", "speed", "wall", "neighbour"] = "neighbour"
+    shown_against: Literal["time", "speed", "turn", "wall", "neighbour"] = "neighbour"
     generic: bool = False
     other_forms: tuple[str, ...] = ()
     looks_like: Likeness | None = None

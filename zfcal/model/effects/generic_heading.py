@@ -235,10 +235,13 @@ _ASKED: dict[str, tuple[Callable[[Arena], Shapes], Callable[[Company], str | Non
     "own-turn": (_each("carried", -1.0, 0.0, 1.0), _anywhere),
 }
 
-_SHOWN: dict[str, Literal["time", "speed", "wall"]] = {
+_SHOWN: dict[str, Literal["time", "speed", "turn", "wall"]] = {
     "wall": "wall",
     "wall-time": "wall",
+    "place": "wall",
+    "place-time": "time",
     "time": "time",
+    "own-turn": "turn",
     "own-speed": "speed",
 }
 """What pictures show a cue against, where that is no neighbour."""

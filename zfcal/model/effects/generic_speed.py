@@ -151,9 +151,11 @@ _ASKED: dict[str, Callable[[Arena], Shapes]] = {
     "time": _times,
 }
 
-_SHOWN: dict[str, Literal["time", "speed", "wall"]] = {
+_SHOWN: dict[str, Literal["time", "speed", "turn", "wall"]] = {
     "wall": "wall",
+    "place": "wall",
     "time": "time",
+    "own-turn": "turn",
     "own-speed": "speed",
 }
 """What pictures show a cue against, where that is no neighbour."""

@@ -102,7 +102,7 @@ EFFECT = Effect(
     ),
     fixed=("along_walls", "forgets_wide"),
     identity_s=0.8,
-    shown_against="wall",
+    shown_against="turn",
     # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep
     # their heading, which is no memory of turns, and what real fish do most.
     control=Control(name="a shuffled turn", states=_shuffled),

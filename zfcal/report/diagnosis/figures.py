@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.diagnose.pictured import Curve, Parts, Pictured
+from zfcal.diagnose.pictured import Parts, Pictured
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls
 from zfcal.report.figures.panels import PANEL_IN, Entry, Panel, Picture
@@ -26,7 +26,7 @@ _FEWEST_STEPS = 10
 _DEEPEST = 0.98
 """The squares above this quantile share the deepest colour."""
 
-WITHOUT, WITH, MEASURED = theme.MODEL, theme.GROUP, theme.FISH
+WITHOUT, WITH = theme.MODEL, theme.GROUP
 
 
 def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) -> Picture:
@@ -53,7 +53,7 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
     made = [
         place,
         _parts_panel("When", pictured.minutes, _draw_minutes, "minute"),
-        _curve_panel(pictured.curve),
+        _curve_panel(pictured),
         _parts_panel("In whom", pictured.agents, _draw_agents, "track"),
     ]
     return Picture(
@@ -63,14 +63,13 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
         panels=[panel for panel in made if panel is not None],
         columns=2,
         key=(
-            Entry(label="measured", colour=MEASURED, mark="points", marker="o"),
             Entry(label="model without the effect", colour=WITHOUT, mark="dash", marker="^"),
             Entry(label="model with it", colour=WITH, mark="line", marker="D"),
             Entry(label="95 % of a right model", colour=theme.BAND, mark="band"),
         ),
-        note="The score tells how much more of the effect the fish show than the model expects: "
-        "zero where the model is right, in standard deviations of a single step. The map is of "
-        "the model without the effect.",
+        note="In all panels the score tells how much more of the effect the fish show than the "
+        "model expects: zero where the model is right, in standard deviations of a single step. "
+        "The map is of the model without the effect.",
     )
 
 
@@ -168,28 +167,32 @@ def _draw_agents(axes: Axes, *, parts: Parts) -> None:
     theme.name_ticks(axes, at, [str(label) for label in parts.label])
 
 
-def _curve_panel(curve: Curve) -> Panel | None:
+def _curve_panel(pictured: Pictured) -> Panel | None:
+    curve = pictured.curve
     known = ~np.isnan(curve.observed)
     if not known.any():
         return None
-    errors = [
-        float(np.sqrt(np.nanmean((curve.observed - expected)[known] ** 2)))
-        for expected in (curve.before, curve.after)
-    ]
+    left = [curve.observed - expected for expected in (curve.before, curve.after)]
+    sizes = [float(np.sqrt(np.nanmean(scores[known] ** 2))) for scores in left]
     return Panel(
         title=f"By {_without_unit(curve.cue_name)}",
-        alt=f"{curve.response_name} against {curve.cue_name}: the model misses what was measured "
-        f"by {errors[0]:.3g} without the effect and by {errors[1]:.3g} with it (root mean square).",
-        draw=partial(_draw_curve, curve=curve),
+        alt=f"Score by {curve.cue_name}, of the model without the effect {sizes[0]:.3g} and with "
+        f"it {sizes[1]:.3g} in size (root mean square).",
+        draw=partial(_draw_curve, pictured=pictured, left=left),
         size_in=PANEL_IN,
     )
 
 
-def _draw_curve(axes: Axes, *, curve: Curve) -> None:
-    axes.plot(curve.cue, curve.before, color=WITHOUT, ls="--", marker="^")
-    axes.plot(curve.cue, curve.after, color=WITH, marker="D")
-    axes.plot(curve.cue, curve.observed, color=MEASURED, ls="none", marker="o", ms=6, zorder=4)
-    axes.set(xlabel=_lines(curve.cue_name, 42), ylabel=_lines(curve.response_name, 28))
+def _draw_curve(axes: Axes, *, pictured: Pictured, left: list[Floats]) -> None:
+    """Draw what each model leaves unexplained, as the other panels do; bins are equally full."""
+    cue = pictured.curve.cue
+    n = pictured.minutes.n.sum() / len(cue)
+    half = np.full(len(cue), 1.96 / np.sqrt(max(n, 1.0)))
+    axes.fill_between(cue, -half, half, color=theme.BAND, alpha=0.3, lw=0)
+    axes.axhline(0, color=theme.MUTED, lw=0.8)
+    axes.plot(cue, left[0], color=WITHOUT, ls="--", marker="^", zorder=3)
+    axes.plot(cue, left[1], color=WITH, marker="D", zorder=3)
+    axes.set(xlabel=_lines(pictured.curve.cue_name, 42), ylabel="score")
     axes.xaxis.set_major_locator(MaxNLocator(6))
 
 

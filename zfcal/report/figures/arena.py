@@ -64,7 +64,7 @@ def _panel(arena: Arena, width_in: float) -> Panel:
     return Panel(
         title=f"{x1 - x0:.2f} by {y1 - y0:.2f} m",
         alt=f"Plan of the arena {arena.name}, {x1 - x0:.2f} by {y1 - y0:.2f} m, zones {names}.",
-        draw=lambda axes: _draw(axes, arena, width_in, field),
+        draw=lambda axes: _draw(axes, arena, field),
         size_in=arena_size_in(arena, width_in),
     )
 
@@ -136,7 +136,8 @@ def paint_walls(axes: Axes, arena: Arena, *, water: str = theme.GROUND) -> None:
     axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), aspect="equal")
     axes.set(xlabel="x (m)", ylabel="y (m)")
     for axis, length_m in ((axes.xaxis, x1 - x0), (axes.yaxis, y1 - y0)):
-        axis.set_major_locator(MaxNLocator(max(1, round(5 * length_m / arena.extent_m))))
+        steps = min(5, theme.letters_across(axes) // 7) * length_m / arena.extent_m
+        axis.set_major_locator(MaxNLocator(max(1, round(steps))))
 
 
 def paint_zones(axes: Axes, arena: Arena, *, alpha: float) -> None:
@@ -156,12 +157,12 @@ def paint_zones(axes: Axes, arena: Arena, *, alpha: float) -> None:
             )
 
 
-def _draw(axes: Axes, arena: Arena, width_in: float, field: _Field) -> None:
+def _draw(axes: Axes, arena: Arena, field: _Field) -> None:
     axes.grid(visible=False)
     paint_walls(axes, arena)
     paint_zones(axes, arena, alpha=0.35)
     _paint_distances(axes, arena, field)
-    _paint_names(axes, arena, m_per_in=arena.extent_m / (width_in - 0.9))
+    _paint_names(axes, arena, m_per_in=arena.extent_m / theme.width_in_of(axes))
     _paint_scale(axes, arena)
 
 

@@ -9,6 +9,8 @@ they were drawn; the PNG puts them on a grid.
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -28,6 +30,18 @@ _HOLLOW = frozenset({"reference", "hollow"})
 
 PANEL_IN = (3.75, 2.6)
 """Width and height of a panel: 360 pixels wide, what a phone shows."""
+
+_NARROWEST_IN = 1.6
+"""Of a panel on paper: a column of 85 mm has two beside each other."""
+
+_LOWEST_IN = 1.5
+_KEY_LINE_IN = 0.22
+_PAPER_SCALE = 0.83
+"""Letters on paper over those on the screen."""
+
+_MARGIN_IN = 0.35
+_TITLE_LETTER_IN = 0.068
+"""What a letter of a title takes on paper, and what is left of a panel beside its axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,20 +135,37 @@ def png_of(picture: Picture) -> bytes:
     return made.getvalue()
 
 
-def compose(picture: Picture) -> Figure:
-    """Return all panels of a picture on one figure, its title above, its key below."""
+def compose(picture: Picture, *, width_in: float | None = None) -> Figure:
+    """Return all panels of a picture on one figure, its key below.
+
+    Parameters
+    ----------
+    picture
+        With at least one panel.
+    width_in
+        Width on paper, in inches: as many panels beside each other as have room, each with a
+        letter. None for the screen: panels have the size for which they were drawn, and
+        their title stands above.
+    """
+    on_paper = width_in is not None
     columns = min(picture.columns, len(picture.panels))
+    if width_in is not None:
+        columns = max(1, min(columns, int(width_in / _NARROWEST_IN)))
     rows = math.ceil(len(picture.panels) / columns)
-    widths = [max(p.size_in[0] for p in picture.panels[i::columns]) for i in range(columns)]
-    width = sum(widths)
-    height = max(panel.size_in[1] for panel in picture.panels)
-    key_columns = _key_columns(picture.key, width)
-    extra_in = 0.3 + 0.22 * math.ceil(len(picture.key) / key_columns)
+    width, height = _size(picture, columns, width_in)
+    key_columns = _key_columns(picture.key, width, on_paper=on_paper)
+    line_in = _KEY_LINE_IN * (_PAPER_SCALE if on_paper else 1.0)
+    extra_in = line_in * math.ceil(len(picture.key) / key_columns) + (0.05 if on_paper else 0.3)
     figure = theme.new_figure(width, rows * height + extra_in)
-    figure.suptitle(picture.title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+    if not on_paper:
+        figure.suptitle(picture.title, x=0.01, ha="left", fontsize=11, fontweight="bold")
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, panel in zip(grid, picture.panels, strict=False):
+    several = len(picture.panels) > 1
+    for index, (axes, panel) in enumerate(zip(grid, picture.panels, strict=False)):
         _fill(axes, panel)
+        if on_paper:
+            title = f"{_letter(index)}  {panel.title}" if several else panel.title
+            axes.set_title(_broken(title, width / columns), color=panel.colour, loc="left")
     for axes in grid[len(picture.panels) :]:
         axes.remove()
     if picture.key:
@@ -146,9 +177,34 @@ def compose(picture: Picture) -> Figure:
     return figure
 
 
-def _key_columns(key: Sequence[Entry], width_in: float) -> int:
+def _size(picture: Picture, columns: int, width_in: float | None) -> tuple[float, float]:
+    """Return the width of a figure and the height of its rows, in inches."""
+    widths = [max(p.size_in[0] for p in picture.panels[i::columns]) for i in range(columns)]
+    height = max(panel.size_in[1] for panel in picture.panels)
+    if width_in is None:
+        return sum(widths), height
+    # Letters take their room however small the panel is.
+    shape = max(p.size_in[1] / p.size_in[0] for p in picture.panels)
+    return width_in, max(_LOWEST_IN, shape * width_in / columns)
+
+
+def _letter(index: int) -> str:
+    return chr(ord("a") + index) if index < 26 else str(index + 1)
+
+
+def _broken(title: str, width_in: float) -> str:
+    """Return a title on as many lines as a panel of a width needs."""
+    letters = max(int((width_in - _MARGIN_IN) / _TITLE_LETTER_IN), 12)
+    # A number keeps its unit.
+    held = re.sub(r"(\d) (?=[a-z]{1,3}\b)", "\\1\u00a0", title)
+    lines = textwrap.wrap(held, letters, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines)
+
+
+def _key_columns(key: Sequence[Entry], width_in: float, *, on_paper: bool = False) -> int:
     """Return how many entries stand beside each other without leaving the figure."""
-    longest_in = 0.6 + 0.078 * max((len(entry.label) for entry in key), default=0)
+    scale = _PAPER_SCALE if on_paper else 1.0
+    longest_in = scale * (0.6 + 0.078 * max((len(entry.label) for entry in key), default=0))
     return max(1, min(len(key), int(width_in / longest_in)))
 
 

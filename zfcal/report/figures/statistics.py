@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
-from matplotlib.ticker import MaxNLocator
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats, Ints
@@ -19,41 +16,27 @@ from zfcal.behaviour.features.statistic import Statistic
 from zfcal.behaviour.histograms import frequencies
 from zfcal.behaviour.statistics import Statistics
 from zfcal.report.figures import theme
+from zfcal.report.figures.histograms import (
+    COLOURS,
+    FISH_CASE,
+    MODEL_CASE,
+    ROBOT_CASE,
+    Histogram,
+    centres_of,
+    draw_as_told,
+    draw_histogram,
+    leave_room,
+    remarks_of,
+    write_remark,
+)
 from zfcal.report.figures.panels import PANEL_IN, Entry, Mark, Panel, Picture
 
-_FISH_CASE = "fish"
-_MODEL_CASE = "model"
-_ROBOT_CASE = "robot"
-_COLOURS = MappingProxyType(
-    {_FISH_CASE: theme.FISH, _MODEL_CASE: theme.MODEL, _ROBOT_CASE: theme.ROBOT}
-)
 _MANY_ZONES = 5
 _READING = (
-    "Each bar is the share of all observations in its zone; the last bin also holds what lies "
-    "beyond it. In the transition tables a row tells where an animal is one step later."
+    "Each bar is the share of all n observations of the fish in its zone. A last bin that holds "
+    "all that lies beyond, however far, stands apart and has a ≥. In the transition tables a row "
+    "tells where an animal is one step later."
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Histogram:
-    """What one panel of bins shows.
-
-    Parameters
-    ----------
-    counts
-        Counts of each bin, for each case.
-    edges
-        Edges of the bins.
-    axis
-        Label of the x axis.
-    statistic
-        What is counted; says how two cases are compared.
-    """
-
-    counts: Mapping[str, Ints]
-    edges: Floats
-    axis: str
-    statistic: Statistic
 
 
 def statistics_picture(cases: Mapping[str, Statistics], arena: Arena, *, title: str) -> Picture:
@@ -89,7 +72,7 @@ def _panels(statistic: Statistic, cases: Mapping[str, Statistics], arena: Arena)
         if statistic.name in stats.names
         and stats.of(statistic.name).shape == statistic.shape(arena)
     }
-    if _FISH_CASE not in counts:
+    if FISH_CASE not in counts:
         return
     if statistic.form == "zones":
         yield _occupation(statistic, counts, arena.zone_names)
@@ -105,7 +88,7 @@ def _histograms(statistic: Statistic, counts: Mapping[str, Ints], arena: Arena) 
     edges = statistic.edges_in(arena)
     unit = f" ({statistic.unit})" if statistic.unit else ""
     for row, zone in enumerate(arena.zone_names if statistic.per_zone else (None,)):
-        shown = _Histogram(
+        shown = Histogram(
             counts={case: table[row] for case, table in counts.items()},
             edges=edges,
             axis=f"{statistic.axis}{unit}",
@@ -119,44 +102,53 @@ def _histograms(statistic: Statistic, counts: Mapping[str, Ints], arena: Arena) 
 
 def _note(cases: Mapping[str, Statistics]) -> str:
     parts = [_READING]
-    if _MODEL_CASE in cases:
+    if MODEL_CASE in cases:
         parts.append(
             "The number in a panel is the similarity of fish and model there, 1 for equal."
         )
-    if _ROBOT_CASE in cases:
+    if ROBOT_CASE in cases:
         parts.append("For the robot, distances between two fish are those of robot and fish.")
     return " ".join(parts)
 
 
 def _entry(case: str) -> Entry:
     labels = {
-        _FISH_CASE: "fish, as observed",
-        _MODEL_CASE: "calibrated model, long simulation",
-        _ROBOT_CASE: "robot, as observed",
+        FISH_CASE: "fish, as observed",
+        MODEL_CASE: "calibrated model, long simulation",
+        ROBOT_CASE: "robot, as observed",
     }
-    if case == _FISH_CASE:
-        return Entry(label=labels[case], colour=_COLOURS[case], mark="bar")
-    mark: Mark = "line" if case == _MODEL_CASE else "dot"
-    marker = theme.MARKER_OF[_COLOURS[case]]
-    return Entry(label=labels[case], colour=_COLOURS[case], mark=mark, marker=marker)
+    if case == FISH_CASE:
+        return Entry(label=labels[case], colour=COLOURS[case], mark="bar")
+    mark: Mark = "line" if case == MODEL_CASE else "dot"
+    marker = theme.MARKER_OF[COLOURS[case]]
+    return Entry(label=labels[case], colour=COLOURS[case], mark=mark, marker=marker)
 
 
-def _histogram(title: str, shown: _Histogram, colour: str) -> Panel:
+def _histogram(title: str, shown: Histogram, colour: str) -> Panel:
     unit = shown.statistic.unit
     means = "; ".join(
         f"{case} mean {mean:.3f} {unit}".rstrip()
         for case, counts in shown.counts.items()
         if not np.isnan(mean := histogram_mean(counts, shown.edges))
     )
-    draw = partial(_draw_histogram, shown=shown)
+    said = f"{means or 'no observation'}; {_said_of_fish(shown)}"
+    draw = partial(draw_histogram, shown=shown)
     if shown.statistic.draw is not None:
-        draw = partial(_draw_as_told, shown=shown)
+        draw = partial(draw_as_told, shown=shown)
     return Panel(
         title=title,
-        alt=f"Histogram, {title.lower()}: {means or 'no observation'}.",
+        alt=f"Histogram, {title.lower()}: {said}.",
         draw=draw,
         colour=colour,
     )
+
+
+def _said_of_fish(shown: Histogram) -> str:
+    """Return of how many observations the fish's bars are, and how many lie beyond."""
+    fish = shown.counts[FISH_CASE]
+    n = int(fish.sum())
+    beyond = "" if shown.statistic.bounded or not n else f", {fish[-1] / n:.0%} in the last bin"
+    return f"{n} observations of fish{beyond}"
 
 
 def histogram_mean(counts: Ints, edges: Floats) -> float:
@@ -174,61 +166,7 @@ def histogram_mean(counts: Ints, edges: Floats) -> float:
         In the unit of the edges; NaN without a count.
     """
     total = counts.sum()
-    return float(counts @ _centres(edges) / total) if total else float("nan")
-
-
-def _centres(edges: Floats) -> Floats:
-    return (edges[1:] + edges[:-1]) / 2
-
-
-def _draw_as_told(axes: Axes, *, shown: _Histogram) -> None:
-    """Leave it to the statistic, and say how alike the cases are."""
-    if shown.statistic.draw is not None:
-        shown.statistic.draw(axes, shown.counts)
-    axes.set(xlabel=shown.axis)
-    _remark(axes, shown.counts, shown.statistic)
-
-
-def _draw_histogram(axes: Axes, *, shown: _Histogram) -> None:
-    widths = np.diff(shown.edges)
-    is_even = bool(np.allclose(widths, widths[0]))
-    # Bins of unequal width are drawn side by side: to scale the small ones could not be seen.
-    edges = shown.edges if is_even else np.arange(len(shown.edges), dtype=np.float64)
-    centres = _centres(edges)
-    top = 0.0
-    for case, counts in shown.counts.items():
-        share = frequencies(counts)
-        if np.isnan(share).all():
-            continue
-        top = max(top, float(share.max()))
-        if case == _FISH_CASE:
-            width = 0.92 * (edges[1] - edges[0])
-            axes.bar(centres, share, width=width, color=_COLOURS[case], alpha=0.45, lw=0)
-        else:
-            style = "-" if case == _MODEL_CASE else ":"
-            marker = theme.MARKER_OF[_COLOURS[case]]
-            axes.plot(centres, share, color=_COLOURS[case], ls=style, marker=marker)
-    limits = (float(edges[0]), float(edges[-1]))
-    axes.set(xlabel=shown.axis, ylabel="share", xlim=limits, ylim=(0, top * 1.22 or 1))
-    if is_even:
-        axes.xaxis.set_major_locator(MaxNLocator(5))
-    else:
-        axes.set_xticks(edges[::2], [f"{edge:g}" for edge in shown.edges[::2]])
-    _remark(axes, shown.counts, shown.statistic)
-
-
-def _remark(axes: Axes, counts: Mapping[str, Ints], statistic: Statistic) -> None:
-    """Write how alike fish and model are, or who was never seen here."""
-    empty = [case for case, values in counts.items() if not values.sum()]
-    text = ""
-    if len(empty) == len(counts):
-        text = "none seen"
-    elif empty:
-        text = "none seen: " + ", ".join(empty)
-    elif {_FISH_CASE, _MODEL_CASE} <= counts.keys():
-        alike = float(statistic.compare(counts[_FISH_CASE], counts[_MODEL_CASE]))
-        text = f"similarity {alike:.2f}"
-    axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, color=theme.MUTED)
+    return float(counts @ centres_of(edges) / total) if total else float("nan")
 
 
 def _occupation(statistic: Statistic, counts: Mapping[str, Ints], zones: Sequence[str]) -> Panel:
@@ -255,28 +193,29 @@ def _draw_occupation(
 ) -> None:
     at = np.arange(len(zones))
     width = 0.8 / len(counts)
-    hatches = {_ROBOT_CASE: "....", _MODEL_CASE: "////"}
+    hatches = {ROBOT_CASE: "....", MODEL_CASE: "////"}
     top = 0.0
     for index, (case, values) in enumerate(counts.items()):
         share = 100 * np.nan_to_num(frequencies(values))
         top = max(top, float(share.max()))
         x = at + (index - (len(counts) - 1) / 2) * width
-        bars = axes.bar(x, share, width=0.92 * width, color=_COLOURS[case], alpha=0.45, lw=0)
+        bars = axes.bar(x, share, width=0.92 * width, color=COLOURS[case], alpha=0.45, lw=0)
         if case in hatches:
             for bar in bars:
                 bar.set(hatch=hatches[case], edgecolor=theme.GROUND, alpha=0.6)
         for left, value in zip(x, share, strict=True):
             axes.annotate(
                 f"{value:.0f}", (left, value), xytext=(0, 2), textcoords="offset points",
-                ha="center", fontsize=8,
+                ha="center", fontsize=theme.small_pt(),
             )  # fmt: skip
     theme.name_ticks(axes, at, zones)
     colours = theme.zone_colours(zones)
     for label, zone in zip(axes.get_xticklabels(), zones, strict=True):
         label.set(color=colours[zone], fontweight="bold")
-    axes.set(ylabel="% of the time", ylim=(0, top * 1.22 or 1))
+    axes.set(ylabel="% of the time")
+    leave_room(axes, top, 100.0, remarks_of(counts, statistic))
     axes.grid(visible=False, axis="x")
-    _remark(axes, counts, statistic)
+    write_remark(axes, counts, statistic)
 
 
 def _transitions(statistic: Statistic, case: str, counts: Ints, *, zones: Sequence[str]) -> Panel:
@@ -289,20 +228,21 @@ def _transitions(statistic: Statistic, case: str, counts: Ints, *, zones: Sequen
         alt=f"Table of transitions of the {case} between zones; stays: {stays or 'none seen'}.",
         draw=partial(_draw_transitions, share=share, zones=zones),
         size_in=(PANEL_IN[0], max(PANEL_IN[1], 0.5 * len(zones) + 1.1)),
-        colour=_COLOURS[case],
+        colour=COLOURS[case],
     )
 
 
 def _draw_transitions(axes: Axes, *, share: Floats, zones: Sequence[str]) -> None:
     # Stays are near one and moves near zero: a square root makes both visible.
     axes.pcolormesh(share, cmap="Blues", norm=PowerNorm(0.5, 0.0, 1.0), rasterized=False)
+    digits = 3 if theme.letters_across(axes) > 7 * len(zones) else 2
     for row, column in np.ndindex(share.shape):
         value = share[row, column]
         known = not np.isnan(value)
         axes.text(
             column + 0.5,
             row + 0.5,
-            f"{value:.3f}" if known and value else ("0" if known else "none"),
+            f"{value:.{digits}f}" if known and value else ("0" if known else "none"),
             ha="center",
             va="center",
             color="#fbfcfd" if known and value > 0.3 else "#101418" if known else theme.MUTED,

@@ -22,6 +22,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
@@ -31,8 +32,11 @@ INK = "#1b1f24"
 MUTED = "#59636e"
 _GRID = "#dde2e8"
 GROUND = "#ffffff"
+WARN = "#8a4b00"
+"""Of what is too little to be read."""
+
 BAND = "#8b95a1"
-"""The ceiling, its interval and the spread over trials."""
+"""The ceiling and its range, and nothing else."""
 
 FISH = "#16497a"
 MODEL = "#d55e00"
@@ -48,6 +52,7 @@ THEME: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         MUTED: ("muted", MUTED, "#a3adb8"),
         _GRID: ("grid", _GRID, "#343b43"),
         GROUND: ("ground", GROUND, "#16191d"),
+        WARN: ("warn", WARN, "#ffc069"),
         BAND: ("band", BAND, "#7d8793"),
         FISH: ("fish", FISH, "#a9cdec"),
         MODEL: ("model", MODEL, "#e8701a"),
@@ -68,9 +73,11 @@ MARKER_OF = MappingProxyType({FISH: "o", MODEL: "^", ROBOT: "s", GROUP: "D"})
 
 _KNOWN_ZONES = {"corridor": 0, "walls": 1, "centre": 2, "inner": 0, "middle": 1, "outer": 2}
 
+FONT = "DejaVu Sans"
+
 _STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
+    "font.sans-serif": [FONT],
     "font.size": 9,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
@@ -104,11 +111,36 @@ _STYLE: dict[str, Any] = {
     # Text stays text: it can be searched, read aloud and takes the page's colour.
     "svg.fonttype": "none",
     "svg.hashsalt": "zfcal",
+    "pdf.fonttype": 42,
 }
 
-PNG_DPI = 150
+_ON_PAPER: dict[str, Any] = {
+    "font.size": 7.5,
+    "axes.titlesize": 7.5,
+    "axes.titlepad": 4,
+    "axes.labelsize": 7.5,
+    "axes.labelpad": 2,
+    "axes.linewidth": 0.6,
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.fontsize": 7,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.2,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 3,
+    "hatch.linewidth": 0.6,
+}
+"""What a journal asks for: letters of 7 to 8 points at the width of print."""
 
-_LETTERS_PER_PANEL = 44
+PNG_DPI = 150
+PAPER_DPI = 300
+
+_LETTER = 0.6
+"""Width of a letter, in sizes of the font."""
+
 _REM_PER_PT = 1 / 11.6
 """A letter of 12 points is a little larger than one of 16 pixels."""
 
@@ -141,13 +173,19 @@ def zone_markers(names: Sequence[str]) -> dict[str, str]:
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """Draw and save in the report's style, whatever a person's own settings are."""
+def style(*, on_paper: bool = False) -> Iterator[None]:
+    """Draw and save in the report's style, whatever a person's own settings are.
+
+    Parameters
+    ----------
+    on_paper
+        Whether the letters are those of print.
+    """
     with mpl.rc_context(), warnings.catch_warnings():
         # A zone may be named in letters that the font lacks; on the page they are shown.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+        mpl.rcParams.update(_STYLE | (_ON_PAPER if on_paper else {}))  # type: ignore[arg-type]
         yield
 
 
@@ -174,10 +212,30 @@ def name_ticks(axes: Axes, at: Ints | NDArray[np.floating], names: Sequence[str]
     """Put names below an x axis, slanted where they would run into each other."""
     labels = [wrapped(name) for name in names]
     longest = max(len(line) for label in labels for line in label.split("\n"))
-    if longest * len(names) > _LETTERS_PER_PANEL:
+    if longest * len(names) > letters_across(axes):
         axes.set_xticks(at, labels, rotation=30, ha="right", rotation_mode="anchor")
     else:
         axes.set_xticks(at, labels)
+
+
+def small_pt() -> float:
+    """Return the size of the smallest letters, in points."""
+    return float(FontProperties(size=mpl.rcParams["xtick.labelsize"]).get_size_in_points())
+
+
+def width_in_of(axes: Axes) -> float:
+    """Return about how wide axes will be, in inches."""
+    return float(axes.get_window_extent().width / axes.figure.dpi)
+
+
+def height_in_of(axes: Axes) -> float:
+    """Return about how high axes will be below their title, in inches."""
+    return float(0.8 * axes.get_window_extent().height / axes.figure.dpi)
+
+
+def letters_across(axes: Axes) -> int:
+    """Return how many letters of tick labels stand beside each other below axes."""
+    return round(width_in_of(axes) * 72 / (_LETTER * small_pt()))
 
 
 def save_png(figure: Figure, path: Path | BytesIO) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import shapely
@@ -21,8 +22,8 @@ from zfcal.report.seen import Seen, Visits, grid_of
 from zfcal.tracks import FISH, KINDS, ROBOT
 from zfcal.units import WINDOW_S
 
-_WIDTH_IN = 3.4
-_BAR_IN = 0.6
+WIDTH_IN = 3.4
+BAR_IN = 0.6
 """Room for the bar that tells what the colours of a map mean."""
 
 _SLIVER = 0.3
@@ -43,7 +44,7 @@ def tracks_picture(seen: Seen) -> Picture | None:
     if not seen.n_points:
         return None
     arena = seen.arena
-    width_in, height_in = arena_size_in(arena, _WIDTH_IN)
+    width_in, height_in = arena_size_in(arena, WIDTH_IN)
     start_s = max(float(seen.first_k) * seen.dt_s, seen.end_s - WINDOW_S)
     paths = Panel(
         title=f"Paths, {start_s:.0f} to {seen.end_s:.0f} s",
@@ -51,13 +52,13 @@ def tracks_picture(seen: Seen) -> Picture | None:
         draw=partial(_draw_paths, located=seen.last),
         size_in=(width_in, height_in),
     )
-    area_m2 = _area_inside_m2(arena)
+    area_m2 = area_inside_m2(arena)
     maps = [
         Panel(
             title=f"{KINDS[kind].capitalize()}, all {seen.end_s:.0f} s",
-            alt=_describe_map(visits, arena.zone_names, KINDS[kind]),
+            alt=describe_map(visits, arena.zone_names, KINDS[kind]),
             draw=partial(_draw_density, arena=arena, visits=visits, area_m2=area_m2),
-            size_in=(width_in + _BAR_IN, height_in),
+            size_in=(width_in + BAR_IN, height_in),
         )
         for kind, visits in seen.visits.items()
     ]
@@ -80,7 +81,8 @@ def _count(located: Located) -> str:
     return " and ".join(f"{n} {kind} tracks" for kind, n in ids.items() if n) or "nobody"
 
 
-def _describe_map(visits: Visits, names: tuple[str, ...], who: str) -> str:
+def describe_map(visits: Visits, names: tuple[str, ...], who: str) -> str:
+    """Return what a map shows, for those who cannot see it: the share of time in each zone."""
     share = visits.zones / visits.zones.sum()
     said = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share[1:], strict=True))
     return f"Map of where the {who} spent the time: {said}."
@@ -117,21 +119,47 @@ def path_pieces(located: Located) -> list[Floats]:
 
 
 def _draw_density(axes: Axes, *, arena: Arena, visits: Visits, area_m2: Floats) -> None:
-    axes.grid(visible=False)
-    paint_walls(axes, arena)
-    _, extent = grid_of(arena)
+    times = times_as_even(visits, arena, area_m2)
+    draw_map(axes, arena, times, brightest_of(times))
+
+
+def times_as_even(visits: Visits, arena: Arena, area_m2: Floats) -> np.ma.MaskedArray[Any, Any]:
+    """Return how many times as long animals were in each square as if spread evenly.
+
+    Parameters
+    ----------
+    visits
+        How often they were where.
+    arena
+        The tank.
+    area_m2 : ndarray, shape (row, column)
+        From `area_inside_m2`; squares outside are masked.
+    """
     # A square that the wall cuts to a sliver would stand out for a single visit.
     floor_m2 = _SLIVER * float(area_m2.max())
     times = density(visits) * arena.outline.area / np.maximum(area_m2, floor_m2)
-    times = np.ma.masked_array(times, area_m2 <= 0)
-    brightest = float(np.quantile(times.compressed(), _BRIGHTEST))
+    return np.ma.masked_array(times, area_m2 <= 0)
+
+
+def brightest_of(times: np.ma.MaskedArray[Any, Any]) -> float:
+    """Return where the colours of a map end, at least at evenly spread."""
+    return max(float(np.quantile(times.compressed(), _BRIGHTEST)), 1.0)
+
+
+def draw_map(
+    axes: Axes, arena: Arena, times: np.ma.MaskedArray[Any, Any], brightest: float
+) -> None:
+    """Draw a map of where animals were, with the bar that tells what its colours mean."""
+    axes.grid(visible=False)
+    paint_walls(axes, arena)
+    _, extent = grid_of(arena)
     # A square root: else the corner where a fish rests is all that is seen.
     image = axes.imshow(
         times,
         extent=extent,
         origin="lower",
         cmap="viridis",
-        norm=PowerNorm(0.5, 0.0, max(brightest, 1.0)),
+        norm=PowerNorm(0.5, 0.0, brightest),
         interpolation="nearest",
         zorder=1,
     )
@@ -148,7 +176,7 @@ def density(visits: Visits) -> Floats:
     return visits.cells / max(visits.cells.sum(), 1.0)
 
 
-def _area_inside_m2(arena: Arena) -> Floats:
+def area_inside_m2(arena: Arena) -> Floats:
     """Return how much of each square of the grid lies in the tank, in square metres."""
     shape, extent = grid_of(arena)
     x, dx = np.linspace(*extent[:2], shape[1], endpoint=False, retstep=True)

@@ -1,0 +1,70 @@
+"""What a report shows, and in which form its figures are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from zfcal.artifacts.lineage import JSON
+
+FORMATS = ("png", "svg", "pdf")
+FILMS = ("mp4", "gif")
+WIDTHS_MM: Mapping[str, float] = MappingProxyType({"single": 85.0, "double": 174.0})
+"""Columns of a journal by their names, in millimetres."""
+
+NARROWEST_MM, WIDEST_MM = 60.0, 400.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Printing:
+    """In which form pictures become files.
+
+    Parameters
+    ----------
+    formats
+        Of `FORMATS`, at least one.
+    width_mm
+        Width on paper, in millimetres; None for the screen.
+    """
+
+    formats: tuple[str, ...] = ("png",)
+    width_mm: float | None = None
+
+
+FOR_THE_SCREEN = Printing()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportOptions:
+    """How a report is made.
+
+    Parameters
+    ----------
+    published
+        Whether the published scores, which are of other fish, stand beside the trials' own.
+    printing
+        In which form the figures are files.
+    film
+        Of `FILMS`; None for none.
+    """
+
+    published: bool = False
+    printing: Printing = FOR_THE_SCREEN
+    film: str | None = None
+
+    def as_lineage(self) -> dict[str, JSON]:
+        """Return what differs from the usual, as a report's lineage holds it."""
+        said: dict[str, JSON] = {}
+        if self.published:
+            said["published"] = True
+        if self.printing.formats != FOR_THE_SCREEN.formats:
+            said["format"] = list(self.printing.formats)
+        if self.printing.width_mm is not None:
+            said["width_mm"] = self.printing.width_mm
+        if self.film is not None:
+            said["film"] = self.film
+        return said
+
+
+AS_USUAL = ReportOptions()
