@@ -412,7 +412,8 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
     effects
         Those without features are left out.
     """
-    fits, also = Fits(law=law), []
+    fits = Fits(law=law)
+    also: list[Component | Turned] = []
     for effect in effects:
         for feature in effect.features(law.scene.arena):
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
