@@ -214,6 +214,10 @@ def test_likely_noise_is_held_against_none(question):
         )
         looks = looking._Looks(case=noisy, screen=case.screen, beside=())
         assert [law.noise_m for law in looks.laws] == levels
+        # Of exact positions the exact law is likelier: then nothing is gained over the noisy one.
+        gains = looks.gains([find_effect("turning-bias")], ())
+        assert {gain.without_noise for gain in gains} == {is_likely}
+        assert len(gains) == len(find_effect("turning-bias").features(case.scene.arena))
         explained = dataclasses.replace(looks, without_noise=True)
         assert [law.noise_m for law in explained.laws] == [0.0]
 

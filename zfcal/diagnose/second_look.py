@@ -186,11 +186,14 @@ class _Looks:
     def gains(self, effects: Sequence[Effect], beside: Sequence[Effect]) -> list[Gain]:
         """Return what features of effects gain."""
         n_workers = self.case.question.n_workers
-        first, *others = self.laws
-        found = gains_of(first, effects, beside=beside, n_workers=n_workers)
-        beyond = fits_beside(first, beside).null_log_p if others else None
-        for law in others:
-            found += gains_of(law, effects, beside=beside, beyond=beyond, n_workers=n_workers)
+        noisy, *exact = self.laws
+        if not exact:
+            return gains_of(noisy, effects, beside=beside, n_workers=n_workers)
+        nulls = [fits_beside(law, beside).null_log_p for law in self.laws]
+        if nulls[1].sum() > nulls[0].sum():  # What is there explains what noise had seemed to.
+            return gains_of(exact[0], effects, beside=beside, n_workers=n_workers)
+        found = gains_of(noisy, effects, beside=beside, n_workers=n_workers)
+        found += gains_of(exact[0], effects, beside=beside, beyond=nulls[0], n_workers=n_workers)
         return found
 
     def tell(self) -> Told | None:

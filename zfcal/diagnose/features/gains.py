@@ -70,7 +70,7 @@ class Gain:
     noise_nats
         What noise of positions alone makes it gain.
     without_noise
-        Whether it gains that by the law of exact positions, over that of noisy ones.
+        Whether it gains that by the law of exact positions.
     """
 
     name: str
@@ -164,7 +164,7 @@ class Fits:
             made = made + self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n,
-            without_noise=self.beyond is not None,
+            without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
 
     def best_of(self, name: str, choice: OneOf) -> list[Gain]:
