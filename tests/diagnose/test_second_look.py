@@ -15,9 +15,11 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told
 from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.second_look import Found, _noise_nats, _stays, second_look
+from zfcal.diagnose.selection import Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 
@@ -176,7 +178,11 @@ def step(name, screen, nats=20.0):
     """Return an effect that was named, in a model of that screen."""
     effect = SimpleNamespace(effect=find_effect(name))
     best = SimpleNamespace(candidate=effect, screen=screen, nats=nats, name=name)
-    return SimpleNamespace(choice=SimpleNamespace(best=best))
+    return Step(
+        choice=Choice(best=best, ties=(), considered=(best,)),
+        best=Best(score="score", z=9.0, p=1e-9, information=1.0),
+        before="before",
+    )
 
 
 def found(*names, nats=20.0, **more):
@@ -231,16 +237,28 @@ def test_effects_that_the_model_came_with_are_there(question, fish, looked):
         assert [effect.name for effect in looked[0].pop()[0].beside] == [name] * n
 
 
-def test_the_first_effect_on_headings_is_held_against_features(question, looked):
-    """In the model before it: those on speed stay, and all after it goes."""
+def test_the_first_effect_on_headings_is_held_against_features(question, looked, monkeypatch):
+    """In the model before it: those on speed stay or are added anew, others after it go."""
     case, (calls, answers) = open_case(question()), looked
-    before = found("crowding", "alignment", "fatigue")
+
+    def anew(_case, screen, name):
+        assert screen == "with reaction-delay"
+        return step(name, f"{screen} and {name}").choice.best, "its score there"
+
+    monkeypatch.setattr(looking, "_in_the_model", anew)
+    before = found("crowding", "alignment", "turning-bias", "fatigue")
     answers.append(found("reaction-delay", without_noise=True))
     now = second_look(case, before)
     assert calls[0][0].screen == "with crowding"
     assert calls[0][1] == {"there": before.steps[1]}
-    assert [each.choice.best.name for each in now.steps] == ["crowding", "reaction-delay"]
-    assert now.confirmed == ("crowding", "reaction-delay")
+    names = ["crowding", "reaction-delay", "fatigue"]
+    assert [each.choice.best.name for each in now.steps] == names
+    assert list(now.confirmed) == names
+    assert now.steps[-1].choice.best.screen == "with reaction-delay and fatigue"
+    assert (now.steps[-1].before, now.steps[-1].best.score) == (
+        "with reaction-delay",
+        "its score there",
+    )
 
 
 def test_further_effects_are_looked_for_beside_what_is_there(question, looked):

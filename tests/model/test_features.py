@@ -129,6 +129,42 @@ def test_who_is_not_there_has_no_weight(arena, seen):
                 assert not each.weights(alone).any(), (name, each.label)
 
 
+def test_attention_that_can_but_be_lost_and_leanings_of_one_sign(arena):
+    """Fish that flee each other show no cohesion, and who attends to the far no range."""
+    for name in ("alignment", "group-cohesion"):
+        for each in features_of(name, arena):
+            assert each.low == 0.0, (name, each.label)
+    for name in ("interaction-range", "rear-blind-zone"):
+        (each,) = features_of(name, arena)
+        assert each.high == 0.0
+
+
+def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
+    """Nobody to follow: no strength. Of short pieces of tracks none has one of its own."""
+    who = {
+        name: next(each for each in features_of(name, arena) if each.label == "who")
+        for name in ("leader-following", "boldness")
+    }
+    alone = dataclasses.replace(seen, is_robot=np.ones((N, OTHERS), dtype=bool))
+    assert who["leader-following"].weights(alone).shape == (N, OTHERS, 0)
+    many = dataclasses.replace(
+        seen,
+        other=np.arange(N * OTHERS, dtype=np.int32).reshape(N, OTHERS),
+        track=np.arange(N, dtype=np.int32),
+    )
+    assert who["boldness"].weights(many).shape[1] <= 11
+    assert who["leader-following"].weights(many).shape[2] in (0, N * OTHERS - N - 1)
+
+
+def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
+    """There the base forgets the heading, and a heading before is but the present one."""
+    unknown = dataclasses.replace(seen, last_turn_rad=np.array([0.0, 0.2] * (N // 2)))
+    drawn, leaning = features_of("turning-memory", arena)[1:]
+    expected = (~seen.follows_walls) & (unknown.last_turn_rad != 0)
+    np.testing.assert_array_equal(drawn.weights(unknown)[:, 0, 0], expected)
+    np.testing.assert_array_equal(leaning.vectors(unknown)[:, 0].any(axis=1), expected)
+
+
 def test_a_late_response_takes_from_the_present_one(arena, seen):
     """At a strength of one all attention goes to where the others were."""
     for each in features_of("reaction-delay", arena):

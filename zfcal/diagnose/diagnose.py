@@ -87,7 +87,7 @@ class _Judged:
     """Effects that stand, of those that were selected; the omnibus test with them in the model.
 
     ``confirmed`` holds what held-out steps say of all that were selected, ``halves`` how far the
-    fits of the two halves differ.
+    fits of the two halves differ; ``without_noise`` is of `Found`.
     """
 
     kept: tuple[Step, ...]
@@ -95,6 +95,7 @@ class _Judged:
     halves: Note
     omnibus: Omnibus
     suspicious: bool
+    without_noise: bool = False
 
 
 def diagnose(question: Question, tell: Tell) -> Diagnosis:
@@ -179,7 +180,11 @@ def _looked_again(case: Case, judged: _Judged) -> _Judged:
     if found is None:
         return judged
     return dataclasses.replace(
-        judged, kept=found.steps, confirmed=found.confirmed, suspicious=False
+        judged,
+        kept=found.steps,
+        confirmed=found.confirmed,
+        suspicious=False,
+        without_noise=found.without_noise,
     )
 
 
@@ -314,6 +319,11 @@ def _diagnosis(
         for number, (step, held) in enumerate(zip(steps, judged.confirmed, strict=False), start=1)
     )
     final = steps[-1].choice.best.screen if steps else case.screen
+    question = case.question
+    if judged.without_noise:
+        question = dataclasses.replace(
+            question, noise_m=0.0, noise_source="the law of headings, with what was found"
+        )
     screened = _screened(case, selection.screened)
     return Diagnosis(
         verdict=_verdict(effects, screened, suspicious=judged.suspicious or selection.left_over),
@@ -321,7 +331,7 @@ def _diagnosis(
         effects=effects,
         screened=screened,
         notes=notes_of(
-            case.question, final, judged.halves, judged.omnibus, [row.controls for row in rows]
+            question, final, judged.halves, judged.omnibus, [row.controls for row in rows]
         ),
         base=case.screen.fitted.parameters,
         extended=final.fitted.parameters,

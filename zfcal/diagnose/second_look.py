@@ -82,6 +82,8 @@ def second_look(case: Case, before: Found) -> Found | None:
     looks = _Looks(case=case, screen=screen, beside=tuple(known))
     first = _named(looks, there=there)
     found = before if first is None else _with(before, n, first)
+    if first is not None:
+        found = _with_speeds(case, found, before, n)
     while True:
         named = [step for step in found.steps if _on_headings(step)]
         if not named or len(named) >= _MOST_EFFECTS:
@@ -102,6 +104,23 @@ def second_look(case: Case, before: Found) -> Found | None:
 
 def _on_headings(step: Step) -> bool:
     return not step.choice.best.candidate.effect.on_speed
+
+
+def _with_speeds(case: Case, found: Found, before: Found, n: int) -> Found:
+    """Return what was found with the effects on speed that had been added after step ``n``."""
+    for step, confirmed in zip(before.steps[n:], before.confirmed[n:], strict=False):
+        if _on_headings(step):
+            continue
+        screen = found.steps[-1].choice.best.screen
+        made, score = _in_the_model(case, screen, step.choice.best.name)
+        again = dataclasses.replace(
+            step,
+            choice=dataclasses.replace(step.choice, best=made),
+            best=dataclasses.replace(step.best, score=score),
+            before=screen,
+        )
+        found = _with(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
+    return found
 
 
 def _with(found: Found, n: int, further: Found) -> Found:
@@ -138,6 +157,9 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
         before=screen,
     )
     (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
+    if found.values[found.candidate.effect.strength] == 0.0:
+        # No form of ours goes that way: it is another effect, which the list does not have.
+        return None
     is_borne_out = _gains(found) and _is_steady(confirmed, found.screen, screen)
     if not (is_borne_out or told.lead > _BY_ITSELF or looks.explains(told)):
         return None
@@ -189,18 +211,25 @@ class _Looks:
         noisy, *exact = self.laws
         if not exact:
             return gains_of(noisy, effects, beside=beside, n_workers=n_workers)
-        nulls = [fits_beside(law, beside).null_log_p for law in self.laws]
+        nulls = [self._null(noisy, beside), fits_beside(exact[0], beside).null_log_p]
         if nulls[1].sum() > nulls[0].sum():  # What is there explains what noise had seemed to.
             return gains_of(exact[0], effects, beside=beside, n_workers=n_workers)
         found = gains_of(noisy, effects, beside=beside, n_workers=n_workers)
         found += gains_of(exact[0], effects, beside=beside, beyond=nulls[0], n_workers=n_workers)
         return found
 
+    @staticmethod
+    def _null(noisy: Law, beside: Sequence[Effect]) -> Floats:
+        """Return log densities by the law of noisy positions, as of many draws (Richardson)."""
+        half = dataclasses.replace(noisy, n_draws=noisy.n_draws // 2)
+        all_, some = (fits_beside(law, beside).null_log_p for law in (noisy, half))
+        return 2 * all_ - some
+
     def tell(self) -> Told | None:
         """Return which name it is; None where chance may have made all gains."""
         case, gains = self.case, self.gains(self._asked, self.beside)
         is_noisy = self.laws[0].noise_m > 0
-        noise = (lambda clear: _noise_nats(case, clear)) if is_noisy else None
+        noise = (lambda clear: _noise_nats(case, clear, self.beside)) if is_noisy else None
         told = tell(gains, noise)
         return None if told is None else self._settled(told)
 
@@ -231,8 +260,7 @@ class _Looks:
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         """Return whether features of an effect gain more than chance beside those of another."""
-        gains = self.gains([effect], [*self.beside, beside])
-        return min((gain.p for gain in gains), default=1.0) < LEVEL
+        return tell(self.gains([effect], [*self.beside, beside]), None) is not None
 
 
 def _gains(form: Refit) -> bool:
@@ -286,14 +314,17 @@ def _stays(there: Refit, told: Told, law: Law) -> bool:
     return ahead < -SURE * error if there.is_generic else ahead < SURE * error
 
 
-def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
-    """Return what features gain on replicates of the model: their mean and two deviations more."""
+def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()) -> list[float]:
+    """Return what features gain on replicates of the model: their mean and two deviations more.
+
+    The model is that without the effects that were found; their features are fitted as well.
+    """
     keys = [gain.key for gain in clear]
     effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
 
     def ask(_number: int, other: Screen) -> list[float]:
         law = _law(case, other, noise_of(case.question))
-        found = gains_of(law, effects, kinds=set(keys))
+        found = gains_of(law, effects, kinds=set(keys), beside=beside)
         most: dict[tuple[str, str], float] = {}
         for gain in found:
             most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))
@@ -306,7 +337,7 @@ def _noise_nats(case: Case, clear: Sequence[Gain]) -> list[float]:
 
 def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
     """Return an effect in the model in that form which gains most, and its score there."""
-    own = [each for each in case.listed if each.name == name]
+    own = [each for each in (*case.listed, *case.generic) if each.name == name]
     own += further_forms(find_effect(name), case.scene.arena)
     scores = ask_all(screen, own, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}

@@ -146,10 +146,13 @@ class Tilt:
         Tells it from other features of the effect.
     vectors
         Direction times weight, shape (step, weight, 2).
+    low
+        Lower bound of the strengths, where the opposite is no form of the effect.
     """
 
     label: str
     vectors: Weights
+    low: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,11 +167,14 @@ class Turned:
         The angle at a strength of one, shape (step,).
     neighbours
         Whether those to neighbours turn as well.
+    low
+        Lower bound of the strength, where the opposite is no form of the effect.
     """
 
     label: str
     by: Callable[[Seen], Floats]
     neighbours: bool
+    low: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -240,7 +246,9 @@ def attended(weights: Weights) -> Weights:
     return lambda seen: seen.attention[..., None] * weights(seen)
 
 
-def factor_on_attention(weights: Weights, label: str = "attention") -> Component:
+def factor_on_attention(
+    weights: Weights, label: str = "attention", high: float | None = None
+) -> Component:
     """Return a factor on what fish attend to of the others: 1 + strength times weight, never none.
 
     Parameters
@@ -249,8 +257,10 @@ def factor_on_attention(weights: Weights, label: str = "attention") -> Component
         Shape (step, other, weight).
     label
         Of the feature.
+    high
+        Upper bound of the strengths: 0 where attention can but be lost.
     """
-    return Component(label=label, toward="toward", weights=attended(weights), low=_LEAST)
+    return Component(label=label, toward="toward", weights=attended(weights), low=_LEAST, high=high)
 
 
 def evenly(seen: Seen) -> Floats:

@@ -131,7 +131,7 @@ class Fits:
     def _columns(self, feature: Component | Turned) -> tuple[Columns, list[Bounds]]:
         """Return the columns of a feature, and the bounds of its strengths."""
         if isinstance(feature, Turned):
-            return self.law.turned(feature), [(-_MOST_TURN, _MOST_TURN)]
+            return self.law.turned(feature), [(_low(feature, _MOST_TURN), _MOST_TURN)]
         columns = self.law.component(feature)
         return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 
@@ -267,7 +267,8 @@ class Fits:
             return value, -np.append(gradient, slope)
 
         n_strengths = vectors.shape[1]
-        x = self._climb_from_null(objective, n_strengths, _MOST_TILT)
+        bounds = [(_low(feature, _MOST_TILT), _MOST_TILT)] * n_strengths
+        x = self._climb_from_null(objective, bounds)
         log_p = _log_mixed(density(x), x[-1]) - base
         return log_p, np.einsum("sbd,b->sd", vectors, x[:-1]), n_strengths
 
@@ -280,7 +281,7 @@ class Fits:
             value, _, slope = _mixed(at, x[-1])
             return value, np.array([-slope])
 
-        x = self._climb_from_null(objective, 0, 0.0)
+        x = self._climb_from_null(objective, [])
         return _log_mixed(at, x[-1])
 
     def leaving(self, feature: Leaving) -> tuple[Floats, Floats, int]:
@@ -313,16 +314,23 @@ class Fits:
                 value, own, slope = _mixed(found, x[-1])
                 return value, -np.append(columns.T @ (own * (landed - chance)), slope)
 
-            x = self._climb_from_null(objective, columns.shape[1], _MOST_LEAVING)
+            bounds = [(-_MOST_LEAVING, _MOST_LEAVING)] * columns.shape[1]
+            x = self._climb_from_null(objective, bounds)
             return _log_mixed(density(x)[0], x[-1]), columns @ x[:-1]
 
         null, _ = fitted(each * may_)
         log_p, log_factor = fitted(np.concatenate([each, weights], axis=1) * may_)
         return log_p - null, log_factor, weights.shape[1]
 
-    def _climb_from_null(self, objective: Objective, n: int, most: float) -> Floats:
-        x0 = np.append(np.zeros(n), logit(self._lapse))
-        return _climb(objective, x0, [(-most, most)] * n)
+    def _climb_from_null(
+        self, objective: Objective, bounds: Sequence[tuple[float, float]]
+    ) -> Floats:
+        x0 = np.append(np.zeros(len(bounds)), logit(self._lapse))
+        return _climb(objective, x0, bounds)
+
+
+def _low(feature: Tilt | Turned, most: float) -> float:
+    return -most if feature.low is None else feature.low
 
 
 def _mixed(density: Floats, level: float) -> tuple[float, Floats, float]:
@@ -396,7 +404,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
-    return [gain for some in found for gain in some]
+    # One fish has nobody to follow: then a feature of who is who has no strength at all.
+    return [gain for some in found for gain in some if gain.n_strengths]
 
 
 def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
@@ -418,22 +427,27 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
         for feature in effect.features(law.scene.arena):
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
             for each in chosen:
-                if isinstance(each, Component):
-                    # The model's form of it may have too much of this.
-                    low = min(each.low, -(each.high or _MOST_LESS))
-                    also.append(replace(each, low=low))
-                elif isinstance(each, Turned):
-                    also.append(each)
+                if isinstance(each, Component | Turned):
+                    also.append(_either_way(each))
                 elif isinstance(each, Tilt) or law.between:
                     law = _absorbed(law, each)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
 
 
+def _either_way(feature: Component | Turned) -> Component | Turned:
+    """Return a feature that may also take away: a model's form of its effect may have too much."""
+    if isinstance(feature, Turned):
+        return replace(feature, low=None)
+    low = -(feature.high or _MOST_LESS) if feature.low == 0.0 else feature.low
+    return replace(feature, low=low, high=feature.high or None)
+
+
 def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
     """Return a law with a tilt or a factor on leaving, if that gains more than chance."""
     fits = Fits(law=law)
     if isinstance(feature, Tilt):
+        feature = replace(feature, low=None)
         gain, there, n = fits.tilt(feature)
     else:
         gain, there, n = fits.leaving(feature)

@@ -50,14 +50,14 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
         Asked of those alone that stand out; None for positions that are exact.
     """
     n_tried = sum(gain.n_tried for gain in _once(gains))
-    clear = [gain for gain in gains if gain.p * n_tried < LEVEL]
+    clear = [gain for gain in gains if gain.p * n_tried < LEVEL and gain.nats > 0]
     if noise is not None:
         ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
         doubted = [g for g in clear if g.name in ahead and not g.without_noise]
         known = zip(doubted, noise(doubted) if doubted else (), strict=True)
         clear = [gain for gain in clear if gain.without_noise and gain.name in ahead]
         clear += [replace(gain, noise_nats=nats) for gain, nats in known]
-        clear = [gain for gain in clear if gain.p * n_tried < LEVEL]
+        clear = [gain for gain in clear if gain.p * n_tried < LEVEL and gain.nats > 0]
     best = best_by_name(clear)
     if not best:
         return None
@@ -79,8 +79,8 @@ def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
 
 
 def _once(gains: Sequence[Gain]) -> list[Gain]:
-    """Return gains with one of those that are the best of the same features."""
-    return list({gain.key: gain for gain in gains}.values())
+    """Return gains with one of those that are the best of the same features by the same law."""
+    return list({(gain.key, gain.without_noise): gain for gain in gains}.values())
 
 
 def _lead(one: Gain, other: Gain) -> float:

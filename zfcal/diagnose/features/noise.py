@@ -39,7 +39,7 @@ def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0) -> float:
     Returns
     -------
     float
-        In metres; 0 where no noise is likelier than 0.1 mm.
+        In metres; 0 or 0.1 mm where that is likelier than twice as much, which is exact enough.
     """
     every = max(1, int(fitted.used.sum()) // _STEPS)
 
@@ -55,8 +55,8 @@ def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0) -> float:
         if found[-1] < found[-2]:
             break
     k = int(np.argmax(found)) - 1
-    if k < 0:
-        return 0.0
+    if k < 1:
+        return 0.0 if k < 0 else _TRIED_M[0]
     return _peak(_TRIED_M[k], found[k : k + 3])
 
 

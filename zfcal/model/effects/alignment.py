@@ -134,9 +134,9 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0),
     Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0),
     Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
-    Tilt(label="leaning", vectors=_summed),
-    Tilt(label="leaning, the mean", vectors=_mean),
-    Turned(label="turning", by=_toward_mean, neighbours=False),
+    Tilt(label="leaning", vectors=_summed, low=0.0),
+    Tilt(label="leaning, the mean", vectors=_mean, low=0.0),
+    Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0),
 )
 
 

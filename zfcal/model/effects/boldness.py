@@ -28,6 +28,10 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     return tilt(own, 1.0 if landing != state[ZONE * n + i] else -1.0, 1.0)
 
 
+_MOST_TRACKS = 12
+"""Of so many fish each is held apart; short pieces of tracks count as the others."""
+
+
 def _shapes(arena: Arena) -> Shapes:
     shares = (1.0, 0.0) if find_rooms(arena)[0] else (1.0,)
     return tuple({"heading_share": share} for share in shares)
@@ -38,9 +42,10 @@ def _lacks(company: Company) -> str | None:
 
 
 def _who(seen: Seen) -> Floats:
-    """Return one for each track but the first, shape (step, track - 1)."""
-    tracks = np.unique(seen.track)
-    return (seen.track[:, None] == tracks[1:]).astype(np.float64)
+    """Return one for each of the longest tracks but one, shape (step, track)."""
+    tracks, n_steps = np.unique(seen.track, return_counts=True)
+    longest = tracks[np.argsort(-n_steps, kind="stable")][1:_MOST_TRACKS]
+    return (seen.track[:, None] == np.sort(longest)).astype(np.float64)
 
 
 def _leaning(seen: Seen) -> Floats:

@@ -94,8 +94,8 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0),
     Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
     Component(label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0),
-    Tilt(label="leaning", vectors=_leaning),
-    Tilt(label="leaning to each", vectors=_leaning_to_each),
+    Tilt(label="leaning", vectors=_leaning, low=0.0),
+    Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0),
 )
 
 

@@ -23,7 +23,7 @@ def _attention(seen: Seen) -> Floats:
     return hats(seen.distance_m, _KNOTS_M)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
+_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention, high=0.0),)
 
 
 EFFECT = Effect(

@@ -43,7 +43,7 @@ def _who(seen: Seen) -> Floats:
     fish = np.unique(np.where(seen.is_robot, -1, seen.other))
     fish = fish[fish >= 0]
     if len(fish) > _MOST_FISH:
-        return np.zeros((*seen.other.shape, 1))
+        return np.zeros((*seen.other.shape, 0))
     return np.asarray((seen.other[..., None] == fish[1:]) & ~seen.is_robot[..., None], float)
 
 

@@ -31,7 +31,7 @@ def _attention(seen: Seen) -> Floats:
     return hats(seen.off_axis_rad, _KNOTS_RAD)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
+_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention, high=0.0),)
 
 
 EFFECT = Effect(

@@ -41,8 +41,13 @@ def _before(seen: Seen) -> Floats:
     return only(_heading_before(seen))
 
 
+def _remembers(seen: Seen) -> Floats:
+    """Return one where the turn before is known and no wall is followed: there all forget."""
+    return np.where(seen.follows_walls | (seen.last_turn_rad == 0), 0.0, 1.0)
+
+
 def _one(seen: Seen) -> Floats:
-    return np.ones((len(seen.zone), 1, 1))
+    return _remembers(seen)[:, None, None]
 
 
 def _heading_before(seen: Seen) -> Floats:
@@ -54,7 +59,8 @@ def _heading_before(seen: Seen) -> Floats:
 def _leaning(seen: Seen) -> Floats:
     """Return what of the heading before is aside of the present one: that is the memory."""
     left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
-    return np.asarray((np.sin(seen.last_turn_rad)[:, None] * left)[:, None])
+    aside = _remembers(seen) * np.sin(seen.last_turn_rad)
+    return np.asarray((aside[:, None] * left)[:, None])
 
 
 _FEATURES: tuple[Feature, ...] = (
