@@ -181,3 +181,21 @@ def test_a_law_without_some_zone_leaves_its_turns_out(base):
     some = Law(scene=scene, fitted=dataclasses.replace(fitted, log_p=log_p))
     assert (some.turns.zone != 1).all()
     assert len(some.base[0]) == len(some.rows) < len(scene.turns)
+
+
+def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
+    """Twice half a factor is a whole one; draws are not made anew."""
+    scene, fitted = base
+    law = Law(scene=scene, fitted=fitted, noise_m=5e-4, n_draws=2)
+    rng = np.random.default_rng(2)
+    leaning, leaving = rng.normal(0, 0.1, (len(law.rows), 2)), rng.normal(0, 0.1, len(law.rows))
+    once = law.absorbing(leaning=leaning, leaving=leaving)
+    twice = law.absorbing(leaning=leaning / 2).absorbing(leaning=leaning / 2, leaving=leaving)
+    assert twice.draws is law.draws
+    np.testing.assert_allclose(once.cells, twice.cells)
+    np.testing.assert_allclose(once.log_here, twice.log_here)
+    assert not np.allclose(once.cells, law.cells)
+    # By hand: the factor at the heading taken, and that of the zone of landing.
+    by_hand = law.log_here + (leaning * law.turns.taken).sum(axis=1)
+    by_hand += leaving * (law.turns.landing == law.between)
+    np.testing.assert_allclose(once.log_here, by_hand)

@@ -454,8 +454,8 @@ def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
     if chdtrc(n, 2 * max(float(gain.sum()), 0.0)) > LEVEL:
         return law
     if isinstance(feature, Tilt):
-        return replace(law, leaning=there if law.leaning is None else law.leaning + there)
-    return replace(law, leaving=there if law.leaving is None else law.leaving + there)
+        return law.absorbing(leaning=there)
+    return law.absorbing(leaving=there)
 
 
 def kind_of(feature: Feature) -> str:
