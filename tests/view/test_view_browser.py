@@ -188,7 +188,7 @@ def test_it_plays_and_every_key_does_what_it_says(browser, trial):
         browser.press("-")
         assert browser.value("document.getElementById('speed').value") == "5"
         browser.press("End")
-        browser.until(f"{SECOND} === 180")
+        browser.until(f"{SECOND} === 180 && {DRAWN} === '4'")
         bar = "document.getElementById('time')"
         assert browser.value(f"{bar}.getAttribute('aria-valuetext')") == "3:00 of 3:00"
         browser.value(f"{bar}.value = 90; {bar}.dispatchEvent(new Event('input'))")

@@ -47,7 +47,9 @@ export function then(second, starts) {
     const found = recentAt(second);
     if (found.agents.length) return found;
   }
-  const start = Math.floor(second / 60) * 60;
+  const begun = Math.floor(second / 60) * 60;
+  // The end of the last minute is the beginning of none.
+  const start = second === begun && !starts.includes(begun) ? begun - 60 : begun;
   if (!starts.includes(start)) return { agents: [], target: null };
   const next = starts[starts.indexOf(start) + 1];
   if (next !== undefined && second - start > 40) fetched(next);
