@@ -36,8 +36,10 @@ def test_it_shows_the_trial_and_asks_for_nothing_elsewhere(browser, trial, tmp_p
         browser.value("document.getElementById('play').click()")
         browser.press("End")
         assert browser.until("document.getElementById('s').innerText === '0.800'")
-        assert browser.value(text_of("s-of")) == "of 0.900"
-        assert "89 % of its ceiling" in browser.value(text_of("s-note"))
+        assert browser.value(text_of("s-of")) == "ceiling 0.900"
+        assert "within what windows of the model" in browser.value(text_of("s-note"))
+        levels = browser.value("document.getElementById('rounds').textContent")
+        assert levels.startswith("0.00.20.40.60.81.0")
         assert "1.00 to 9.00" in browser.value(text_of("parameters"))
         assert "published by the rule nearest" in browser.value(text_of("parameters-note"))
         assert browser.value(text_of("stage-rows")).split() == [
@@ -48,7 +50,9 @@ def test_it_shows_the_trial_and_asks_for_nothing_elsewhere(browser, trial, tmp_p
         assert re.search(
             r"at \d:\d\d: 3 fish; .*the robot in", browser.until(f"{label}.length > 30 && {label}")
         )
-        assert "3:00: 0.80 of 0.90" in browser.value("document.getElementById('rounds').ariaLabel")
+        assert "3:00: 0.80 (ceiling 0.90, within" in browser.value(
+            "document.getElementById('rounds').ariaLabel"
+        )
         assert browser.problems() == []
         hosts = {urlsplit(address).netloc for address in browser.asked_for()}
         assert hosts <= {urlsplit(page.url).netloc, ""}
@@ -121,6 +125,45 @@ def test_it_says_that_the_server_is_gone_and_comes_back_by_itself(browser, trial
         browser.until("document.getElementById('rounds').ariaLabel.includes('4:00: 0.85')")
 
 
+def test_after_ten_minutes_without_a_server_it_asks_for_a_reload(browser, trial):
+    """Whoever has the port by then shall not hear the secret."""
+    with Page(trial, 0) as page:
+        port = urlsplit(page.url).port
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+    browser.until(f"{LINK} === 'Server gone, tries again'")
+    later = "(() => { const now = performance.now(); performance.now = () => now + 6e5 })()"
+    browser.value(later)
+    browser.until(f"{LINK} === 'Server gone, reload'")
+    assert "reload the page" in browser.value(text_of("alarm"))
+    with Page(trial, port):
+        time.sleep(3)
+        assert browser.value("document.documentElement.dataset.link") == "gone"
+
+
+def test_a_minute_that_was_played_while_it_grew_is_played_to_where_it_is(browser, empty, made):
+    """What was fetched of it once is not all."""
+    second = "document.getElementById('time')"
+    go = f"(s => {{ {second}.value = s; {second}.dispatchEvent(new Event('input')) }})"
+    with Page(empty, 0) as page, made["poses"](empty, 0) as writer:
+        for n in range(10):
+            writer.add(made["poses_at"](n / 5))
+        browser.go(page.url)
+        browser.until(f"{LINK} === 'Replay' && {DRAWN} === '3'")
+        browser.value(f"{go}(1)")
+        browser.until(f"{SECOND} === 1 && {DRAWN} === '3'")
+        for n in range(10, 220):
+            writer.add(made["poses_at"](n / 5))
+        browser.until(f"{second}.max === '44'")
+        browser.value(f"{go}(20)")
+        browser.until(f"{SECOND} === 20 && {DRAWN} === '3'")
+        for n in range(220, 290):
+            writer.add(made["poses_at"](n / 5))
+        browser.until(f"{second}.max === '58'")
+        browser.value(f"{go}(50)")
+        browser.until(f"{SECOND} === 50 && {DRAWN} === '3'")
+
+
 def test_it_plays_and_every_key_does_what_it_says(browser, trial):
     """Space, arrows, with shift, the ends, speeds; at the end it stops."""
     with Page(trial, 0) as page:
@@ -145,7 +188,7 @@ def test_it_plays_and_every_key_does_what_it_says(browser, trial):
         browser.press("-")
         assert browser.value("document.getElementById('speed').value") == "5"
         browser.press("End")
-        browser.until(f"{SECOND} === 180")
+        browser.until(f"{SECOND} === 180 && {DRAWN} === '4'")
         bar = "document.getElementById('time')"
         assert browser.value(f"{bar}.getAttribute('aria-valuetext')") == "3:00 of 3:00"
         browser.value(f"{bar}.value = 90; {bar}.dispatchEvent(new Event('input'))")

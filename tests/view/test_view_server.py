@@ -4,11 +4,14 @@ import asyncio
 import contextlib
 import http.client
 import json
+import math
 import os
+import resource
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from urllib.parse import urlsplit
 
@@ -57,7 +60,7 @@ def hear(page):
     line = http.client.HTTPConnection(parts.hostname, parts.port, timeout=STARTS_S)
     line.request("GET", parts.path + "events")
     answer, found = line.getresponse(), []
-    while not found or found[-1][0] != "beat":
+    while not {"state", "faults", "beat"} <= {kind for kind, _ in found}:
         kind = answer.readline().decode().removeprefix("event: ").strip()
         found.append((kind, json.loads(answer.readline().decode().removeprefix("data: "))))
         answer.readline()
@@ -76,6 +79,9 @@ def test_only_who_knows_the_secret_may_look(page):
         "/minute/0",
         f"//{token}/",
         "/%C3%A9",
+        "foo",
+        "*",
+        f"x/{token}/",
     ]
     codes = [ask(page, path, whole=True).status for path in paths]
     assert set(codes) == {403}
@@ -138,7 +144,13 @@ def test_a_minute_is_answered_and_one_that_is_not_there_says_so(page):
     assert json.loads(ask(page, "minute/60").text)["start_s"] == 60
     answer = ask(page, "minute/600")
     assert answer.status == 404
-    assert json.loads(answer.text) == {"problem": "tracks/000600.parquet: no such file."}
+    assert json.loads(answer.text) == {"problem": "There is no such minute."}
+
+
+@pytest.mark.parametrize("start", ["300", "7", "060", "-1", "9" * 5000, "x"])
+def test_a_minute_that_the_trial_has_not_is_none(page, start):
+    """Whatever stands in its place; it is no error of the server."""
+    assert ask(page, f"minute/{start}").status == 404
 
 
 def test_a_page_hears_the_trial_its_state_and_what_the_watch_tells(page):
@@ -193,6 +205,68 @@ def test_all_pages_are_told_of_the_end(kept):
         assert heard[0] == "event: trial"
         assert heard[-1] == "event: bye"
         assert heard.count("event: bye") == 1
+
+
+def test_a_page_hears_a_beat_while_a_look_takes_long(kept, monkeypatch):
+    """As the first one at a trial of hours does."""
+    trial = read_trial(kept)
+    station = Station(trial, load_arena(trial.arena, kept))
+    is_over = threading.Event()
+    monkeypatch.setattr(station._state, "look", lambda: is_over.wait(5) and {})
+
+    async def listen():
+        looking = asyncio.create_task(station.run())
+        kinds = []
+        async for text in station.stream():
+            kinds.append(text.split("\n")[0])
+            if kinds[-1] in {"event: beat", "event: state"}:
+                is_over.set()
+                station.close()
+        await looking
+        return kinds
+
+    kinds = asyncio.run(listen())
+    assert "event: beat" in kinds
+    assert "event: state" not in kinds[: kinds.index("event: beat")]
+
+
+def test_for_a_page_that_does_not_read_the_newest_waits(kept):
+    """Of each kind one, whatever comes; then the end."""
+    trial = read_trial(kept)
+    station = Station(trial, load_arena(trial.arena, kept))
+
+    async def listen():
+        stream = station.stream()
+        await anext(stream)
+        for n in range(1000):
+            station.hear({"status": {"n": n}})
+            station.hear({"event": {"n": n}})
+        station.close()
+        return [text async for text in stream]
+
+    heard = asyncio.run(listen())
+    assert [text.split("\n")[0] for text in heard] == [
+        "event: watch",
+        "event: events",
+        "event: bye",
+    ]
+    assert '{"n":999}' in heard[0]
+    assert '{"n":999}]' in heard[1]
+
+
+def test_a_number_that_is_none_is_null(kept):
+    """In what the watch tells, at any depth."""
+    trial = read_trial(kept)
+    station = Station(trial, load_arena(trial.arena, kept))
+    station.hear({"status": {"lag_s": math.nan, "rows": [{"s": math.inf}, 1.5]}})
+
+    async def second():
+        stream = station.stream()
+        await anext(stream)
+        return await anext(stream)
+
+    text = asyncio.run(second())
+    assert text == 'event: watch\ndata: {"lag_s":null,"rows":[{"s":null},1.5]}\n\n'
 
 
 @pytest.mark.slow
@@ -251,6 +325,20 @@ def test_the_secret_stays_while_nobody_else_can_read_it(trial):
     assert len(token_of(trial)) == 24
     assert not path.is_symlink()
     assert token_of(trial / "not" / "there") != token_of(trial / "not" / "there")
+
+
+def test_a_secret_that_cannot_be_written_whole_is_not_kept(trial):
+    """As on a disk that is full: there is one for this time, and no half one."""
+    from zfcal.view.token import TOKEN_NAME, token_of
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5, limits[1]))
+    try:
+        token = token_of(trial)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert len(token) == 24
+    assert not (trial / TOKEN_NAME).exists()
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.report.figures import theme
-from zfcal.view.minutes import minute_of, minute_starts
+from zfcal.view.minutes import minute_of, minute_starts, stamps_of
 from zfcal.view.state import TrialState
 from zfcal.view.tank import tank_of
 
@@ -176,6 +177,55 @@ def test_a_recording_is_whole_when_its_last_segment_says_so(trial):
     assert looks.look()["whole"] is True
     write_tracks(path, tracks, lineage, extra={"recording_s": [0.0, 240.0]})
     assert looks.look()["whole"] is False
+
+
+def test_a_recording_that_goes_on_is_not_whole(trial, made):
+    """A trial that is resumed grows beyond the segment that said it was the last."""
+    path = trial / "tracks" / "000120.parquet"
+    lineage = Lineage(schema="zfcal.tracks/1", command="track")
+    write_tracks(path, read_tracks(path), lineage, extra={"recording_s": [0.0, 180.0]})
+    with made["poses"](trial, 120) as writer:
+        writer.add(made["poses_at"](120.0))
+    looks = state_of(trial)
+    assert looks.look()["whole"] is True
+    with made["poses"](trial, 180) as writer:
+        writer.add(made["poses_at"](180.0))
+    state = looks.look()
+    assert (state["minutes"][-1], state["whole"]) == (180, False)
+
+
+def test_the_stamp_of_a_minute_changes_when_it_grows(trial, made):
+    """And no other: by poses, targets, and the segment that takes their place."""
+    with made["poses"](trial, 180) as writer:
+        writer.add(made["poses_at"](180.0))
+        stamps = [stamps_of(trial)]
+        writer.add(made["poses_at"](180.2))
+        stamps.append(stamps_of(trial))
+    drive = made["drive"](trial, 180)
+    drive.add(made["target"](180.2, 0.25, 0.5))
+    drive.flush()
+    stamps.append(stamps_of(trial))
+    drive.close()
+    shutil.copy(trial / "tracks" / "000120.parquet", trial / "tracks" / "000180.parquet")
+    stamps.append(stamps_of(trial))
+    assert [sorted(each) for each in stamps] == [[0, 60, 120, 180]] * 4
+    assert len({each[180] for each in stamps}) == 4
+    assert len({(each[0], each[60], each[120]) for each in stamps}) == 1
+
+
+@pytest.mark.parametrize(
+    ("score", "says"),
+    [
+        (0.6, "67 % of its ceiling"),
+        (0.85, "within what windows of the model itself score"),
+        (0.93, "within what windows of the model itself score"),
+        (0.98, "above the range of its ceiling: it fits chance"),
+    ],
+)
+def test_no_score_is_more_than_all_of_its_ceiling(trial, made, score, says):
+    """The ceiling is 0.9, and 95 % of windows of the model score 0.8 to 0.95."""
+    made["round"](trial, 180, score)
+    assert state_of(trial).look()["scores"][-1]["says"] == says
 
 
 def test_findings_are_sentences(trial):

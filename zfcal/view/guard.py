@@ -63,7 +63,9 @@ class Guard:
             return PlainTextResponse("This name is none of this computer's.\n", 403)
         if scope["method"] != "GET":
             return PlainTextResponse("Only GET is answered.\n", 405, {"Allow": "GET"})
-        given = scope["path"].split("/")[1].encode()
+        # A path need not begin with a slash, nor hold one.
+        before, _, rest = scope["path"].partition("/")
+        given = b"" if before else rest.partition("/")[0].encode()
         if not hmac.compare_digest(given, self._token.encode()):
             text = "The address of the page is the one that zfcal watch printed, to its end.\n"
             return PlainTextResponse(text, 403)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.artifacts.drive_files import drive_files
 from zfcal.artifacts.pose_files import read_poses
-from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.reading.contents import looks_of, numbered_of
 from zfcal.artifacts.reading.parsing import json_of
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_tracks
@@ -37,6 +38,26 @@ def minute_starts(root: Path) -> list[int]:
     """
     poses = [start for start in numbered_of(root / "poses", ".mcap") if start % SEGMENT_S == 0]
     return sorted({*segment_starts(root), *poses})
+
+
+def stamps_of(root: Path) -> dict[int, int]:
+    """Return for each minute a number that changes when its files do.
+
+    Raises
+    ------
+    InputError
+        A folder cannot be listed.
+    """
+    poses, drives = numbered_of(root / "poses", ".mcap"), drive_files(root)
+    return {
+        start: _stamp(segment_path(root, start), poses.get(start), drives.get(start))
+        for start in minute_starts(root)
+    }
+
+
+def _stamp(*paths: Path | None) -> int:
+    looks = [path and looks_of(path) for path in paths]
+    return crc32(repr(looks).encode())
 
 
 def minute_of(trial: Trial, start_s: int) -> dict[str, Any]:

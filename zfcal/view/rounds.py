@@ -14,11 +14,13 @@ from zfcal.artifacts.tables import SCORES, read_table
 from zfcal.parameters import gene_names, gene_scales
 from zfcal.report.figures.parameters import values_of
 from zfcal.report.gather import round_of
-from zfcal.report.views import MODEL, ROBOT, Round
+from zfcal.report.standing import is_above, share_of
+from zfcal.report.views import MODEL, ROBOT, Mark, Round
 from zfcal.trial import Trial
 from zfcal.view.reading import Reader
 
 _SCORE = "S"
+_MARKS = ("value", "low", "high", "ceiling")
 
 
 def rounds_of(reader: Reader, trial: Trial, arena: Arena) -> list[dict[str, Any]]:
@@ -44,7 +46,8 @@ def scores_of(reader: Reader) -> list[dict[str, Any]]:
     -------
     list of dict
         ``end_s``; ``compared`` (such as ``model-vs-control``); ``value``; and ``ceiling`` with
-        its ``low`` and ``high``, null where there are none. In the order of time.
+        its ``low`` and ``high``, null where there are none; ``says``, how they stand to each
+        other. In the order of time.
     """
     paths = [
         *reader.files("scores", ".parquet").values(),
@@ -60,13 +63,28 @@ def _scores(path: Path) -> list[dict[str, Any]]:
         {
             "end_s": row["window_end_s"],
             "compared": row["compared"],
-            **{key: _number(row[key]) for key in ("value", "low", "high", "ceiling")},
+            **{key: _number(row[key]) for key in _MARKS},
+            "says": _standing(row),
         }
         for row in rows
         if row["feature"] == _SCORE
         and row["compared"] in {MODEL, ROBOT}
         and row["value"] is not None
     ]
+
+
+def _standing(row: dict[str, Any]) -> str:
+    """Return how a score stands to its ceiling: never more than all of it."""
+    value, low, high, ceiling = (math.nan if row[key] is None else row[key] for key in _MARKS)
+    mark = Mark(value=value, low=low, high=high, ceiling=ceiling)
+    is_model = row["compared"] == MODEL
+    if is_above(mark):
+        return "above the range of its ceiling" + (": it fits chance" if is_model else "")
+    if mark.low <= mark.value <= mark.high:
+        of = "within what windows of the model itself score"
+        return of if is_model else "within the range of its ceiling"
+    share = share_of(mark)
+    return share if math.isnan(mark.against_ceiling) else f"{share} of its ceiling"
 
 
 def _round(path: Path, *, arena: Arena, dt_s: float) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from zfcal.errors import ZfcalError
 from zfcal.report.figures import theme
 from zfcal.trial import Trial
 from zfcal.view.guard import Guard
-from zfcal.view.minutes import minute_of
+from zfcal.view.minutes import minute_of, minute_starts
 from zfcal.view.station import Station
 
 _PAGE = files("zfcal.view") / "page"
@@ -60,12 +60,13 @@ def make_app(trial: Trial, station: Station, token: str) -> Guard:
         return StreamingResponse(station.stream(), media_type="text/event-stream")
 
     async def minute(request: Request) -> Response:
-        start_s = int(request.path_params["start_s"])
         try:
-            found = await asyncio.to_thread(minute_of, trial, start_s)
+            found = await asyncio.to_thread(_minute, trial, request.path_params["start_s"])
         except ZfcalError as error:
             text = str(error).replace(f"{trial.root}/", "")
             return JSONResponse({"problem": text}, 404)
+        if found is None:
+            return JSONResponse({"problem": "There is no such minute."}, 404)
         return JSONResponse(found)
 
     async def page(request: Request) -> Response:
@@ -77,7 +78,7 @@ def make_app(trial: Trial, station: Station, token: str) -> Guard:
     routes = [
         Route("/", page),
         Route("/events", events),
-        Route("/minute/{start_s:int}", minute),
+        Route("/minute/{start_s}", minute),
         Route("/colours.css", colours),
         Route("/{name}", page),
     ]
@@ -167,6 +168,12 @@ def colours_css() -> str:
         "".join(f"--{row[0]}:{row[column]};" for row in theme.THEME.values()) for column in (1, 2)
     )
     return f":root{{{light}}}@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+
+
+def _minute(trial: Trial, said: str) -> dict[str, Any] | None:
+    """Return a minute by what an address says; None where the trial has none of that start."""
+    start_s = {str(start): start for start in minute_starts(trial.root)}.get(said)
+    return None if start_s is None else minute_of(trial, start_s)
 
 
 def _file(name: str) -> Response:

@@ -63,11 +63,12 @@ class TrialState:
         gone = looks_of(self._trial.config) is None
         rounds = rounds_of(reader, self._trial, self._arena)
         segments = _or_none(lambda: segment_starts(root)) or []
+        minutes = _or_none(lambda: minute_starts(root)) or []
         stats = list(reader.files("stats", ".parquet"))
         return {
             "gone": gone,
-            "minutes": _or_none(lambda: minute_starts(root)) or [],
-            "whole": self._is_whole(segments),
+            "minutes": minutes,
+            "whole": minutes[-1:] == segments[-1:] and self._is_whole(segments),
             "last": {
                 "track": segments[-1] + int(SEGMENT_S) if segments else None,
                 "analyse": stats[-1] if stats else None,

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, final
 
 from zfcal.arena import Arena
+from zfcal.errors import ZfcalError
 from zfcal.trial import Trial
 from zfcal.view.live import Live
+from zfcal.view.minutes import stamps_of
 from zfcal.view.state import TrialState
 from zfcal.view.tank import tank_of
 
@@ -27,8 +30,7 @@ FRESH_S = 5.0
 MOST_PAGES = 16
 
 _MOST_EVENTS = 40
-_MOST_WAITING = 50
-"""Messages that a page may be behind: beyond that it misses positions."""
+_BYE = "bye"
 
 
 @final
@@ -42,9 +44,10 @@ class Station:
     """
 
     def __init__(self, trial: Trial, arena: Arena) -> None:
+        self._root = trial.root
         self._live = Live(trial.root)
         self._state = TrialState(trial, arena)
-        self._pages: set[asyncio.Queue[str | None]] = set()
+        self._pages: set[_Page] = set()
         self._last: dict[str, Any] = {"trial": _head(trial, arena)}
         self._events: deque[dict[str, Any]] = deque(maxlen=_MOST_EVENTS)
         self._open = asyncio.Event()
@@ -59,10 +62,15 @@ class Station:
 
     async def run(self) -> None:
         """Look, and tell all pages, until `close`: positions do not wait for the other files."""
-        await asyncio.gather(self._every(TICK_S, self._follow), self._every(LOOK_S, self._look))
+        await asyncio.gather(
+            self._every(TICK_S, self._follow),
+            self._every(LOOK_S, self._look),
+            self._every(LOOK_S, self._beat),
+        )
 
     def hear(self, message: dict[str, Any]) -> None:
         """Take what the watch tells: its ``status``, or an ``event``."""
+        message = _finite(message)
         if "event" in message:
             self._events.append(message["event"])
             self._note("events", list(self._events))
@@ -71,15 +79,14 @@ class Station:
 
     async def stream(self) -> AsyncIterator[str]:
         """Yield what one page is told, from what is known on, until it or the server closes."""
-        page: asyncio.Queue[str | None] = asyncio.Queue()
+        page = _Page()
         for kind, value in self._last.items():
-            page.put_nowait(_message(kind, value))
+            page.put(kind, _message(kind, value))
         self._pages.add(page)
         self._open.set()
         try:
-            while (text := await page.get()) is not None:
-                yield text
-            yield _message("bye", {})
+            while not page.is_over:
+                yield await page.take()
         finally:
             self._pages.discard(page)
             if not self._pages:
@@ -90,7 +97,7 @@ class Station:
         self._is_closed = True
         self._open.set()
         for page in self._pages:
-            page.put_nowait(None)
+            page.put(_BYE, _message(_BYE, {}))
 
     async def _every(self, interval_s: float, step: Callable[[], Awaitable[None]]) -> None:
         while not self._is_closed:
@@ -108,9 +115,19 @@ class Station:
         self._has_looked = True
 
     async def _look(self) -> None:
+        self._note("stamps", await asyncio.to_thread(self._stamps))
         self._note("state", await asyncio.to_thread(self._state.look))
         self._note("faults", self._live.faults)
+
+    async def _beat(self) -> None:
+        # By itself: the first look at a long trial takes many beats.
         self._publish("beat", {"fresh": time.monotonic() - self._seen_s < FRESH_S})
+
+    def _stamps(self) -> dict[str, int]:
+        try:
+            return {str(start): stamp for start, stamp in stamps_of(self._root).items()}
+        except ZfcalError:
+            return {}
 
     def _note(self, kind: str, value: Any) -> None:
         """Tell what has changed."""
@@ -122,8 +139,41 @@ class Station:
             self._last[kind] = value
         text = _message(kind, value)
         for page in self._pages:
-            if kind != "pose" or page.qsize() < _MOST_WAITING:
-                page.put_nowait(text)
+            page.put(kind, text)
+
+
+@final
+class _Page:
+    """What waits for one page: of each kind the newest, since each tells all that counts."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, str] = {}
+        self._news = asyncio.Event()
+        self.is_over = False
+
+    def put(self, kind: str, text: str) -> None:
+        self._waiting.pop(kind, None)
+        self._waiting[kind] = text
+        self._news.set()
+
+    async def take(self) -> str:
+        """Return the message that has waited longest; the end comes last."""
+        await self._news.wait()
+        kind = next(iter(self._waiting))
+        text = self._waiting.pop(kind)
+        if not self._waiting:
+            self._news.clear()
+        self.is_over = kind == _BYE
+        return text
+
+
+def _finite(value: Any) -> Any:
+    """Return a value for JSON, with null for numbers that are none."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _message(kind: str, value: Any) -> str:

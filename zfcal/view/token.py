@@ -5,6 +5,7 @@ It stays the same while the trial lies where it is, so that an open page finds i
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import secrets
@@ -34,8 +35,13 @@ def token_of(root: Path) -> str:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except OSError:
         return made
-    with os.fdopen(descriptor, "w", encoding="ascii") as file:
-        file.write(made)
+    try:
+        with os.fdopen(descriptor, "w", encoding="ascii") as file:
+            file.write(made)
+    except OSError:
+        # The disk is full: half a secret is none.
+        with contextlib.suppress(OSError):
+            path.unlink()
     return made
 
 

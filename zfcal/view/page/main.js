@@ -1,7 +1,7 @@
 // The page: listens to the server, keeps the time, and lets the parts draw.
 
 import { describeTank, drawTank, fit, setTank, takeColours } from "./tank.js";
-import { forget, newest, now, takePose, then } from "./player.js";
+import { newest, now, takePose, takeStamps, then } from "./player.js";
 import { showParameters } from "./parameters.js";
 import { lastAt, showScore } from "./score.js";
 import { showFaults, showFindings, showStages } from "./panels.js";
@@ -10,9 +10,11 @@ import { byId, calm, clock, dark, draw, entry, fill } from "./shapes.js";
 const AGAIN_MS = 1500;
 const SILENT_MS = 5000;
 const STARTING_MS = 30000;
+const GIVES_UP_MS = 600000;
 const SPEEDS = [1, 2, 5, 10, 30];
 const STAYS =
   "What you see stays; the page comes back by itself when zfcal watch --view runs again.";
+const ENDS = "What you see stays; reload the page when zfcal watch --view runs again.";
 const PLAY = "M5 3 L17 10 L5 17 Z";
 const PAUSE = "M4 3 H8 V17 H4 Z M12 3 H16 V17 H12 Z";
 
@@ -21,6 +23,7 @@ const seen = { trial: null, state: null, watch: null, events: [], faults: [], fr
 const time = { mode: "replay", second: 0, isPlaying: false, speed: 1, isChosen: false };
 let source = null;
 let heardMs = 0;
+let lostMs = null;
 let isDirty = true;
 let shown = "";
 
@@ -33,6 +36,7 @@ function connect() {
   for (const [kind, take] of Object.entries(TAKES)) {
     source.addEventListener(kind, (event) => {
       heardMs = performance.now();
+      lostMs = null;
       setLink(true);
       take(JSON.parse(event.data));
       isDirty = true;
@@ -46,14 +50,18 @@ function lose(because) {
   if (!source) return;
   source.close();
   source = null;
+  // Not for ever: whoever has the port by then would hear the secret.
+  lostMs ??= performance.now();
+  const tries = performance.now() - lostMs < GIVES_UP_MS;
+  page.dataset.tries = String(tries);
   setLink(false, because);
-  setTimeout(connect, AGAIN_MS);
+  if (tries) setTimeout(connect, AGAIN_MS);
 }
 
 function setLink(isOpen, because = "") {
   page.dataset.link = isOpen ? "open" : "gone";
   byId("alarm").hidden = isOpen && !seen.state?.gone;
-  if (!isOpen) byId("alarm").textContent = `${because} ${STAYS}`;
+  if (!isOpen) byId("alarm").textContent = `${because} ${page.dataset.tries === "false" ? ENDS : STAYS}`;
   sayLink();
 }
 
@@ -74,18 +82,17 @@ const TAKES = {
     ]);
   },
   state(found) {
-    const end = endOf();
     seen.state = found;
     byId("alarm").hidden = !found.gone;
     if (found.gone) byId("alarm").textContent = "The trial cannot be found: its disk or folder is gone.";
     if (!time.isChosen) begin();
-    if (endOf() !== end) forget(found.minutes.at(-1));
     showStages(found, seen.watch);
     showFindings(found.findings);
     showFaults(seen.faults, seen.events, found.problems);
     shown = "";
   },
   pose: takePose,
+  stamps: takeStamps,
   watch(found) {
     seen.watch = found;
     if (seen.state) showStages(seen.state, found);
@@ -165,7 +172,8 @@ function setSpeed(speed) {
 function sayLink() {
   const isOpen = page.dataset.link === "open";
   const says = { live: seen.fresh ? "Live" : "Live, no new positions", replay: "Replay" }[time.mode];
-  const text = isOpen ? says : page.dataset.link === "gone" ? "Server gone, tries again" : "Connecting";
+  const gone = page.dataset.tries === "false" ? "Server gone, reload" : "Server gone, tries again";
+  const text = isOpen ? says : page.dataset.link === "gone" ? gone : "Connecting";
   if (byId("link").textContent !== text) byId("link").textContent = text;
 }
 

@@ -6,8 +6,11 @@ const TRAIL_S = 2.5;
 const FARTHEST_M = 0.15;
 const MOVES_M = 0.004;
 const KEPT = 8;
+const RECENT_S = 15;
+const REFRESH_MS = 2000;
 
 const minutes = new Map();
+let stamps = {};
 let recent = [];
 
 /** Take positions of now. */
@@ -15,7 +18,7 @@ export function takePose({ time_s, agents, target }) {
   if (recent.length && time_s < recent.at(-1).time) recent = [];
   const places = agents.map(([id, kind, x, y, heading, guess]) => ({ id, kind, x, y, heading, guess }));
   recent.push({ time: time_s, places, target });
-  while (recent[0].time < time_s - TRAIL_S) recent.shift();
+  while (recent[0].time < time_s - RECENT_S) recent.shift();
 }
 
 /** Return the second of the newest positions; null before there are any. */
@@ -23,10 +26,16 @@ export const newest = () => (recent.length ? recent.at(-1).time : null);
 
 /** Return what is there now. */
 export function now() {
-  if (!recent.length) return { agents: [], target: null };
-  const { places, target } = recent.at(-1);
+  return recent.length ? recentAt(recent.at(-1).time) : { agents: [], target: null };
+}
+
+/** Return what came live for a second, which no file that was fetched may hold yet. */
+function recentAt(second) {
+  const frames = recent.filter(({ time }) => time <= second && time >= second - TRAIL_S);
+  if (!frames.length) return { agents: [], target: null };
+  const { places, target } = frames.at(-1);
   const agents = places.map((agent) => {
-    const trail = recent.flatMap(({ places: then }) => then.filter((a) => a.id === agent.id));
+    const trail = frames.flatMap(({ places: then }) => then.filter((a) => a.id === agent.id));
     return { ...agent, trail: joined(trail.map(({ x, y }) => [x, y])) };
   });
   return { agents: agents.map(headed), target };
@@ -34,7 +43,13 @@ export function now() {
 
 /** Return what was there at a second; null while it is still being fetched. */
 export function then(second, starts) {
-  const start = Math.floor(second / 60) * 60;
+  if (recent.length && recent[0].time <= second && second <= newest()) {
+    const found = recentAt(second);
+    if (found.agents.length) return found;
+  }
+  const begun = Math.floor(second / 60) * 60;
+  // The end of the last minute is the beginning of none.
+  const start = second === begun && !starts.includes(begun) ? begun - 60 : begun;
   if (!starts.includes(start)) return { agents: [], target: null };
   const next = starts[starts.indexOf(start) + 1];
   if (next !== undefined && second - start > 40) fetched(next);
@@ -45,23 +60,32 @@ export function then(second, starts) {
   return { agents: agents.map(headed), target: targetAt(minute.targets, second) };
 }
 
-/** Forget a minute that may have grown. */
-export function forget(start) {
-  minutes.delete(start);
+/** Take for each minute the number that changes when its files do. */
+export function takeStamps(found) {
+  stamps = found;
 }
 
+/** Return a minute, null before it has come; one that has changed stays until the new one is there. */
 function fetched(start) {
-  if (!minutes.has(start)) {
-    minutes.set(start, null);
-    while (minutes.size > KEPT) minutes.delete(minutes.keys().next().value);
-    fetch(`minute/${start}`)
-      .then((answer) => answer.json())
-      .then((found) => {
-        if (minutes.has(start)) minutes.set(start, found.agents ? found : EMPTY);
-      })
-      .catch(() => setTimeout(() => minutes.delete(start), 1000));
-  }
-  return minutes.get(start);
+  const known = minutes.get(start);
+  if (!known || (isOld(known, start) && performance.now() - known.ms > REFRESH_MS)) ask(start, known);
+  return minutes.get(start).found;
+}
+
+const isOld = ({ isAsked, found, stamp }, start) =>
+  !isAsked && (found === EMPTY || stamp !== stamps[start]);
+
+function ask(start, known) {
+  // The stamp is at most as new as what comes.
+  const asked = { found: known?.found ?? null, stamp: stamps[start], ms: performance.now(), isAsked: true };
+  minutes.delete(start);
+  minutes.set(start, asked);
+  while (minutes.size > KEPT) minutes.delete(minutes.keys().next().value);
+  fetch(`minute/${start}`)
+    .then((answer) => answer.json())
+    .then((found) => { asked.found = found.agents ? found : asked.found ?? EMPTY; })
+    .catch(() => { asked.stamp = null; })
+    .finally(() => { asked.isAsked = false; });
 }
 
 /** Of a minute that cannot be read; which file that is stands among the messages. */

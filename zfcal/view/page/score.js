@@ -4,6 +4,7 @@ import { byId, clock, draw, entry, fill } from "./shapes.js";
 
 const MODEL = "model-vs-control";
 const ROBOT = "robot-vs-fish";
+const LEVELS = [0, 0.2, 0.4, 0.6, 0.8, 1];
 const PAD = { left: 30, right: 10, top: 8, bottom: 22 };
 
 /** Return the last of rows that was there at a second. */
@@ -20,30 +21,26 @@ export function showScore(state, second, end) {
 function showNumbers(found, robot, n) {
   byId("s").textContent = found ? found.value.toFixed(3) : "–";
   const has = found && found.ceiling !== null;
-  const share = has ? Math.round((100 * found.value) / found.ceiling) : 0;
-  byId("s-of").textContent = has ? `of ${found.ceiling.toFixed(3)}` : found ? "no ceiling" : "";
+  byId("s-of").textContent = has ? `ceiling ${found.ceiling.toFixed(3)}` : found ? "no ceiling" : "";
   const parts = [];
-  if (has) parts.push(`S of the window to ${clock(found.end_s)}, ${share} % of its ceiling`);
+  if (has) parts.push(`S of the window to ${clock(found.end_s)}: ${found.says}`);
   else if (!found) parts.push(n ? "No model was there yet" : "No model has been calibrated yet");
-  if (robot) parts.push(`robot among fish: ${ofCeiling(robot, 3)}`);
+  if (robot) parts.push(`robot among fish: ${withCeiling(robot, 3)}`);
   byId("s-note").textContent = `${parts.join("; ")}.`;
 }
 
-const ofCeiling = ({ value, ceiling }, digits) =>
-  value.toFixed(digits) + (ceiling === null ? "" : ` of ${ceiling.toFixed(digits)}`);
+const withCeiling = ({ value, ceiling, says }, digits) =>
+  value.toFixed(digits) + (ceiling === null ? "" : ` (ceiling ${ceiling.toFixed(digits)}, ${says})`);
 
 function showRounds({ model, robot, skipped }, second, end) {
   const svg = byId("rounds");
   const [width, height] = [svg.clientWidth, svg.clientHeight];
   if (!width) return;
-  const numbers = [...model, ...robot].flatMap((r) => [r.value, r.low, r.ceiling]);
-  const values = numbers.filter((v) => v !== null);
-  const least = Math.max(0, Math.floor(10 * Math.min(0.7, ...values) - 0.2) / 10);
   const x = (s) => PAD.left + (s / end) * (width - PAD.left - PAD.right);
-  const y = (v) => PAD.top + ((1 - v) / (1 - least)) * (height - PAD.top - PAD.bottom);
+  const y = (v) => PAD.top + (1 - v) * (height - PAD.top - PAD.bottom);
   const floor = height - PAD.bottom;
   const marks = [
-    ...levels(least).flatMap((v) => [
+    ...LEVELS.flatMap((v) => [
       stroke(`M${PAD.left} ${y(v)} H${width - PAD.right}`, "grid", 1),
       text(PAD.left - 6, y(v) + 4, v.toFixed(1), "end"),
     ]),
@@ -72,13 +69,6 @@ const shape = (d, colour, opacity = 1) => draw("path", { d, fill: colour, opacit
 const stroke = (d, colour, width, more = {}) =>
   draw("path", { d, stroke: colour, fill: "none", "stroke-width": width, ...more });
 const text = (x, y, said, anchor) => draw("text", { x, y, "text-anchor": anchor }, said);
-
-function levels(least) {
-  const step = 1 - least > 0.5 ? 0.2 : 0.1;
-  const found = [];
-  for (let v = 1; v >= least - 1e-9; v -= step) found.push(v);
-  return found;
-}
 
 function minutesOf(end) {
   const step = [1, 2, 5, 10, 20, 30, 60, 120, 300].find((m) => end / 60 / m <= 7) ?? 600;
@@ -114,6 +104,6 @@ function ceilingOf(model, x, y) {
 
 function inWords(model) {
   if (!model.length) return "No rounds yet";
-  const said = model.map((r) => `${clock(r.end_s)}: ${ofCeiling(r, 2)}`);
+  const said = model.map((r) => `${clock(r.end_s)}: ${withCeiling(r, 2)}`);
   return `S of the model and its ceiling by the end of each window. ${said.join("; ")}`;
 }
