@@ -94,7 +94,8 @@ def page(context: click.Context, tasks: Mapping[str, Sequence[str]], version: st
     for code, meaning in _EXITS.items():
         lines += [".TP", f".B {code}", _shown(meaning)]
     if context.parent is not None:
-        lines += [".SH SEE ALSO", f".BR {_shown(context.parent.command_path)} (1)"]
+        above = context.parent.command_path.replace(" ", "-")
+        lines += [".SH SEE ALSO", f".BR {_shown(above)} (1)"]
     return "\n".join(lines) + "\n"
 
 

@@ -57,6 +57,13 @@ def open_page(trial: Path, options: Mapping[str, Any]) -> Iterator[Page | None]:
         yield page
 
 
+def page_plan(options: Mapping[str, Any]) -> str:
+    """Return what a dry run says of the page."""
+    port = options["view_port"]
+    where = f"port {port}" if port else "a free port"
+    return f"watch would show the trial on a page, at {where} of this computer."
+
+
 def stay(page: Page, out: Output) -> None:
     """Go on serving the page of a trial that has ended, until Ctrl-C.
 

@@ -66,7 +66,7 @@ def command(out: Output, trial: Path, **options: Any) -> None:
         zfcal watch trial --once --generations 20
         zfcal watch trial --view
     """
-    from .viewing import open_page, stay
+    from .viewing import open_page, page_plan, stay
     from .watching import Voice, watch_options
 
     chosen = watch_options(trial, options)
@@ -74,6 +74,8 @@ def command(out: Output, trial: Path, **options: Any) -> None:
         from zfcal.online.plan import tell_watch_plan
 
         out.attempt(lambda: tell_watch_plan(trial, chosen, out.tell))
+        if options["view"]:
+            out.note(page_plan(options))
         return
     from zfcal.online.watch import watch
 

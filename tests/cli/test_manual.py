@@ -34,6 +34,13 @@ def test_every_command_has_a_page(pages):
     assert ".SS The robot" in pages["zfcal.1"].read_text()
 
 
+def test_a_page_names_the_page_above_it(pages):
+    """As the file is called, with hyphens: man finds no name with a space."""
+    ends = {name: path.read_text().splitlines()[-2:] for name, path in pages.items()}
+    assert ends["zfcal-camera-align.1"] == [".SH SEE ALSO", ".BR zfcal\\-camera (1)"]
+    assert ends["zfcal-camera.1"] == [".SH SEE ALSO", ".BR zfcal (1)"]
+
+
 def test_signs_are_no_orders_to_the_formatter(pages):
     """Lines of an example stay lines, and no text begins with a dot or holds a bare backslash."""
     text = pages["zfcal-drive.1"].read_text()

@@ -183,6 +183,18 @@ def test_a_dry_run_says_what_each_stage_would_make(zfcal, trial):
     assert sorted(trial.rglob("*")) == before
 
 
+def test_a_dry_run_says_where_the_page_would_be(zfcal, trial):
+    """Without stages too: then it would run none."""
+    done = zfcal("watch", "trial", "--view", "--stages", "none", "--dry-run")
+    assert done.code == 0
+    assert "watch would run no stage in trial." in done.err
+    assert "would show the trial on a page, at port 8642 of this computer." in done.err
+    done = zfcal("watch", "trial", "--view", "--view-port", "0", "--dry-run")
+    assert "watch would run analyse, calibrate in trial." in done.err
+    assert "on a page, at a free port of this computer." in done.err
+    assert "on a page" not in zfcal("watch", "trial", "--dry-run").err
+
+
 def test_a_dry_run_takes_no_round_with_a_budget_for_stale(zfcal, trial):
     """Such a round is made once, whatever its inputs; one with generations is made again."""
     assert zfcal("analyse", "trial").code == 0

@@ -95,7 +95,7 @@ def test_frames_do_not_run_ahead_of_a_clock_that_wavers(jitter_ms, off):
     """Ten minutes without a lost frame: rounding each step loses 200 frames at 12 ms."""
     frame = np.arange(9000)
 
-    found = frames_of(wavering(frame, jitter_ms / 1000, off=off), 15.0)
+    found = frames_of(HERE, wavering(frame, jitter_ms / 1000, off=off), 15.0)
 
     # At 20 ms the first row may itself take the frame before its own.
     assert np.abs(found - frame).max() <= (1 if jitter_ms == 20 else 0)
@@ -108,7 +108,7 @@ def test_lost_frames_stay_lost_however_much_times_waver(jitter_ms):
     kept[4000:4060] = False
     frame = np.flatnonzero(kept)
 
-    found = frames_of(wavering(frame, jitter_ms / 1000), 15.0)
+    found = frames_of(HERE, wavering(frame, jitter_ms / 1000), 15.0)
 
     apart = found - (frame - frame[0])
     assert np.abs(apart).max() <= 1
@@ -122,7 +122,7 @@ def test_a_gap_between_wavering_times_has_its_length(gap_s):
     n_lost = round(gap_s * 15)
     frame = np.concatenate([np.arange(2000), np.arange(2000) + 2000 + n_lost])
 
-    found = frames_of(wavering(frame, 0.012, off=1.007), 15.0)
+    found = frames_of(HERE, wavering(frame, 0.012, off=1.007), 15.0)
 
     assert found[-1] - found[0] == pytest.approx(frame[-1], abs=max(1, 5e-4 * n_lost))
     assert (np.diff(found[:2000]) == 1).all()
@@ -134,7 +134,7 @@ def test_one_late_row_in_a_hundred_costs_no_frames():
     frame = np.arange(9000)
     late = np.random.default_rng(3).random(9000) < 0.01
 
-    assert np.array_equal(frames_of(frame / 15 * 1.004 + 0.045 * late, 15.0), frame)
+    assert np.array_equal(frames_of(HERE, frame / 15 * 1.004 + 0.045 * late, 15.0), frame)
 
 
 def test_a_clock_that_is_set_slowly_takes_no_frames_along():
@@ -142,7 +142,29 @@ def test_a_clock_that_is_set_slowly_takes_no_frames_along():
     frame = np.arange(9000)
     slow_s = 0.2 * np.sin(2 * np.pi * frame / 9000)
 
-    assert np.array_equal(frames_of(wavering(frame, 0.012) + slow_s, 15.0), frame)
+    assert np.array_equal(frames_of(HERE, wavering(frame, 0.012) + slow_s, 15.0), frame)
+
+
+def test_rows_too_many_are_refused():
+    """One in a hundred stands twice: each would take a frame, and the file would last longer."""
+    rng = np.random.default_rng(5)
+    frame = np.flatnonzero(rng.random(9000) > 0.002)
+    once_s = frame / 15 + rng.normal(0, 0.15 / 15, len(frame))
+    twice_s = once_s[rng.random(len(frame)) < 0.01] + 0.002
+
+    assert frames_of(HERE, once_s, 15.0)[-1] == frame[-1] - frame[0]
+    with pytest.raises(InputError, match="more rows than frames") as caught:
+        frames_of(HERE, np.sort(np.concatenate([once_s, twice_s])), 15.0)
+    assert "half a frame after the one before, first at" in str(caught.value)
+
+
+def test_rows_that_were_written_late_together_are_none_too_many():
+    """A computer was busy for a second: the rows of that second follow each other at once."""
+    frame = np.arange(9000)
+    time_s = wavering(frame, 0.01)
+    time_s[3000:3015] = time_s[3015] - 0.003 * np.arange(15, 0, -1)
+
+    assert np.array_equal(frames_of(HERE, time_s, 15.0), frame)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 30])
@@ -150,7 +172,7 @@ def test_few_wavering_rows_have_a_frame_each(n):
     """Too few to tell a rate: the expected one holds."""
     frame = np.arange(n)
 
-    assert np.array_equal(frames_of(wavering(frame, 0.012, seed=4), 15.0), frame)
+    assert np.array_equal(frames_of(HERE, wavering(frame, 0.012, seed=4), 15.0), frame)
 
 
 @pytest.mark.parametrize("jitter_ms", [0, 4, 8, 12, 16, 20])

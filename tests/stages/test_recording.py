@@ -1,23 +1,26 @@
 """Cutting a recording into closed segments."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.settings import read_trial
-from zfcal.artifacts.tables import read_extra, read_tracks
+from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import InputError
 from zfcal.stages.events import Made, UpToDate
 from zfcal.stages.recording import (
     Recording,
     check_same_source,
     cut,
+    has_ended,
     hash_sources,
     segmented,
     starts_between,
     starts_of_recording,
+    stretch_of,
 )
 from zfcal.stages.stage import OneThing, run
 from zfcal.stages.trial_context import Task
@@ -173,3 +176,24 @@ def test_an_empty_segment_can_be_read_back(trial, heard):
     """A table without rows is a table."""
     write_segments(trial, recording_of(tracks_at([10.0, 130.0]), 130.2), heard.append, task=Task())
     assert len(read_tracks(trial.root / "tracks" / "000060.parquet")) == 0
+
+
+@pytest.mark.parametrize(
+    "said",
+    [["x", "y"], [0, 1e12], [-1, 60], [60, 0], [0, True], [0, 10**400], [0], 60],
+)
+def test_a_stretch_that_no_recording_has_is_none(tmp_path, said):
+    """Neither an error nor a list of a thousand million minutes."""
+    path = tmp_path / "tracks" / "000000.parquet"
+    path.parent.mkdir()
+    write_tracks(path, tracks_at([0.0]), LINEAGE, extra={"recording_s": said})
+    assert stretch_of(path) is None
+    assert starts_of_recording(tmp_path) == []
+    assert not has_ended(tmp_path, [0])
+
+
+@pytest.mark.parametrize("said", [[0.0, math.nan], [math.nan, 60.0], [0.0, math.inf]])
+def test_a_stretch_without_an_end_is_none(monkeypatch, tmp_path, said):
+    """Files of other programs may hold what zfcal never writes."""
+    monkeypatch.setattr("zfcal.stages.recording.read_extra", lambda _: {"recording_s": said})
+    assert stretch_of(tmp_path / "000000.parquet") is None

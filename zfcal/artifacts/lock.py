@@ -49,6 +49,32 @@ def lock(root: Path, command: str) -> Iterator[None]:
         held.release()
 
 
+def is_locked(root: Path, command: str) -> bool:
+    """Return whether a command is at work on the trial; none has been where no lock file lies.
+
+    To know it the lock is taken for an instant.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    command
+        As `lock` has it.
+
+    Raises
+    ------
+    StorageError
+        The lock file cannot be opened.
+    """
+    if not (root / f".lock-{command}").exists():
+        return False
+    try:
+        with lock(root, command):
+            return False
+    except LockedError:
+        return True
+
+
 def _take(held: BaseFileLock, path: Path, command: str) -> None:
     try:
         if not path.parent.is_dir():

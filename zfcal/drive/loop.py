@@ -10,8 +10,8 @@ from typing import final
 
 from zfcal.artifacts.drive_files import drive_files
 from zfcal.artifacts.pose_files import PoseFollower
-from zfcal.artifacts.segments import segment_starts
 from zfcal.drive.driving import Crew, Driver
+from zfcal.drive.ending import can_no_tracker_come, is_recorded
 from zfcal.drive.events import DriveTell
 from zfcal.drive.options import DriveOptions
 from zfcal.drive.plan import no_poses_hint
@@ -19,7 +19,6 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.robot.plausible import is_frame
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import LeftOut, Note
-from zfcal.stages.recording import has_ended
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import FramePoses
 from zfcal.units import SEGMENT_S
@@ -40,7 +39,7 @@ _CUT_S = 60.0
 """The same for a last file that was cut short, or whose writer is busy compiling."""
 
 _OVER_S = 10.0
-"""After so long without poses the recording is looked at: one that has ended brings none."""
+"""After so long without any poses the trial is looked at: can they come at all?"""
 
 
 @final
@@ -72,7 +71,7 @@ class Loop:
         self._is_waited_for = False
         self._is_unsound = False
         self._n_batches = 0
-        self._over_s = _OVER_S
+        self._is_looked_at = False
 
     def run(self) -> str:
         """Go on until it is over, and return why it is."""
@@ -93,7 +92,7 @@ class Loop:
                 if frames and self._is_over(frames[-1].time_s):
                     return "the duration is over"
             self._show()
-        return "the recording has ended" if self._crew.clock.is_live else "the poses have ended"
+        return "the poses have ended"
 
     def _show(self) -> None:
         """Tell how it goes, now and then."""
@@ -106,7 +105,7 @@ class Loop:
         while True:
             frames = self._poll()
             if frames:
-                self._quiet_since_s, self._over_s = time.monotonic(), _OVER_S
+                self._quiet_since_s = time.monotonic()
                 self._n_batches += 1
             elif self._is_finished():
                 return
@@ -188,33 +187,41 @@ class Loop:
             )
 
     def _is_finished(self) -> bool:
-        quiet_s = time.monotonic() - self._quiet_since_s
-        if self._crew.clock.is_live or not self._n_batches:
-            return self._is_recording_over(quiet_s)
-        return quiet_s > (_END_S if self._follower.is_closed else _CUT_S)
-
-    def _is_recording_over(self, quiet_s: float) -> bool:
-        """Return whether no poses come since the recording has ended; looked at now and then.
+        """Return whether no poses come any more; a live drive that had some waits for ever.
 
         Raises
         ------
         InputError
-            It had ended before the drive began: what was there at the start is all.
+            None ever came, and none can.
         """
-        if quiet_s < self._over_s:
+        is_live = self._crew.clock.is_live
+        if self._n_batches and is_live:
             return False
-        self._over_s = quiet_s + _OVER_S
+        quiet_s = time.monotonic() - self._quiet_since_s
+        if self._n_batches:
+            return quiet_s > (_END_S if self._follower.is_closed else _CUT_S)
+        self._check_ending(quiet_s)
+        # On the poses' clock a file that never comes is waited for no longer than the next.
+        return not is_live and quiet_s > _CUT_S
+
+    def _check_ending(self, quiet_s: float) -> None:
+        """Look once whether poses can come: what it reads may take longer than a tick.
+
+        Raises
+        ------
+        InputError
+            They cannot.
+        """
+        if self._is_looked_at or quiet_s < _OVER_S:
+            return
+        self._is_looked_at = True
         root = self._opened.trial.root
-        if not has_ended(root, segment_starts(root)):
-            # On the poses' clock a file that never comes is waited for no longer than the next.
-            return not self._crew.clock.is_live and quiet_s > _CUT_S
-        if self._n_batches > 1:
-            return True
-        raise InputError(
-            f"{root / 'poses'}: no new poses for {quiet_s:.0f} s, and the recording has ended: "
-            "no process writes poses.",
-            hint=no_poses_hint(self._opened),
-        )
+        if can_no_tracker_come(root) if self._crew.clock.is_live else is_recorded(root):
+            raise InputError(
+                f"{root / 'poses'}: no poses for {quiet_s:.0f} s, and the recording has ended: "
+                "no process writes poses.",
+                hint=no_poses_hint(self._opened),
+            )
 
     def _greet(self) -> None:
         """Say once if nobody answers by the robot's name."""

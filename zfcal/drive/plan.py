@@ -9,7 +9,7 @@ from pathlib import Path
 
 from zfcal.artifacts.drive_files import drive_files
 from zfcal.artifacts.pose_files import read_poses
-from zfcal.artifacts.segments import segment_starts
+from zfcal.drive.ending import can_no_tracker_come, is_recorded
 from zfcal.drive.models import DriveModels
 from zfcal.drive.options import VIRTUAL, DriveOptions
 from zfcal.drive.pilot import Command, InForce, Pilot, Target
@@ -18,7 +18,6 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.robot.fishbot import FishBot
 from zfcal.robot.port import is_pseudo_terminal
 from zfcal.stages.events import LeftOut, Note, Planned, Result, Tell
-from zfcal.stages.recording import has_ended
 from zfcal.stages.track.minutes import pose_files
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FramePoses
@@ -104,7 +103,7 @@ def tell_plan(opened: OpenTrial, options: DriveOptions, tell: Tell, *, task: Tas
         tell(Note(text=f"It would remove {len(known)} files of an earlier drive."))
     first = _first(opened, options, model, tell)
     tell(Note(text=_first_words(opened, options, first)))
-    if first is not None and not (options.clock == "wall" and _is_over(opened)):
+    if first is not None:
         start_s = int(first.poses.time_s // SEGMENT_S * SEGMENT_S)
         path = opened.trial.path("drive", start_s, ".mcap")
         tell(Planned(path=path, reason="the robot is driven"))
@@ -146,26 +145,19 @@ def _poses_of(opened: OpenTrial, options: DriveOptions, tell: Tell) -> Iterator[
             tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
 
 
-def _is_over(opened: OpenTrial) -> bool:
-    """Return whether the trial's recording has ended: no poses will come."""
-    root = opened.trial.root
-    return has_ended(root, segment_starts(root))
-
-
 def _first_words(opened: OpenTrial, options: DriveOptions, first: _First | None) -> str:
-    root, is_over = opened.trial.root, _is_over(opened)
+    root, is_live = opened.trial.root, options.clock == "wall"
     if first is None:
+        is_over = can_no_tracker_come(root) if is_live else is_recorded(root)
         ends = "it would end, since the recording has ended" if is_over else "it would wait"
         return f"{root / 'poses'}: no poses. It would send STOP, and {ends}."
     at_s = first.poses.time_s
     words = _target_words(first)
-    if options.clock == "wall":
-        until = (
-            "The recording has ended: it would send STOP, and end after 10 s."
-            if is_over
-            else "It would send STOP until new poses come."
+    if is_live:
+        return (
+            f"It would send STOP until new poses come. By the recorded poses at {at_s:.2f} s "
+            f"{words}"
         )
-        return f"{until} By the recorded poses at {at_s:.2f} s {words}"
     return f"At the first step, at {at_s:.2f} s, {words}"
 
 

@@ -33,7 +33,8 @@ def tell_watch_plan(root: Path, options: WatchOptions, tell: Tell) -> None:
     jobs = options.jobs(root)
     polls = reason_to_poll(root, asked=options.poll)
     how = f", which it polls ({polls})" if polls else ""
-    tell(Note(text=f"watch would run {', '.join(jobs)} in {root}{how}."))
+    named = ", ".join(jobs) or "no stage"
+    tell(Note(text=f"watch would run {named} in {root}{how if jobs else ''}."))
     for name, job in jobs.items():
         planned: list[Path] = []
 

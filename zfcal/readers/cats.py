@@ -65,7 +65,7 @@ def _text_rows(path: Path, options: ImportOptions) -> Rows:
         notes.append(f"{int(invalid.sum())} positions at exactly (0, 0) are taken as missing.")
     grid = Grid(
         xy=xyd[..., :2],
-        frame=frames_of(time_s, options.fps),
+        frame=frames_of(path, time_s, options.fps),
         time_s=time_s - start_s,
         unit="m",
         heading_rad=np.where(xyd[..., 2] == 0, np.nan, xyd[..., 2]),

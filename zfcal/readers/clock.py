@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import isotonic_regression
 
 from zfcal.arrays import Bools, Floats, Ints
@@ -28,6 +28,12 @@ _FAR = 20.0
 
 _WINDOW = 600
 """Rows over which phases are averaged: few enough for a clock's rate to be steady."""
+
+_BESIDE = 1.5
+"""Frames by which rows may lie beside their times."""
+
+_BESIDE_WINDOW = 61
+"""Rows whose median lies so: a computer that was busy for some rows wrote those late."""
 
 _LEAST = 40
 """Rows that tell a rate; fewer have that of the others."""
@@ -90,7 +96,7 @@ def _compare(path: Path, rate_hz: float, fps: float, *, n_steps: int) -> None:
         )
 
 
-def frames_of(time_s: Floats, fps: float) -> Ints:
+def frames_of(path: Path, time_s: Floats, fps: float) -> Ints:
     """Return frame numbers of times that waver, as a computer's clock gives them.
 
     Where each step is close to whole frames it is rounded. Otherwise the jitter is
@@ -99,8 +105,10 @@ def frames_of(time_s: Floats, fps: float) -> Ints:
 
     Parameters
     ----------
+    path
+        Named in the message.
     time_s : ndarray of float64, shape (row,)
-        Strictly ascending.
+        Strictly ascending, a row a frame at most.
     fps
         In hertz.
 
@@ -108,7 +116,13 @@ def frames_of(time_s: Floats, fps: float) -> Ints:
     -------
     ndarray of int64, shape (row,)
         From 0, strictly ascending. A row is off by a frame at most where a frame is lost beside
-        it; jitter is averaged out up to a standard deviation of about 0.3 frames.
+        it; jitter is averaged out up to a standard deviation of about 0.3 frames. A row too many
+        moves those around it by a frame at most.
+
+    Raises
+    ------
+    InputError
+        Rows too many would move others by more than 1.5 frames.
 
     Notes
     -----
@@ -129,7 +143,25 @@ def frames_of(time_s: Floats, fps: float) -> Ints:
     at -= np.unwrap(phase) / (2 * np.pi)
     row = np.arange(len(at))
     frame = row + np.rint(isotonic_regression(at - row).x).astype(np.int64)
+    _check_beside(path, time_s, frame - at, fps=fps)
     return frame - frame[0]
+
+
+def _check_beside(path: Path, time_s: Floats, beside: Floats, *, fps: float) -> None:
+    """Refuse rows that have no frame of their own: those behind them would come ever later."""
+    far = np.abs(median_filter(beside, _BESIDE_WINDOW)) > _BESIDE
+    if not far.any():
+        return
+    at = int(np.argmax(far))
+    close = np.flatnonzero(np.diff(time_s) * fps < 0.5) + 1
+    named = f", first at {time_s[close[0]]:.10g} s" if len(close) else ""
+    raise InputError(
+        f"{path}: more rows than frames. About {time_s[at]:.6g} s rows lie "
+        f"{abs(beside[at]):.1f} frames beside their times; {len(close)} rows come less than half "
+        f"a frame after the one before{named}. Expected a row a frame, each "
+        f"{1000 / fps:.4g} ms.",
+        hint="Remove the rows that stand twice, in the program that made the file.",
+    )
 
 
 def _local_rates(at: Floats, stretches: list[Ints]) -> Floats:

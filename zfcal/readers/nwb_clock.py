@@ -168,7 +168,7 @@ def _timed(path: Path, clocks: Sequence[Clock], fps: float) -> list[Ints]:
     starts = np.array([clock.start_s for clock in clocks if clock.time_s is None])
     times = [clock.time_s for clock in clocks if clock.time_s is not None]
     shared = _apart(np.concatenate([starts, *times]), fps)
-    frame = frames_of(shared, fps)
+    frame = frames_of(path, shared, fps)
     found: list[Ints] = []
     for clock in clocks:
         if clock.time_s is None:

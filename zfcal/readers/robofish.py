@@ -94,7 +94,7 @@ def read_robofish(path: Path, options: ImportOptions) -> Imported:
     if sampling.time_s is not None:
         time_s = sampling.time_s - sampling.time_s[0]
         check_rate(path, time_s, fps=options.fps)
-        frame = frames_of(time_s, options.fps)
+        frame = frames_of(path, time_s, options.fps)
     elif sampling.frequency_hz is not None:
         notes += check_declared(path, sampling.frequency_hz, options.fps)
     if left_out:

@@ -28,6 +28,9 @@ TRACKS = "zfcal.tracks/1"
 STRETCH_KEY = "recording_s"
 """Extra metadata of every segment: the seconds from which and to which the recording goes."""
 
+_LONGEST_S = 1e7
+"""No recording goes on for so long, about 4 months."""
+
 _SLACK_S = 1e-6
 """A time this little before a segment's start is the start, but for rounding."""
 
@@ -118,14 +121,21 @@ def starts_of_recording(root: Path) -> list[int]:
 
 
 def stretch_of(path: Path) -> tuple[float, float] | None:
-    """Return from where to where a segment says that its recording goes; None for no word."""
+    """Return from where to where a segment says that its recording goes; None for no word.
+
+    What no recording can be (no two numbers, an end before the start, months) is no word.
+    """
     try:
         said = read_extra(path).get(STRETCH_KEY)
     except (DamagedError, InputError):
         return None
     if not isinstance(said, list) or len(said) != 2:
         return None
-    return float(str(said[0])), float(str(said[1]))
+    numbers = [n for n in said if isinstance(n, int | float) and not isinstance(n, bool)]
+    # A comparison with NaN is false.
+    if len(numbers) != 2 or not 0 <= numbers[0] <= numbers[1] < _LONGEST_S:
+        return None
+    return float(numbers[0]), float(numbers[1])
 
 
 def has_ended(root: Path, whole: Collection[int]) -> bool:
