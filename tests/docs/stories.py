@@ -113,6 +113,11 @@ def copies(folder, repository, *names):
         shutil.copytree(repository / "data-samples" / "two-rooms", folder / name)
 
 
+def days(folder, repository):
+    """Put a trial there, and those of three days."""
+    copies(folder, repository, "trial", "day1", "day2", "day3")
+
+
 def two_sets(folder, repository):
     """Put the sets of trials there that are compared."""
     sides = [f"{side}{n}" for side in ("treated", "control", "a", "b") for n in (1, 2, 3, 4)]
@@ -227,6 +232,13 @@ STORIES = (
         ),
         prepare=two_sets,
         before=f"zfcal analyse trial && zfcal calibrate trial {QUICK}",
+    ),
+    Story(
+        name="print",
+        parts=(("docs/figures.md", None), ("docs/statistics.md", "Where D says little")),
+        prepare=days,
+        before=f"zfcal analyse trial day1 day2 day3 && zfcal calibrate trial {QUICK}",
+        changes=(("--publish score", f"--publish score {QUICK} --force"),),
     ),
     Story(
         name="python",
