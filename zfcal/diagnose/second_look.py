@@ -72,7 +72,8 @@ def second_look(case: Case, before: Found) -> Found | None:
     before
         What was named without features. Of effects on headings the first is held against them:
         one beyond the list is kept where it gains more than features do, a listed one where it
-        gains as much. Where it is not kept, all that were added after it go as well.
+        gains as much. Where it is not kept, what was added after it goes as well; effects on speed
+        are then added anew.
     """
     given = [each.effect for each in in_model(case.screen.fitted.parameters)]
     known = [effect for effect in given if not effect.on_speed]
