@@ -177,7 +177,9 @@ def looked(monkeypatch):
 def step(name, screen, nats=20.0):
     """Return an effect that was named, in a model of that screen."""
     effect = SimpleNamespace(effect=find_effect(name))
-    best = SimpleNamespace(candidate=effect, screen=screen, nats=nats, name=name)
+    best = SimpleNamespace(
+        candidate=effect, screen=screen, nats=nats, name=name, is_generic=":" in name
+    )
     return Step(
         choice=Choice(best=best, ties=(), considered=(best,)),
         best=Best(score="score", z=9.0, p=1e-9, information=1.0),
@@ -274,6 +276,14 @@ def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
     ]
     assert [looks.without_noise for looks, _ in calls] == [False, True, True]
     assert [how.get("least") for _, how in calls] == [None, 60.0, 60.0]
+
+
+def test_beside_a_guess_a_further_effect_gains_half_as_much(question, looked):
+    """One beyond the list has no features, so its left-overs answer to those of others."""
+    case, (calls, answers) = open_case(question()), looked
+    answers += [None, None]
+    assert second_look(case, found("generic:heading:wall", nats=80.0)) is None
+    assert [how.get("least") for _, how in calls] == [None, 40.0]
 
 
 def test_what_stays_is_beside_further_effects(question, looked):

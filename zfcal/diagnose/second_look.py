@@ -30,7 +30,14 @@ from zfcal.diagnose.null import run_null
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import LEVEL, Best, Step
+from zfcal.diagnose.selection import (
+    GENERIC_SHARE,
+    LEAST_SHARE,
+    LEVEL,
+    MOST_EFFECTS,
+    Best,
+    Step,
+)
 from zfcal.model.effects import Effect, find_effect
 
 _BY_ITSELF = 4.0
@@ -39,13 +46,6 @@ bears it out and something is left."""
 
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
-
-_MOST_EFFECTS = 4
-"""On headings, in one recording."""
-
-_LEAST_SHARE = 0.15
-"""A further effect gains that share of what the clearest one does, or it may be what is wrong with
-the form of that."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,7 +87,7 @@ def second_look(case: Case, before: Found) -> Found | None:
         found = _with_speeds(case, found, before, n)
     while True:
         named = [step for step in found.steps if _on_headings(step)]
-        if not named or len(named) >= _MOST_EFFECTS:
+        if not named or len(named) >= MOST_EFFECTS:
             break
         looks = _Looks(
             case=case,
@@ -96,7 +96,10 @@ def second_look(case: Case, before: Found) -> Found | None:
             without_noise=found.without_noise,
         )
         most = max(found.nats, *(step.choice.best.nats for step in named))
-        further = _named(looks, least=_LEAST_SHARE * most)
+        # One beyond the list has no features: its own form is a guess.
+        is_guess = any(step.choice.best.is_generic for step in named)
+        share = GENERIC_SHARE if is_guess else LEAST_SHARE
+        further = _named(looks, least=share * most)
         if further is None:
             break
         found = _with(found, len(found.steps), further)

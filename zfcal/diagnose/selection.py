@@ -33,15 +33,15 @@ Told = Callable[[str, int, int], None]
 LEVEL = 0.02
 """Chance of a false alarm over the whole family."""
 
-_MOST_EFFECTS = 4
+MOST_EFFECTS = 4
 _SUSPECTS = 6
 RIVALS = 3
 _LEAST_NATS = 6.0
-_LEAST_SHARE = 0.15
+LEAST_SHARE = 0.15
 """A further effect must gain this share of the first one's nats: an effect whose true form
 is a little different from its mechanism leaves something over that others answer to."""
 
-_GENERIC_SHARE = 0.5
+GENERIC_SHARE = 0.5
 """The same where one of the two is beyond the list. It names no mechanism: as the further one it
 answers to nearly all that a strong effect of another form leaves over, and as the first one its
 own form is a guess. Of headings and speeds one leaves nothing over in the other."""
@@ -158,7 +158,7 @@ def least_z(nats: float) -> float:
 
 def _least(done: Sequence[Step]) -> float:
     """Return what a further effect must gain, in nats."""
-    return max([_LEAST_NATS, *(_LEAST_SHARE * step.choice.best.nats for step in done[:1])])
+    return max([_LEAST_NATS, *(LEAST_SHARE * step.choice.best.nats for step in done[:1])])
 
 
 def _least_beside(first: Refit | None, further: Refit) -> float:
@@ -167,7 +167,7 @@ def _least_beside(first: Refit | None, further: Refit) -> float:
         return 0.0
     pair = (first.candidate.effect, further.candidate.effect)
     guessed = first.is_generic and pair[0].on_speed == pair[1].on_speed
-    return _GENERIC_SHARE * first.nats if guessed or further.is_generic else 0.0
+    return GENERIC_SHARE * first.nats if guessed or further.is_generic else 0.0
 
 
 def _is_clearer(rival: Refit, listed: Refit) -> bool:
@@ -269,7 +269,7 @@ class Selector:
         first = tuple(best_of(self.listed, scores))
         ranked = self._others(screen, first)
         left_over = len(ranked) < len(first)
-        for number in range(_MOST_EFFECTS):
+        for number in range(MOST_EFFECTS):
             sampled = Sampled(whole=screen)
             if number:
                 known = self._asked_again(sampled, steps, known)
@@ -281,7 +281,7 @@ class Selector:
                 break
             steps.append(step)
             screen = step.choice.best.screen
-            self.told("adding effects", number + 1, _MOST_EFFECTS)
+            self.told("adding effects", number + 1, MOST_EFFECTS)
         return Selection(steps=tuple(steps), screened=first, final=screen, left_over=left_over)
 
     def _others(self, screen: Screen, ranked: Sequence[Best]) -> list[Best]:
