@@ -21,7 +21,8 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms, in_model
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
-from zfcal.diagnose.features.gains import Gain, fits_beside, gains_of
+from zfcal.diagnose.features.asking import fits_beside, gains_of
+from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told, tell
 from zfcal.diagnose.heldout import heading_gains

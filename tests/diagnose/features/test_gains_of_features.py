@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from zfcal.diagnose.features.gains import Fits, Gain, gains_of, kind_of
+from zfcal.diagnose.features.asking import gains_of, kind_of
+from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.selection import LEVEL
