@@ -8,18 +8,7 @@ import subprocess
 import sys
 import time
 
-OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-pipe",
-)
+OPTIONS = ("--hide-scrollbars", "--remote-debugging-pipe")
 
 # Chromium reads the descriptor 3 and writes to 4.
 _RUN = """
@@ -36,16 +25,16 @@ class Browser:
 
     Parameters
     ----------
-    program
-        Path of Chromium.
+    command
+        Path of Chromium, and options that show nothing.
     profile
         A folder for what it keeps.
     """
 
-    def __init__(self, program, profile):
+    def __init__(self, command, profile):
         theirs_in, self._to = os.pipe()
         self._from, theirs_out = os.pipe()
-        words = [program, *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
+        words = [*command, *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
         self._process = subprocess.Popen(
             [sys.executable, "-c", _RUN, str(theirs_in), str(theirs_out), *words],
             pass_fds=(theirs_in, theirs_out),

@@ -10,9 +10,22 @@ PACKAGES = {
     "chromium": ("chromium", "chromium-browser"),
     "rsync": ("rsync",),
     "iproute2": ("ip",),
+    "man-db": ("man",),
     "faketime": ("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1",),
 }
 """What is needed of each package: a program, or a file; the first that is there will do."""
+
+HEADLESS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+"""Options of a Chromium that shows nothing and asks nobody."""
 
 
 def need(package):

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -54,9 +53,10 @@ def test_signs_are_no_orders_to_the_formatter(pages):
         assert orders <= allowed
 
 
-@pytest.mark.skipif(shutil.which("man") is None, reason="needs man")
-def test_man_shows_each_page_without_a_warning(pages):
+@pytest.mark.apt
+def test_man_shows_each_page_without_a_warning(pages, debian):
     """The formatter itself reads them."""
+    debian.need("man-db")
     for name, path in pages.items():
         words = ["man", "--warnings", "-l", "-E", "ascii", str(path)]
         env = os.environ | {"MANPAGER": "cat", "MANWIDTH": "100", "LC_ALL": "C.UTF-8"}

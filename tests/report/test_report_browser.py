@@ -9,17 +9,7 @@ import pytest
 
 from zfcal.report.figures import theme
 
-OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--virtual-time-budget=5000",
-)
+LOADED = "--virtual-time-budget=5000"
 # Chromium's words for the two colour schemes.
 SCHEMES = {"dark": 0, "light": 1}
 
@@ -72,7 +62,8 @@ def look(debian, drawn_trial, tmp_path):
         done = subprocess.run(
             [
                 chromium,
-                *OPTIONS,
+                *debian.HEADLESS,
+                LOADED,
                 f"--user-data-dir={tmp_path / 'profile'}",
                 f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}",
                 "--window-size=1400,1000",

@@ -18,7 +18,9 @@ LINK = "document.getElementById('link').textContent"
 @pytest.fixture
 def browser(debian, browsing, tmp_path):
     """Return a page of Chromium that a test drives."""
-    with browsing.Browser(debian.need("chromium"), tmp_path / "profile") as opened:
+    with browsing.Browser(
+        [debian.need("chromium"), *debian.HEADLESS], tmp_path / "profile"
+    ) as opened:
         opened.show()
         yield opened
 

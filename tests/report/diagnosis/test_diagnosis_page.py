@@ -29,17 +29,7 @@ from zfcal.report.diagnosis.words import statements, verdict_sentence
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
 
-OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--virtual-time-budget=5000",
-)
+LOADED = "--virtual-time-budget=5000"
 # Chromium's words for the two colour schemes.
 SCHEMES = {"dark": 0, "light": 1}
 
@@ -650,7 +640,8 @@ def test_the_page_fits_and_can_be_read(debian, drawn_page, tmp_path, width, sche
     )
     words = [
         debian.need("chromium"),
-        *OPTIONS,
+        *debian.HEADLESS,
+        LOADED,
         f"--user-data-dir={tmp_path / 'profile'}",
         f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}",
         "--window-size=1400,1000",
