@@ -78,9 +78,9 @@ class Packed(NamedTuple):
     dt_s
         The step, the same for all.
     lags : ndarray of int64, shape (model,)
-        Steps by which agents respond late: others are seen where they were then.
-    lates : ndarray, shape (model, 3)
-        Columns LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART.
+        Steps by which agents respond late, the begun one counted: others are seen where they were.
+    lates : ndarray, shape (model, LATE_COLUMNS)
+        Columns LATE_SHARE, LATE_FELT_M (m), LATE_WHOLE, LATE_PART: the share of the begun step.
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
