@@ -36,6 +36,7 @@ def test_a_candidate_has_its_shape_and_a_strength(candidate):
         "grading": 1.0,
         "leaning": 0.0,
         "turning": 0.0,
+        "among": 0.0,
     }
     assert own.name == "alignment"
     assert own.notable == 20.0

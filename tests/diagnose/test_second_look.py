@@ -120,12 +120,20 @@ def test_what_was_named_stays_by_what_it_gains(law, generic, share, stays):
     assert _stays(there, told, law) is stays
 
 
-def test_the_same_name_stays_in_its_own_form(law):
-    """And one that features cannot tell from the best."""
+def test_the_same_name_stays_in_its_own_form_unless_features_gain_more(law):
+    """What features cannot tell from the best stays as well."""
     values = np.full(len(law.rows), 0.1)
+    by = np.bincount(law.turns.at, values, minlength=len(law.scene.k))
+    apart = np.random.default_rng(6).normal(0, 0.1, len(by))
+    same = by + apart - apart.mean()
+    told = Told(gain=gain("alignment", values), p=0.0, ties=())
+    for share, stays in ((1.0, True), (0.5, False)):
+        there = SimpleNamespace(
+            name="alignment", gain=share * same, nats=share * same.sum(), is_generic=False
+        )
+        assert _stays(there, told, law) is stays
     nothing = np.zeros(len(law.scene.k))
     there = SimpleNamespace(name="alignment", gain=nothing, nats=0.0, is_generic=False)
-    assert _stays(there, Told(gain=gain("alignment", values), p=0.0, ties=()), law)
     tied = Told(gain=gain("x", values), p=0.0, ties=(gain("alignment", values),))
     assert _stays(there, tied, law)
 

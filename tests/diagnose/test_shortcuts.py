@@ -33,8 +33,9 @@ def packed_with(own, effect, arena, **given):
     """Return an effect as a model has it, each of its parameters well away from zero."""
     middling = {p.name: p.default or min(0.7, p.high) for p in effect.parameters}
     here = own.scene.states[own.scene.turns.at[0], :, own.scene.turns.who[0]]
-    # Leaning, where some headings may be drawn instead: that is no factor.
+    # Leaning, where some headings may be drawn or turned instead: that is no factor.
     place = {"x_m": here[X] + 0.05, "y_m": here[Y], "drawn": 0.0}
+    place |= {"turning": 0.0} if effect.name == "turning-memory" else {}
     middling |= {name: at for name, at in place.items() if name in middling} | given
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return pack([model], arena)

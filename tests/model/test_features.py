@@ -39,6 +39,7 @@ def seen():
         speed_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
         heading=ways(N, OTHERS),
         here=np.ones((N, OTHERS), dtype=bool),
+        in_sight=rng.random((N, OTHERS)) < 0.7,
         is_robot=robot,
         other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:OTHERS], (N, 1)),
         own_heading=ways(N),
@@ -159,7 +160,7 @@ def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
 def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
     """There the base forgets the heading, and a heading before is but the present one."""
     unknown = dataclasses.replace(seen, last_turn_rad=np.array([0.0, 0.2] * (N // 2)))
-    drawn, leaning = features_of("turning-memory", arena)[1:]
+    drawn, leaning = features_of("turning-memory", arena)[2:]
     expected = (~seen.follows_walls) & (unknown.last_turn_rad != 0)
     np.testing.assert_array_equal(drawn.weights(unknown)[:, 0, 0], expected)
     np.testing.assert_array_equal(leaning.vectors(unknown)[:, 0].any(axis=1), expected)

@@ -98,6 +98,9 @@ def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
     return _at(find_effect(name), values)
 
 
+_LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
+
+
 def _at(effect: Effect, values: Mapping[str, float]) -> Candidate:
     own = {p.name: values.get(p.name, p.default) for p in effect.parameters}
     shape = {key: value for key, value in own.items() if key != effect.strength}
@@ -126,9 +129,19 @@ def candidates_of(
     return tuple(made)
 
 
-def further_forms(effect: Effect, arena: Arena) -> tuple[Candidate, ...]:
-    """Return an effect at the shapes in which features alone may find it."""
-    return tuple(_at(effect, shape) for shape in effect.further_shapes(arena))
+def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
+    """Return an effect at the shapes in which features alone may find it.
+
+    One that responds late may do so by half a step of the recording, by one, and so on.
+    """
+    shapes = list(effect.further_shapes(scene.arena))
+    if effect.lag is not None:
+        shapes += [
+            {effect.lag: steps * scene.dt_s, "felt_m": 0.0, "whole": whole}
+            for whole in (1.0, 0.0)
+            for steps in _LATE_STEPS
+        ]
+    return tuple(_at(effect, shape) for shape in shapes)
 
 
 def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[str, str]]:

@@ -147,12 +147,13 @@ class Screen:
             scene = replace(scene, states=scene.states.copy())
             scene.states[:, TRAIT] = 1.0
         raw = self.heading_scores(scene, candidate)
+        if effect.by_trait:
+            # The model's parameters are the same for all: they explain nothing of how fish differ.
+            return self._scatter(candidate, np.where(self.fitted.used, raw, 0.0))
         steps = self.project(raw)
         if not (steps**2).sum() > _LEFT * (raw**2).sum():
             # What the model has already leaves but the error of its own approximation.
             steps = np.zeros_like(raw)
-        if effect.by_trait:
-            return self._scatter(candidate, steps)
         return summed(candidate, steps)
 
     def own_scores(self, candidate: Candidate) -> Floats:

@@ -155,6 +155,9 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     if there is not None and _stays(there.choice.best, told, looks.laws[0]):
         return None
     found, score = _in_the_model(case, screen, told.gain.name)
+    same = None if there is None or there.choice.best.name != found.name else there.choice.best
+    if same is not None and not found.worth > same.worth:
+        return None
     ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
     step = Step(
         choice=Choice(best=found, ties=ties, considered=(found, *ties)),
@@ -310,8 +313,11 @@ def _law(case: Case, screen: Screen, noise_m: float) -> Law:
 
 
 def _stays(there: Refit, told: Told, law: Law) -> bool:
-    """Return whether what was named is kept beside what features say."""
-    if there.name in {told.gain.name, *(gain.name for gain in told.ties)}:
+    """Return whether what was named is kept beside what features say.
+
+    Where they say the same and gain more, it is put into the model in another form.
+    """
+    if there.name in {gain.name for gain in told.ties}:
         return True
     by = by_sample(law.scene, law.turns.at, told.gain.log_p) - there.gain
     error = float(by.std()) * float(np.sqrt(len(by)))
@@ -343,7 +349,7 @@ def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()
 def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
     """Return an effect in the model in that form which gains most, and its score there."""
     own = [each for each in (*case.listed, *case.generic) if each.name == name]
-    own += further_forms(find_effect(name), case.scene.arena)
+    own += further_forms(find_effect(name), case.scene)
     scores = ask_all(screen, own, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -abs(each.z)):

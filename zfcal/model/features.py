@@ -47,7 +47,7 @@ class Seen:
         Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its speed.
     heading : ndarray, shape (step, other, 2)
         Of the other.
-    here, is_robot : ndarray of bool, shape (step, other)
+    here, in_sight, is_robot : ndarray of bool, shape (step, other)
     other : ndarray of int, shape (step, other)
         Track of the other; -1 for who is not there.
     own_heading, along_wall, way_out, xy_m : ndarray, shape (step, 2)
@@ -79,6 +79,7 @@ class Seen:
     speed_m_s: Floats
     heading: Floats
     here: NDArray[np.bool_]
+    in_sight: NDArray[np.bool_]
     is_robot: NDArray[np.bool_]
     other: NDArray[np.int32]
     own_heading: Floats

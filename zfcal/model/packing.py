@@ -12,7 +12,7 @@ from scipy.special import i0e
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
-from zfcal.model.effects import MAX_PARAMETERS, Effect, find_effect
+from zfcal.model.effects import MAX_PARAMETERS, NEIGHBOURS, Effect, find_effect
 from zfcal.model.effects.genome import genome_length, with_strengths
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
 from zfcal.model.kernels.state import (
@@ -149,7 +149,7 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         lags=_lags(effects, models, n_models),
         lates=_lates(effects, models, n_models),
         clock_s=np.array([0.0, 1.0]),
-        components=_hooks(effects, "component", models),
+        components=_with_each(_hooks(effects, "component", models), effects, models),
         factors=_hooks(effects, "factor", models),
         speeds=_hooks(effects, "speed", models),
         sights=_hooks(effects, "sight", models),
@@ -198,6 +198,34 @@ def _hooks(effects: Sequence[Effect], kind: str, models: Sequence[Parameters]) -
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
 
 
+def _with_each(
+    components: NDArray[np.int64], effects: Sequence[Effect], models: Sequence[Parameters]
+) -> NDArray[np.int64]:
+    """Return the calls of components with those for each neighbour, on parameters of their own."""
+    rows = [
+        (effects[row].component.address, len(effects) + NEIGHBOURS * number + rank)
+        for number, row in enumerate(_of_each(effects, models))
+        for rank in range(NEIGHBOURS)
+    ]
+    return np.concatenate([components, np.array(rows, dtype=np.int64).reshape(-1, 2)])
+
+
+def _of_each(effects: Sequence[Effect], models: Sequence[Parameters]) -> list[int]:
+    """Return which effects have a component for each neighbour in any model."""
+    return [
+        row
+        for row, effect in enumerate(effects)
+        if effect.each
+        and any(
+            dict(zip(effect.names, effect.values(model.effects[effect.name]), strict=True))[
+                effect.each
+            ]
+            != 0.0
+            for model in models
+        )
+    ]
+
+
 def _lags(
     effects: Sequence[Effect], models: Sequence[Parameters], n_models: int
 ) -> NDArray[np.int64]:
@@ -243,4 +271,9 @@ def _effect_parameters(
         for model in range(n_models):
             given = models[model % len(models)].effects[effect.name]
             packed[model, row, : len(effect.parameters)] = effect.values(given)
-    return packed
+    each = [
+        np.where(np.arange(MAX_PARAMETERS) == MAX_PARAMETERS - 1, rank, packed[:, row])
+        for row in _of_each(effects, models)
+        for rank in range(1, NEIGHBOURS + 1)
+    ]
+    return np.concatenate([packed, np.stack(each, axis=1)], axis=1) if each else packed

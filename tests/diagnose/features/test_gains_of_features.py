@@ -5,14 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+from scipy.special import logit
 
 from zfcal.diagnose.features.asking import gains_of, kind_of
+from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.extended import maximise
+from zfcal.model.extended import LAPSE, maximise
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
 
 
@@ -111,8 +114,9 @@ def test_the_own_way_is_never_gone(nothing):
 
 def test_of_places_a_few_are_fitted_and_all_are_counted(nothing):
     """Each gain says of how many it is the best, and its chance is that of so many."""
-    drawn = find_effect("place-preference").features(nothing.law.scene.arena)[0]
-    found = nothing.best_of("place-preference", drawn)
+    place = find_effect("place-preference")
+    drawn = place.features(nothing.law.scene.arena)[0]
+    found = gains_of(nothing.law, [place], kinds={("place-preference", "drawn")})
     assert 0 < len(found) <= 2
     assert {each.n_tried for each in found} == {len(drawn.features)}
     assert {each.key for each in found} == {("place-preference", "drawn")}
@@ -205,3 +209,66 @@ def test_chance_tells_a_name_as_seldom_as_the_level_says():
     ratios = rng.chisquare(1, (2000, 40)) / 2
     told = sum(tell([gain(str(k), [r]) for k, r in enumerate(row)]) is not None for row in ratios)
     assert 0.005 < told / 2000 < LEVEL + 3 * math.sqrt(LEVEL / 2000)
+
+
+def test_a_search_ends_where_a_library_ends():
+    """A lapse and two bounded strengths, one of them at its bound: the maximum is the same."""
+    rng = np.random.default_rng(3)
+    columns, density = rng.normal(size=(400, 2)), np.exp(rng.normal(size=400))
+
+    def log_p(x):
+        lapse = 1 / (1 + math.exp(-x[2]))
+        made = density * np.exp(columns @ x[:2] - (x[:2] ** 2).sum())
+        return np.log((1 - lapse) * made + lapse / (2 * math.pi))
+
+    def objective(x):
+        def scores():
+            return np.stack([(log_p(x + d) - log_p(x - d)) / 2e-6 for d in 1e-6 * np.eye(3)], 1)
+
+        return log_p(x).sum(), scores
+
+    bounds = [(None, None), (0.2, 1.0)]
+    ours = climb(objective, np.array([0.0, 0.5, -3.0]), bounds)
+    ends = [*bounds, tuple(logit(LAPSE))]
+    theirs = minimize(lambda x: -log_p(x).sum(), [0.0, 0.5, -3.0], bounds=ends)
+    assert log_p(ours).sum() == pytest.approx(-theirs.fun, abs=0.02)
+    assert ours[1] == 0.2
+
+
+def test_the_base_is_fitted_again_beside_a_tilt(base, hidden):
+    """All headings lean on: the own concentration had grown by it, and goes back."""
+    scene, _ = base
+    heading = np.arctan2(scene.turns.heading[:, 1], scene.turns.heading[:, 0])
+    along = np.arctan2(scene.turns.along_wall[:, 1], scene.turns.along_wall[:, 0])
+    follows = np.abs(scene.turns.along_wall).sum(axis=1) > 0
+    law = hidden(
+        lambda angle: np.exp(0.8 * np.where(follows, 1.0, 0.0)[:, None]
+                             * np.cos(angle - np.where(follows, along, heading)[:, None]))
+    )  # fmt: skip
+    fits = Fits(law=law)
+    tilt = Tilt(label="on", vectors=lambda seen: seen.along_wall[:, None])
+    first = fits.gain("x", tilt)
+    again = fits.refitted(tilt, first)
+    assert again.log_p.sum() > first.log_p.sum() + 3
+    assert fits.refitted(tilt, again).log_p.sum() == pytest.approx(again.log_p.sum())
+
+
+def test_what_fish_are_drawn_to_of_each_that_they_see_is_cohesion(base, hidden):
+    """Nobody behind draws: with those behind as well half of it would be lost."""
+    scene, fitted = base
+    mixture, _, _ = fitted.tables()
+    law = Law(scene=scene, fitted=fitted)
+    (draw,) = law.draws
+    seen = draw.seen
+
+    def factor(angle):
+        odd = np.zeros_like(mixture)
+        for j in range(seen.bearing.shape[1]):
+            centre = np.arctan2(seen.bearing[:, j, 1], seen.bearing[:, j, 0])
+            odd += 0.05 * seen.in_sight[:, j, None] * bump(angle, centre, 5.0)
+        return 1 + odd / np.maximum(mixture, 1e-12)
+
+    found = gains_of(hidden(factor), [find_effect("group-cohesion")])
+    nats = {each.label: each.nats for each in found}
+    assert nats["drawn to each seen"] == max(nats.values())
+    assert nats["drawn to each seen"] > nats["drawn to each"] + 3

@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import TypeAlias
 
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import best_by_name, once
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
 from zfcal.model.features import Component, Feature, Leaving, OneOf, Tilt, Turned
 
-_MOST_LESS = 1.0
-"""By how much less of a component there may be than in the model, where an effect is there."""
+_IN_REACH = 0.5
+"""Share of the nats of the best one below which a feature is not fitted anew."""
+
+Single: TypeAlias = Component | Turned | Tilt | Leaving
 
 
 def gains_of(  # noqa: PLR0913 - the last ones have defaults
@@ -58,8 +62,25 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
-    # One fish has nobody to follow: then a feature of who is who has no strength at all.
-    return [gain for some in found for gain in some if gain.n_strengths]
+        # One fish has nobody to follow: then a feature of who is who has no strength at all.
+        some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
+        hopeful = _hopeful([gain for _, gain in some])
+        return list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
+
+
+def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
+    """Return the best feature of each name that may turn out to gain most."""
+    n_tried = sum(gain.n_tried for gain in once(gains))
+    best = best_by_name(gains)
+    most = max((gain.nats for gain in best), default=0.0)
+    return [gain for gain in best if gain.p * n_tried < LEVEL and gain.nats > _IN_REACH * most]
+
+
+def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -> Gain:
+    feature, gain = asked
+    if isinstance(feature, Tilt) and any(gain is each for each in hopeful):
+        return fits.refitted(feature, gain)
+    return gain
 
 
 def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
@@ -82,18 +103,21 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
             for each in chosen:
                 if isinstance(each, Component | Turned):
-                    also.append(_either_way(each))
+                    also.append(_either_way(each, law.most))
                 elif isinstance(each, Tilt) or law.between:
                     law = _absorbed(law, each)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
 
 
-def _either_way(feature: Component | Turned) -> Component | Turned:
-    """Return a feature that may also take away: a model's form of its effect may have too much."""
+def _either_way(feature: Component | Turned, most: float) -> Component | Turned:
+    """Return a feature that may also take away: a model's form of its effect may have too much.
+
+    Of a component no more than ``most``, the largest weight that one has in the model.
+    """
     if isinstance(feature, Turned):
         return replace(feature, low=None)
-    low = -(feature.high or _MOST_LESS) if feature.low == 0.0 else feature.low
+    low = -most if feature.low == 0.0 else feature.low
     return replace(feature, low=low, high=feature.high or None)
 
 
@@ -117,5 +141,12 @@ def kind_of(feature: Feature) -> str:
     return feature.kind if isinstance(feature, OneOf) else feature.label
 
 
-def _gains(fits: Fits, name: str, feature: Feature) -> list[Gain]:
-    return fits.best_of(name, feature) if isinstance(feature, OneOf) else [fits.gain(name, feature)]
+def _gains(fits: Fits, name: str, feature: Feature) -> list[tuple[Single, Gain]]:
+    """Return a feature, or the most promising of several, with what they add."""
+    if not isinstance(feature, OneOf):
+        return [(feature, fits.gain(name, feature))]
+    n = len(feature.features)
+    return [
+        (each, replace(fits.gain(name, each), n_tried=n, kind=feature.kind))
+        for each in fits.most_promising(feature)
+    ]

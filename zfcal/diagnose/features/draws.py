@@ -220,6 +220,7 @@ def _seen(
         speed_m_s=theirs(SPEED, at),
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         here=here,
+        in_sight=angle[rows, others] > 0,
         is_robot=(theirs(KIND, at) > 0) & here,
         other=np.where(here, steps.scene.tracks[at[:, None], others], -1),
         own_heading=heading,

@@ -275,6 +275,11 @@ class Law:
         known = np.array([zone.follows_walls for zone in self.scene.arena.zones])
         return np.asarray(known[self.turns.zone - 1])
 
+    @property
+    def most(self) -> float:
+        """The largest weight of a component that effects of the model add to the mixture."""
+        return float(self.fitted.view.parts[:, :, 0].max(initial=0.0))
+
     @cached_property
     def own(self) -> Columns:
         """The own stimulus alone, shape (step, 1)."""

@@ -49,7 +49,7 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
     noise
         Asked of those alone that stand out; None for positions that are exact.
     """
-    n_tried = sum(gain.n_tried for gain in _once(gains))
+    n_tried = sum(gain.n_tried for gain in once(gains))
     clear = [gain for gain in gains if gain.p * n_tried < LEVEL and gain.nats > 0]
     if noise is not None:
         ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
@@ -78,7 +78,7 @@ def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
     return sorted(found.values(), key=lambda gain: -gain.nats)
 
 
-def _once(gains: Sequence[Gain]) -> list[Gain]:
+def once(gains: Sequence[Gain]) -> list[Gain]:
     """Return gains with one of those that are the best of the same features by the same law."""
     return list({(gain.key, gain.without_noise): gain for gain in gains}.values())
 

@@ -12,11 +12,12 @@ import pkgutil
 from functools import cache
 
 from zfcal.errors import InputError
-from zfcal.model.effects.base import MAX_PARAMETERS, Company, Effect, EffectParameter
+from zfcal.model.effects.base import MAX_PARAMETERS, NEIGHBOURS, Company, Effect, EffectParameter
 from zfcal.model.effects.generic import PREFIX, generic_effects
 
 __all__ = [
     "MAX_PARAMETERS",
+    "NEIGHBOURS",
     "Company",
     "Effect",
     "EffectParameter",

@@ -8,7 +8,14 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
-from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, tilt
+from zfcal.model.effects.forms import (
+    Hooked,
+    apart,
+    nearest_agent,
+    needs_neighbour,
+    seen_by_rank,
+    tilt,
+)
 from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, attended, evenly
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -25,8 +32,22 @@ _WAY_PER_WEIGHT = 0.01
 
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
-    """Add a component about the neighbours' mean heading; the more they agree, the heavier."""
+    """Add a component about the neighbours' mean heading; the more they agree, the heavier.
+
+    Or about the heading of the nearest, or one about that of each.
+    """
     if parameters[3] > 0.0 or parameters[4] > 0.0:
+        return 0.0
+    if parameters[5] > 0.0 or parameters[7] > 0.0:
+        of_each = parameters[5] > 1.0
+        if of_each == (parameters[7] > 0.0):
+            k = seen_by_rank(state, sight, n, i, parameters[7]) if of_each else (
+                nearest_agent(state, n, i)
+            )  # fmt: skip
+            if k >= 0:
+                out[0], out[1], out[2] = state[HX * n + k], state[HY * n + k], parameters[1]
+                graded = of_each and parameters[2] > 0.0
+                return parameters[0] * (sight[i * n + k] if graded else _USUAL_SR)
         return 0.0
     x, y = 0.0, 0.0
     for j in range(n):
@@ -183,6 +204,14 @@ EFFECT = Effect(
             says="1: all turn toward the mean heading of those within 0.15 m, by a hundredth of "
             "the way per weight; along a wall they prefer the sense that is nearer to it.",
         ),
+        EffectParameter(
+            name="among",
+            low=0.0,
+            high=2.0,
+            default=0.0,
+            says="0: the mean heading of those that are seen; 1: the heading of the nearest, seen "
+            "or not, as one of 0.01 sr; 2: a component about the heading of each that is seen.",
+        ),
     ),
     strength="weight",
     probe=0.5,
@@ -198,8 +227,14 @@ EFFECT = Effect(
         {"leaning": 1.0},
         {"turning": 1.0},
     ),
+    each="among",
+    further_shapes=lambda _arena: tuple(
+        {"kappa": kappa, **form}
+        for kappa in (3.0, 8.0)
+        for form in ({"among": 1.0}, {"among": 2.0}, {"among": 2.0, "grading": 0.0})
+    ),
     lacks=needs_neighbour,
-    fixed=("grading", "leaning", "turning"),
+    fixed=("grading", "leaning", "turning", "among"),
     needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
     other_forms=("generic:heading:neighbour-heading",),
     control=Control(name="neighbours' heading 12 s ago", states=_late),

@@ -42,6 +42,9 @@ from zfcal.model.features import Feature
 
 MAX_PARAMETERS = 8
 
+NEIGHBOURS = 8
+"""Of so many neighbours each may have a component of its own."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffectParameter:
@@ -165,6 +168,10 @@ class Effect:
         So few headings are asked instead of all.
     by_landing
         Whether that number differs between zones.
+    each
+        Name of a shape, empty for most: where it is not zero, the component's function is called
+        for each of the nearest neighbours in sight, `NEIGHBOURS` of them, rather than once. Which
+        one it is, from one on, is the last of `MAX_PARAMETERS` numbers.
     lag
         Name of a parameter in seconds by which agents respond late; the strength is the
         share of what they see that is late, and ``felt_m`` and ``whole`` say of whom and
@@ -228,6 +235,7 @@ class Effect:
     rotation: Any = None
     harmonics: int | None = None
     by_landing: bool = False
+    each: str = ""
     lag: str | None = None
     shapes: Callable[[Arena], Shapes] = _as_it_is
     further_shapes: Callable[[Arena], Shapes] = _no_further

@@ -9,13 +9,29 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, hats, only
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.state import LEFT_S, ROOM
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.state import LEFT_S, MOUTH_X, MOUTH_Y, ROOM
+
+_KAPPA = 3.0
+_PER_STRENGTH = 0.1
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the direction of the way out while another's leaving is fresh."""
+    since_s = state[LEFT_S * n + i]
+    if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
+        return 0.0
+    out[0], out[1], out[2] = state[MOUTH_X * n + i], state[MOUTH_Y * n + i], _KAPPA
+    fresh = 1.0 - beyond(since_s, parameters[1])
+    return _PER_STRENGTH * max(parameters[0], 0.0) * parameters[3] * fresh
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the way out while another's leaving is fresh."""
+    if parameters[3] > 0.0:
+        return 1.0
     since_s = state[LEFT_S * n + i]
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 1.0
@@ -80,8 +96,17 @@ EFFECT = Effect(
             default=1.0,
             says="1: headings toward the way out, all over the room; 0: steps across it.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: all headings lean toward the way out; 1: some are drawn about its direction, "
+            "as a component of the weight 0.1 per strength.",
+        ),
     ),
     probe=0.01,
+    component=component,
     factor=factor,
     harmonics=1,
     by_landing=True,
@@ -90,8 +115,12 @@ EFFECT = Effect(
         for share in (1.0, 0.0)
         for memory_s in (2.0, 5.0, 12.0)
     ),
+    further_shapes=lambda _arena: tuple(
+        {"memory_s": memory_s, "drawn": 1.0} for memory_s in (1.0, 2.0, 4.0, 8.0)
+    ),
     lacks=_lacks,
     identity_s=10.0,
-    fixed=("heading_share",),
+    fixed=("heading_share", "drawn"),
+    needs={"component": ("drawn",)},
     features=lambda _arena: _FEATURES,
 )

@@ -17,6 +17,7 @@ from zfcal.model.kernels.state import (
     MOUTH_Y,
     TAU_X,
     TAU_Y,
+    ZONE,
     X,
     Y,
 )
@@ -142,6 +143,36 @@ def nearest_seen(state: Hooked, sight: Hooked, n: int, i: int) -> int:
     found, least = -1, math.inf
     for j in range(n):
         if sight[i * n + j] > 0.0:
+            away = apart(state, n, i, j)
+            if away < least:
+                found, least = j, away
+    return found
+
+
+@inlined
+def seen_by_rank(state: Hooked, sight: Hooked, n: int, i: int, rank: float) -> int:
+    """Return who is so many-th nearest, from one on, of those that agent i sees; -1 for nobody."""
+    found, last, last_j = -1, -1.0, -1
+    for _ in range(int(rank)):
+        found, least = -1, math.inf
+        for j in range(n):
+            if sight[i * n + j] > 0.0:
+                away = apart(state, n, i, j)
+                after = away > last or (away == last and j > last_j)
+                if after and away < least:
+                    found, least = j, away
+        if found < 0:
+            return -1
+        last, last_j = least, found
+    return found
+
+
+@inlined
+def nearest_agent(state: Hooked, n: int, i: int) -> int:
+    """Return the nearest other agent, seen or not; -1 for nobody."""
+    found, least = -1, math.inf
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
             away = apart(state, n, i, j)
             if away < least:
                 found, least = j, away

@@ -8,7 +8,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import Hooked, needs_neighbour, tilt
+from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, seen_by_rank, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, hats, only
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
@@ -37,10 +37,24 @@ def grown(away_m: float, full_m: float) -> float:
 
 
 @hook(COMPONENT)
-def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Add a component about the bearing of the centroid of all others, seen or not."""
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
+    """Add a component about the bearing of the centroid of all others, seen or not.
+
+    Or one about that of each that is seen.
+    """
     if parameters[3] > 0.0:
         return 0.0
+    if parameters[4] > 0.0 or parameters[7] > 0.0:
+        if not parameters[4] > 0.0 or not parameters[7] > 0.0:
+            return 0.0
+        k = seen_by_rank(state, sight, n, i, parameters[7])
+        if k < 0:
+            return 0.0
+        far_m = max(apart(state, n, i, k), 1e-9)
+        out[0] = (state[X * n + k] - state[X * n + i]) / far_m
+        out[1] = (state[Y * n + k] - state[Y * n + i]) / far_m
+        out[2] = parameters[1]
+        return parameters[0] * grown(far_m, parameters[2])
     out[0], out[1], away_m = centroid(state, n, i)
     out[2] = parameters[1]
     return parameters[0] * grown(away_m, parameters[2]) if away_m > 0.0 else 0.0
@@ -86,6 +100,10 @@ def _of_each(seen: Seen) -> Floats:
     return seen.by_distance(_KNOTS_M)
 
 
+def _of_each_seen(seen: Seen) -> Floats:
+    return _of_each(seen) * seen.in_sight[..., None]
+
+
 def _leaning_to_each(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _of_each(seen), seen.bearing))
 
@@ -94,6 +112,7 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0),
     Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
     Component(label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0),
+    Component(label="drawn to each seen", toward="bearing", weights=_of_each_seen, kappa=5.0),
     Tilt(label="leaning", vectors=_leaning, low=0.0),
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0),
 )
@@ -133,6 +152,14 @@ EFFECT = Effect(
             says="0: some headings are drawn about that bearing; 1: all headings lean toward it, "
             "by one nat per weight.",
         ),
+        EffectParameter(
+            name="each",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: a component about the bearing of each that is seen, each of the whole weight, "
+            "in place of one about the centroid.",
+        ),
     ),
     strength="weight",
     probe=0.005,
@@ -147,8 +174,14 @@ EFFECT = Effect(
         {"leaning": 1.0, "full_m": 0.0},
         {"leaning": 1.0, "full_m": 0.3},
     ),
+    each="each",
+    further_shapes=lambda _arena: tuple(
+        {"kappa": kappa, "full_m": full_m, "each": 1.0}
+        for kappa in (2.0, 6.0)
+        for full_m in (0.0, 0.3)
+    ),
     lacks=needs_neighbour,
-    fixed=("full_m", "leaning"),
+    fixed=("full_m", "leaning", "each"),
     needs={"factor": ("leaning",)},
     features=lambda _arena: _FEATURES,
 )

@@ -16,13 +16,23 @@ from zfcal.model.kernels.state import SPEED
 
 
 @hook(SIGHT)
-def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh a neighbour by how much faster than 0.07 m/s it swims."""
+def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
+    """Weigh a neighbour by how much faster than 0.07 m/s it swims, or one of them alone."""
+    if parameters[2] >= 0.0:
+        return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
+    if parameters[1] > 0.0:
+        for k in range(n):
+            if sight[i * n + k] > 0.0 and state[SPEED * n + k] > state[SPEED * n + j]:
+                return 1.0
+        return math.exp(parameters[0])
     return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
 
 
 _MOST_FISH = 12
 """With more than so many tracks nobody is known for long enough to be followed as such."""
+
+_MOST_LED = 8
+"""Of so many agents each is tried as the one that is followed."""
 
 _KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
 
@@ -68,9 +78,29 @@ EFFECT = Effect(
             says="Log of the attention gained per 0.05 m/s that a neighbour is faster than "
             "0.07 m/s.",
         ),
+        EffectParameter(
+            name="fastest",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the fastest of those that are seen gets all of it, as one 0.05 m/s faster.",
+        ),
+        EffectParameter(
+            name="who",
+            low=-1.0,
+            high=99.0,
+            default=-1.0,
+            says="Number of the agent that gets all of it, whatever its speed, the first one 0; "
+            "-1: nobody in particular.",
+        ),
     ),
     probe=0.01,
     sight=sight,
+    further_shapes=lambda _arena: (
+        {"fastest": 1.0},
+        *({"who": float(who)} for who in range(_MOST_LED)),
+    ),
+    fixed=("fastest", "who"),
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,
 )

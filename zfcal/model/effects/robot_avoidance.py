@@ -8,13 +8,14 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import apart, tilt
+from zfcal.model.effects.forms import apart, beyond, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR, SIGHT
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, SIGHT
 from zfcal.model.kernels.state import KIND, X, Y
 
 _NEAR_M = 0.1
+_PER_STRENGTH = 0.1
 
 
 @hook(SIGHT)
@@ -22,7 +23,25 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Change the attention that a robot gets."""
     if not state[KIND * n + j] > 0.0:
         return 1.0
-    return math.exp(-parameters[0] * (1.0 - parameters[1]))
+    return math.exp(-parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]))
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
+    """Add a component about the way from the nearest robot that is seen, while it is close."""
+    nearest, far_m = -1, math.inf
+    for j in range(n):
+        if state[KIND * n + j] > 0.0 and sight[i * n + j] > 0.0:
+            away = apart(state, n, i, j)
+            if away < far_m:
+                nearest, far_m = j, away
+    if nearest < 0 or not parameters[2] > 0.0:
+        return 0.0
+    side = (1.0 if parameters[0] > 0.0 else -1.0) / max(far_m, 1e-9)
+    out[0] = side * (state[X * n + i] - state[X * n + nearest])
+    out[1] = side * (state[Y * n + i] - state[Y * n + nearest])
+    out[2] = parameters[4]
+    return _PER_STRENGTH * abs(parameters[0]) * (1.0 - beyond(far_m, parameters[3]))
 
 
 @hook(FACTOR)
@@ -91,15 +110,41 @@ EFFECT = Effect(
             default=0.0,
             says="0: the robot gets less attention; 1: it gets that of a fish, and is fled from.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: it gets the attention of a fish, and some headings are drawn about the way "
+            "from it, as a component of the weight 0.1 per strength.",
+        ),
+        EffectParameter(
+            name="reach_m",
+            low=0.02,
+            high=1.0,
+            default=0.15,
+            says="Distance within which headings are drawn about the way from it, in metres.",
+        ),
+        EffectParameter(
+            name="kappa",
+            low=0.0,
+            high=30.0,
+            default=5.0,
+            says="Von Mises concentration about that way.",
+        ),
     ),
     probe=0.01,
+    component=component,
     sight=sight,
     factor=factor,
     harmonics=1,
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
+    further_shapes=lambda _arena: tuple(
+        {"drawn": 1.0, "reach_m": reach_m, "kappa": 5.0} for reach_m in (0.07, 0.12, 0.2, 0.35)
+    ),
     lacks=_lacks,
-    fixed=("flight",),
-    needs={"factor": ("flight",)},
+    fixed=("flight", "drawn"),
+    needs={"factor": ("flight",), "component": ("drawn",)},
     features=lambda _arena: _FEATURES,
 )
 

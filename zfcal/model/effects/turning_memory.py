@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from zfcal.arrays import Floats
@@ -9,18 +11,34 @@ from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY
+from zfcal.model.kernels.hooks import FACTOR, ROTATION
+from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
+
+_PER_STRENGTH = 0.1
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of their turn times that of the last turn."""
+    if parameters[3] > 0.0:
+        return 1.0
     hx, hy = state[HX * n + i], state[HY * n + i]
     px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
     # A fish that has turned back has no side to go on to.
     last = (px * hy - py * hx) * max(0.0, px * hx + py * hy) ** parameters[2]
     return tilt(parameters[0], last * leftward(state, n, i, ux, uy, parameters[1]), abs(last))
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn the own direction on by a share of the last turn."""
+    if not parameters[3] > 0.0 or state[FOLLOWS * n + i] > parameters[1]:
+        return 0.0
+    hx, hy = state[HX * n + i], state[HY * n + i]
+    px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
+    on = px * hx + py * hy
+    last = math.atan2(px * hy - py * hx, on) * max(0.0, on) ** parameters[2]
+    return _PER_STRENGTH * parameters[0] * last
 
 
 def _shuffled(states: Floats, _dt_s: float, random: np.random.Generator) -> Floats:
@@ -35,6 +53,11 @@ def _shuffled(states: Floats, _dt_s: float, random: np.random.Generator) -> Floa
 
 def _last_turn(seen: Seen) -> Floats:
     return np.where(seen.follows_walls, 0.0, seen.last_turn_rad)
+
+
+def _slight_turn(seen: Seen) -> Floats:
+    """Return the last turn, of which less counts the wider it was, along walls as well."""
+    return np.asarray(seen.last_turn_rad * np.maximum(np.cos(seen.last_turn_rad), 0.0))
 
 
 def _before(seen: Seen) -> Floats:
@@ -65,6 +88,7 @@ def _leaning(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=_last_turn, neighbours=False),
+    Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
     Tilt(label="leaning to the heading before", vectors=_leaning),
 )
@@ -99,14 +123,29 @@ EFFECT = Effect(
             default=0.0,
             says="Power of the cosine of the last turn by which wide turns count for less.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the own direction, and that along a wall if along_walls is 1, is turned on by "
+            "a tenth of the last turn per strength.",
+        ),
     ),
     probe=0.01,
     factor=factor,
+    rotation=rotation,
     harmonics=2,
     shapes=lambda _arena: tuple(
         {"along_walls": along, "forgets_wide": wide} for along in (0.0, 1.0) for wide in (0.0, 1.0)
     ),
-    fixed=("along_walls", "forgets_wide"),
+    further_shapes=lambda _arena: tuple(
+        {"turning": 1.0, "along_walls": along, "forgets_wide": wide}
+        for along in (0.0, 1.0)
+        for wide in (0.0, 1.0)
+    ),
+    fixed=("along_walls", "forgets_wide", "turning"),
+    needs={"rotation": ("turning",)},
     identity_s=0.8,
     shown_against="turn",
     # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep

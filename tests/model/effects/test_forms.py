@@ -1,0 +1,177 @@
+"""Further forms of effects: those that features find, and that models have then."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from zfcal.model.effects.base import NEIGHBOURS
+from zfcal.model.onestep import draw_headings, heading_density
+from zfcal.model.packing import pack
+
+HERE = (0.20, 0.77)
+XY = [HERE, (0.26, 0.77), (0.20, 0.85), (0.10, 0.77)]
+"""One ahead, one to the left and a bit farther, one behind who is not seen."""
+
+HEADING = [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.fixture
+def density(natural_model, two_rooms):
+    """Return what gives headings, and their density for agent 0 with some effects."""
+
+    def of(effects):
+        model = dataclasses.replace(natural_model, effects=effects)
+        return heading_density(
+            model, two_rooms, xy_m=XY, heading_rad=HEADING, speed_m_s=0.0
+        )  # fmt: skip
+
+    return of
+
+
+def bell(theta, at, kappa):
+    """Return a von Mises density."""
+    return stats.vonmises(kappa, loc=at).pdf(theta)
+
+
+def test_fish_can_be_drawn_to_each_that_they_see(density):
+    """Two are seen: two components, each of the weight; of the unseen one nothing."""
+    theta, alone = density({})
+    _, found = density({"group-cohesion": {"weight": 1.5, "kappa": 6.0, "each": 1.0}})
+    base = sightless(alone, found, theta, [0.0, math.pi / 2], [1.5, 1.5], 6.0)
+    assert base > 1.0
+
+
+def sightless(alone, found, theta, ways, weights, kappa):
+    """Return the base's whole weight, for which the components are the rest of a density."""
+    more = sum(w * bell(theta, at, kappa) for w, at in zip(weights, ways, strict=True))
+    # found (base + all) = alone base + more; least squares give the base.
+    off = found - alone
+    base = float(((more - found * sum(weights)) * off).sum() / (off * off).sum())
+    np.testing.assert_allclose(found * (base + sum(weights)), alone * base + more, atol=1e-5)
+    return base
+
+
+def test_the_pull_of_each_grows_with_its_distance(density):
+    """Within 0.6 m those at 6 and 8 cm have a tenth and 2 / 15 of the weight."""
+    theta, alone = density({})
+    given = {"weight": 3.0, "kappa": 6.0, "each": 1.0, "full_m": 0.6}
+    _, found = density({"group-cohesion": given})
+    sightless(alone, found, theta, [0.0, math.pi / 2], [0.3, 0.4], 6.0)
+
+
+@pytest.mark.parametrize(
+    ("form", "ways", "weights"),
+    [
+        ({"among": 1.0}, [1.0], [0.4]),
+        ({"among": 2.0, "grading": 0.0}, [1.0, 2.0], [0.4, 0.4]),
+    ],
+    ids=str,
+)
+def test_fish_can_align_with_the_nearest_or_with_each(density, form, ways, weights):
+    """About the heading of the nearest alone, or of each that is seen: 40 per 0.01 sr."""
+    theta, alone = density({})
+    _, found = density({"alignment": {"weight": 40.0, "kappa": 6.0, **form}})
+    sightless(alone, found, theta, ways, weights, 6.0)
+
+
+def test_each_can_count_by_how_large_it_is_seen(ask):
+    """The second nearest at 0.02 sr: weight 20 makes 0.4, about its heading."""
+    rows = {"X": [0.0, 0.1, 0.2], "HX": [1.0, 0.0, -1.0], "HY": [0.0, 1.0, 0.0]}
+    asked = ask("alignment", {"weight": 20.0, "among": 2.0}, **rows)
+    asked.sight[0, 2] = 0.02
+    asked.parameters[7] = 2.0
+    weight, (x, y, _) = asked.component()
+    assert weight == pytest.approx(0.4)
+    assert (x, y) == (-1.0, 0.0)
+    asked.parameters[7] = 3.0
+    assert asked.component()[0] == 0.0
+
+
+def test_only_what_has_a_component_for_each_is_called_so_often(natural_model, two_rooms):
+    """Once for the mean; once and eight times for each, on numbers of their own."""
+
+    def calls(**given):
+        effects = {"alignment": given, "group-cohesion": {}}
+        packed = pack([dataclasses.replace(natural_model, effects=effects)], two_rooms)
+        return packed.components[:, 1].tolist(), packed.effects.shape[1]
+
+    assert calls() == ([0, 1], 2)
+    assert calls(among=1.0) == ([0, 1, *range(2, 2 + NEIGHBOURS)], 2 + NEIGHBOURS)
+
+
+def test_fish_drawn_to_each_head_where_the_density_says(natural_model, two_rooms):
+    """Draws against the density: laws 2 % apart at most."""
+    effects = {"group-cohesion": {"weight": 1.0, "kappa": 6.0, "each": 1.0}}
+    model = dataclasses.replace(natural_model, effects=effects)
+    state = {"xy_m": XY, "heading_rad": HEADING, "speed_m_s": 0.02}
+    theta, found = heading_density(model, two_rooms, **state)
+    drawn = np.sort(draw_headings(model, two_rooms, n=20_000, seed=3, **state))
+    below = np.interp(drawn, theta, np.cumsum(found) * (theta[1] - theta[0]))
+    assert np.abs(below - (np.arange(len(drawn)) + 0.5) / len(drawn)).max() < 0.02
+
+
+def test_one_fish_can_be_followed_whatever_its_speed(ask):
+    """It gets e^1 of the attention; the others as much as ever."""
+    asked = ask("leader-following", {"strength": 1.0, "who": 2.0}, SPEED=[0.1, 0.2, 0.01])
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
+
+
+def test_the_fastest_in_view_can_be_followed(ask):
+    """Not the fastest of all, whom nobody sees."""
+    asked = ask("leader-following", {"strength": 1.0, "fastest": 1.0}, SPEED=[0.1, 0.05, 0.06, 0.2])
+    asked.sight[0, 3] = 0.0
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
+
+
+def test_some_headings_can_be_drawn_to_the_way_out(ask):
+    """A second after another left, of a memory of four: 0.2 about the mouth's direction."""
+    rows = {"ROOM": 1.0, "MOUTH_X": 0.6, "MOUTH_Y": 0.8, "MOUTH_M": 0.3, "LEFT_S": 1.0}
+    given = {"strength": 2.0, "memory_s": 4.0, "drawn": 1.0}
+    asked = ask("collective-departure", given, **rows)
+    weight, (x, y, kappa) = asked.component()
+    assert weight == pytest.approx(0.2, rel=0.01)
+    assert (x, y, kappa) == (0.6, 0.8, 3.0)
+    assert asked.factor(1.0) == 1.0
+    late = ask("collective-departure", given, **(rows | {"LEFT_S": 60.0}))
+    assert late.component()[0] == 0.0
+
+
+@pytest.mark.parametrize("strength", [2.0, -2.0])
+def test_some_headings_can_be_drawn_from_the_robot_or_to_it(ask, strength):
+    """From the nearest that is seen and close; it gets the attention of a fish."""
+    given = {"strength": strength, "drawn": 1.0, "reach_m": 0.2, "kappa": 7.0}
+    rows = {"X": [0.0, 0.05, -0.3], "KIND": [0.0, 1.0, 1.0]}
+    asked = ask("robot-avoidance", given, **rows)
+    weight, (x, y, kappa) = asked.component()
+    assert weight == pytest.approx(0.2, rel=0.01)
+    assert (x, y, kappa) == (-math.copysign(1.0, strength), 0.0, 7.0)
+    assert asked.sight_of(1) == 1.0
+    assert asked.factor(1.0) == pytest.approx(1.0)
+    asked.sight[0, 1] = 0.0
+    assert asked.component()[0] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("form", "follows", "turned"),
+    [
+        ({}, 0.0, 0.1 * 2.0 * math.pi / 4),
+        ({"forgets_wide": 1.0}, 0.0, 0.1 * 2.0 * math.pi / 4 * math.cos(math.pi / 4)),
+        ({}, 1.0, 0.0),
+        ({"along_walls": 1.0}, 1.0, 0.1 * 2.0 * math.pi / 4),
+    ],
+    ids=str,
+)
+def test_a_share_of_the_last_turn_can_be_gone_on_with(ask, form, follows, turned):
+    """A tenth per strength; by a cosine less after wide turns; along walls only if it says so."""
+    side = math.sqrt(0.5)
+    asked = ask(
+        "turning-memory", {"strength": 2.0, "turning": 1.0, **form},
+        HX=side, HY=side, PAST_HX=1.0, FOLLOWS=follows,
+    )  # fmt: skip
+    assert asked.rotation() == pytest.approx(turned)
+    assert asked.factor(2.0) == 1.0
