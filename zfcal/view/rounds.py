@@ -75,7 +75,8 @@ def _scores(path: Path) -> list[dict[str, Any]]:
 
 
 def _mark(row: dict[str, Any]) -> Mark:
-    return Mark(**{key: math.nan if row[key] is None else row[key] for key in _MARKS})
+    value, low, high, ceiling = (math.nan if row[key] is None else row[key] for key in _MARKS)
+    return Mark(value=value, low=low, high=high, ceiling=ceiling)
 
 
 def _standing(row: dict[str, Any]) -> str:
