@@ -33,7 +33,8 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Write a page with figures: one trial, or several in one report.
 
     The page holds its figures and can be sent by itself; they lie beside it as
-    files too. Over several trials it shows mean and standard deviation per window.
+    files too. Over several trials it shows mean and standard deviation per window,
+    and a table of the trials, which leads to a page of each.
 
     \b
     Example:
