@@ -103,9 +103,8 @@ def trials_table(views: Sequence[TrialView], links: Sequence[str] = ()) -> Table
                 number(halves),
             ]
         )
-    heads = ("trial", "min", "fish positions known", "windows", "model S, mean", "ceiling",
-             "S / ceiling", "robot S, pooled", "fish in its place", "robot S / fish in its place",
-             "S of two halves")  # fmt: skip
+    heads = ("trial", "min", "fish known", "windows", "model S", "ceiling", "of ceiling",
+             "robot S", "fish in its place", "of that", "S of two halves")  # fmt: skip
     return Table(
         name="trials",
         title="Trials",
@@ -113,7 +112,8 @@ def trials_table(views: Sequence[TrialView], links: Sequence[str] = ()) -> Table
         rows=rows,
         numbers=range(1, len(heads)),
         links=links,
-        note="Means over the windows of each trial."
+        note="S of the model is the mean over the windows, S of the robot that of all windows "
+        "together. Fish known: the share of the fish's positions that was tracked."
         + (" The name of a trial leads to its own page." if links else ""),
     )
 
