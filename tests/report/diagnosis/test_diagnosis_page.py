@@ -126,7 +126,7 @@ def test_a_tie_names_all_that_it_may_be(make_sheet):
     assert verdict_sentence(findings) == (
         "The model lacks alignment or group-cohesion: this recording cannot tell them apart"
     )
-    assert "cannot be told from group-cohesion" in statements(findings)[0].answer
+    assert "cannot be distinguished from group-cohesion" in statements(findings)[0].answer
 
 
 @pytest.mark.parametrize(
