@@ -150,7 +150,7 @@ def _compile(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if value and not ctx.resilient_parsing:
         from zfcal.virtual.compiling import compile_all
 
-        click.echo("Compiling for this computer takes about a minute on two cores.", err=True)
+        click.echo("Compiling takes about a minute on two cores, the first time.", err=True)
         click.echo(str(compile_all()))
         ctx.exit()
 
