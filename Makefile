@@ -21,9 +21,11 @@ install: .venv/.installed  ## Build .venv from the lock and put zfcal into it
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	@touch $@
 
-# Without build isolation: the lock pins the builder as well, and nothing else is fetched.
+# Without build isolation: the lock pins the builder as well, and nothing else is fetched. Where nothing
+# can be compiled beforehand zfcal works all the same, hence the dash.
 .venv/.installed: .venv/.locked pyproject.toml
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	-$(BIN)/zfcal --compile
 	@touch $@
 
 demo: install  ## Run the main job on the sample; say where the figures lie

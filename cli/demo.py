@@ -28,8 +28,8 @@ def command(
 
     DIR gets tank/ (the simulated truth and the images of it), trial/ (all that
     is made from these images) and a contact sheet of the worst frames. A virtual
-    robot is driven by the calibrated model. Takes about a minute; the first start
-    of all compiles for a minute or two more.
+    robot is driven by the calibrated model. Takes about a minute, and half a minute
+    more where nothing was compiled before (zfcal --compile).
 
     With --closed-loop the fish react to a robot, which is driven by what is
     calibrated meanwhile: cameras, tracker, analysis, calibration, drive and a

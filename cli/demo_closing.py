@@ -24,7 +24,7 @@ def takes(loop: dict[str, Any] | None) -> str:
             loop["duration_s"] or 600.0, video=not loop["no_video"], real_time=loop["real_time"]
         )
     words = f"It takes about {seconds / 60:.0f} min" if seconds > 90 else "It takes about a minute"
-    first = "" if is_warm() else ", and a minute or two more to compile, the first time"
+    first = "" if is_warm() else ", and half a minute more to compile, the first time"
     return f"{words} on two cores with nothing else to do{first}."
 
 

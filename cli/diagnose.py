@@ -11,6 +11,7 @@ from .options import (
     EXISTING,
     PLACE,
     FiniteRange,
+    figure_options,
     makes_artifacts,
     seed_option,
     speaks,
@@ -40,6 +41,7 @@ def _listed(name: str) -> str:
 @seed_option("Seed of the random numbers.  [default: the trial's]")
 @workers_option
 @click.option("-o", "--out", type=PLACE, help="Folder.  [default: TRIAL/diagnosis]")
+@figure_options
 @makes_artifacts
 @speaks
 def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
@@ -53,9 +55,10 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
         zfcal diagnose trial
         zfcal diagnose trial --quick --json
         zfcal diagnose trial --model trial/models/extended.toml
+        zfcal diagnose trial --format pdf --width double
         zfcal diagnose day1 day2 --window 0:1800 --noise-mm 0.5
     """
-    from zfcal.api.diagnosing import diagnosis_of
+    from zfcal.api.diagnosing import diagnosis_of, printing_of
     from zfcal.api.trials import task_of
 
     from .diagnosis import diagnose_all
@@ -64,4 +67,5 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     if chosen.out_dir is not None and (len(trials) != 1 or trials[0] == STDIN):
         raise click.UsageError("-o is for one trial: its findings would overwrite each other's.")
     out.bare = len(trials) == 1
-    diagnose_all(out, roots_of(out, trials), chosen, task_of(options))
+    roots = roots_of(out, trials)
+    diagnose_all(out, roots, chosen, task_of(options), printing=printing_of(options))

@@ -146,6 +146,15 @@ def _write_manual(ctx: click.Context, _: click.Parameter, folder: Path | None) -
         ctx.exit()
 
 
+def _compile(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        from zfcal.virtual.compiling import compile_all
+
+        click.echo("Compiling takes about a minute on two cores, the first time.", err=True)
+        click.echo(str(compile_all()))
+        ctx.exit()
+
+
 def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None) -> None:
     if shell and not ctx.resilient_parsing:
         made = get_completion_class(shell)
@@ -189,6 +198,14 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
     callback=_write_manual,
     help="Write the manual pages into a folder and leave.",
 )
+@click.option(
+    "--compile",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_compile,
+    help="Compile simulator and tracker for this computer and leave; no command waits for it then.",
+)
 @click.pass_context
 @laid_out
 def group(ctx: click.Context, as_json: bool) -> None:  # noqa: ARG001 - it is in ctx.meta
@@ -205,6 +222,7 @@ def group(ctx: click.Context, as_json: bool) -> None:  # noqa: ARG001 - it is in
         zfcal import tracks.csv trial --format csv | zfcal analyse - | zfcal calibrate -
         eval "$(zfcal --completion bash)"
         zfcal --man ~/.local/share/man/man1
+        zfcal --compile
     """
     if ctx.meta[_AS_JSON]:
         command = ctx.invoked_subcommand

@@ -18,7 +18,7 @@ _EXITS = {
     "1": "An error, which is named in one line with a hint.",
     "2": "Wrong usage.",
     "3": "Done, but an input was damaged and left out.",
-    "4": "Scores disagree, or cannot be told apart from disagreeing (reproduce).",
+    "4": "Scores disagree, or it is undecided whether they do (reproduce).",
     "75": "The same command is at work on the same trial.",
     "130, 143": "Ended by Ctrl-C, or by SIGTERM.",
 }

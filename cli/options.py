@@ -76,6 +76,22 @@ def adds(*options: Decorator) -> Decorator:
     )
 
 
+figure_options = adds(
+    click.option(
+        "--format",
+        type=checked(values.formats),
+        metavar="NAMES",
+        help="Of the figures: png, svg and pdf, such as png,pdf.  [default: png]",
+    ),
+    click.option(
+        "--width",
+        type=checked(values.width_mm),
+        metavar="WIDTH",
+        help="Of the figures on paper: single (85 mm), double (174 mm), or such as 120mm.",
+    ),
+)
+
+
 def laid_out(command: Command) -> Command:
     """Keep the lines of the example in the help as they are.
 

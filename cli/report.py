@@ -6,9 +6,7 @@ from typing import Any
 
 import click
 
-from zfcal.api import values
-
-from .options import PLACE, checked, makes_artifacts, speaks, takes_trials
+from .options import PLACE, figure_options, makes_artifacts, speaks, takes_trials
 from .output import Output
 from .streams import roots_of
 
@@ -18,18 +16,7 @@ _OUT = "Where it goes.  [default: TRIAL/report, of several trials report]"
 @click.command("report")
 @takes_trials
 @click.option("-o", "--out", type=PLACE, help=_OUT)
-@click.option(
-    "--format",
-    type=checked(values.formats),
-    metavar="NAMES",
-    help="Of the figures: png, svg and pdf, such as png,pdf.  [default: png]",
-)
-@click.option(
-    "--width",
-    type=checked(values.width_mm),
-    metavar="WIDTH",
-    help="Of the figures on paper: single (85 mm), double (174 mm), or such as 120mm.",
-)
+@figure_options
 @click.option(
     "--film",
     type=click.Choice(["mp4", "gif"]),
@@ -46,7 +33,8 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     r"""Write a page with figures: one trial, or several in one report.
 
     The page holds its figures and can be sent by itself; they lie beside it as
-    files too. Over several trials it shows mean and standard deviation per window.
+    files too. Over several trials it shows mean and standard deviation per window,
+    and a table of the trials, which leads to a page of each.
 
     \b
     Example:

@@ -14,7 +14,7 @@ import pytest
 import zfcal
 from zfcal.api.analysing import analysis_of
 from zfcal.api.calibrating import calibration_of
-from zfcal.api.diagnosing import diagnosis_of
+from zfcal.api.diagnosing import diagnosis_of, printing_of
 from zfcal.api.extending import extension_of
 from zfcal.api.simulating import simulation_of
 from zfcal.errors import OptionError
@@ -138,6 +138,8 @@ OTHERS = {
         "seed": 5,
         "workers": 1,
         "out": "elsewhere",
+        "format": "pdf",
+        "width": "single",
     },
     "extend": {
         "effect": "alignment",
@@ -192,7 +194,7 @@ def chosen(name, **options):
             with calibration_of(asked, say_nothing) as found:
                 return found.chosen, found.span
         case "diagnose":
-            return diagnosis_of(asked)
+            return diagnosis_of(asked), printing_of(asked)
         case "extend":
             return extension_of(asked)
     found = simulation_of(asked)

@@ -1,6 +1,7 @@
 """Each command once on a small trial, and what it says when something is wrong."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -205,14 +206,24 @@ def test_report_writes_a_page_once(zfcal, trial):
 
 
 def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
-    """It belongs to none of them: it goes where the command was called."""
+    """Where the command was called; each has its own page as well, to which a table leads."""
     zfcal("analyse", "trial")
     zfcal("init", "other", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
     done = zfcal("report", "trial", "other")
     assert done.code == 0, done.err
     assert "report/index.html" in done.lines
     assert (trial.parent / "report" / "intervals.csv").exists()
-    assert not (trial / "report").exists()
+    assert {"trial/report/index.html", "other/report/index.html"} <= {*done.lines}
+    page = (trial.parent / "report" / "index.html").read_text()
+    links = re.findall(r'<td><a href="([^"#]+)">(\w+)</a>', page)
+    assert links == [(f"../{name}/report/index.html", name) for name in ("trial", "other")]
+    assert all((trial.parent / "report" / link).is_file() for link, _ in links)
+    second = zfcal("report", "trial", "other")
+    assert {*second.lines} == {*done.lines}
+    assert "nothing to do" in second.err
+    assert set(re.findall(r'(?:src|href)="(?!#|data:)([^"]*)"', page)) == {
+        link for link, _ in links
+    }
 
 
 @pytest.mark.slow

@@ -40,6 +40,20 @@ def test_paths_of_findings_page_and_pictures(zfcal, trial, answered):
     assert len(answered) == 1
 
 
+def test_pictures_for_a_journal(zfcal, trial, answered):
+    """Drawn anew from the same findings; the second run finds them, and PNGs are gone."""
+    zfcal("diagnose", "trial")
+    words = ("diagnose", "trial", "--format", "pdf", "--width", "single")
+    first = zfcal(*words)
+    assert first.code == 0
+    assert [line for line in first.lines if "/1-" in line] == ["trial/diagnosis/1-alignment.pdf"]
+    assert (trial / "diagnosis" / "1-alignment.pdf").read_bytes().startswith(b"%PDF")
+    assert not list((trial / "diagnosis").glob("*.png"))
+    assert "nothing to do, 4 up to date" in zfcal(*words).err
+    assert len(answered) == 1
+    assert zfcal("diagnose", "trial", "--width", "3mm").code == 2
+
+
 def test_json_is_the_document_itself(zfcal, trial, answered):
     """As it stands in findings.json, also when nothing is left to do."""
     for _ in range(2):

@@ -32,6 +32,17 @@ def tank(zfcal, tmp_path):
     return tmp_path / "trial"
 
 
+def negative(film, path):
+    """Write the negative of a video."""
+    reader = cv2.VideoCapture(str(film))
+    code = cv2.VideoWriter.fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), code, 5.0, (200, 200), isColor=False)
+    while (read := reader.read())[0]:
+        writer.write(255 - read[1][..., 0])
+    writer.release()
+    return path
+
+
 def words(film):
     """Return the command's words."""
     return ["track", "trial", "--overhead", str(film), "--corners", CORNERS]
@@ -138,6 +149,30 @@ def test_a_word_against_the_film_is_told(zfcal, tank, film):
     assert numbers["exact"] == 0
     warned = " ".join(note["text"] for note in document["messages"] if note["level"] == "warning")
     assert "--light was given, but the film shows animals that are darker" in warned
+
+
+@pytest.mark.parametrize(("wrong", "right"), [("--light", "--dark"), ("--dark", "--light")])
+def test_a_film_in_which_no_fish_is_found_is_told(zfcal, tank, film, tmp_path, wrong, right):
+    """In one warning, of how many frames, with what to try; the files are there, without a fish."""
+    if wrong == "--dark":
+        film = negative(film, tmp_path / "negative.avi")
+    done = zfcal(*words(film), "--duration", "30s", wrong, "--json")
+    document = json.loads(done.out)
+    (numbers,) = document["results"]
+    assert done.code == 0
+    assert numbers["fish"] == 0
+    assert numbers["without_fish"] == numbers["frames"] > 0
+    (warned,) = [note["text"] for note in document["messages"] if "no fish found" in note["text"]]
+    assert f"no fish found in any of {numbers['frames']} frames" in warned
+    assert f"Try {right} (with --force)" in warned
+    assert (tank / "tracks" / "000000.parquet").exists()
+
+
+def test_a_film_in_which_the_fish_are_found_gives_no_such_warning(zfcal, tank, film):
+    """With the right word."""
+    done = zfcal(*words(film), "--duration", "30s", "--dark")
+    assert done.code == 0
+    assert "fish found" not in done.err
 
 
 def test_the_methods_are_those_of_the_tracker():

@@ -96,6 +96,13 @@ def test_the_page_names_ceiling_and_chance(make_view):
     assert "from a room it led 0.50, a fish in its place 0.40" in answer
 
 
+def test_of_a_single_window_the_page_counts_in_figures(make_view):
+    """It is 0 or 1 of 1 window."""
+    answer = said(make_view, found_of([0.1]))
+    assert "above that it is in 1 of 1 window, where chance" in answer
+    assert "one window" not in answer
+
+
 def test_where_departures_are_not_defined_the_page_says_so(make_view):
     """One room, or nobody left."""
     answer = said(make_view, found_of([0.1], led=(NAN, None), own=(NAN, None)))

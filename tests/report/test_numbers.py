@@ -80,7 +80,7 @@ def test_a_trial_without_anything_has_a_row_of_dashes(make_view):
     """A trial that was only just begun does not stop the table."""
     empty = make_view(courses={}, integration=Integration(start_s=0, end_s=0), seen=None)
 
-    assert trials_table([empty]).rows[0] == ["trial", "0.0", "0", *"–" * 6]
+    assert trials_table([empty]).rows[0] == ["trial", "0.0", "–", "0", *"–" * 7]
 
 
 def test_rules_have_their_mean_forward_score_and_how_often_they_published(make_view):

@@ -60,6 +60,35 @@ def test_it_shows_the_trial_and_asks_for_nothing_elsewhere(browser, trial, tmp_p
         assert hosts <= {urlsplit(page.url).netloc, ""}
 
 
+def test_a_score_above_the_range_of_its_ceiling_is_hollow(browser, trial, made, tmp_path):
+    """That mark alone; the key and the text in place of the picture say what it means."""
+    said = "above the range of its ceiling: fits chance"
+    hollow = "[...document.querySelectorAll('#rounds .above')]"
+    label = "document.getElementById('rounds').ariaLabel"
+    with Page(trial, 0) as page:
+        browser.go(page.url)
+        browser.until(f"{DRAWN} === '4'")
+        browser.until("document.querySelectorAll('#score-keys li').length")
+        assert browser.value(f"{hollow}.length") == 0
+        assert said not in browser.value(text_of("score-keys"))
+        assert "Hollow" not in browser.value(label)
+        made["round"](trial, 180, 0.98)
+        browser.until(f"{hollow}.length === 1")
+        fill, ground, line = (
+            browser.value(f"getComputedStyle({each}")
+            for each in (
+                f"{hollow}[0]).fill",
+                "document.getElementById('score')).backgroundColor",
+                f"{hollow}[0]).stroke",
+            )
+        )
+        assert fill == ground != line
+        assert said in browser.value(text_of("score-keys"))
+        assert "above the range of its ceiling: it fits chance" in browser.value(label)
+        assert "Hollow marks are above the range of the ceiling." in browser.value(label)
+        assert browser.problems() == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
 def test_it_fits_the_window_in_the_colours_that_a_person_prefers(browser, trial, width, scheme):

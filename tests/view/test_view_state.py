@@ -225,7 +225,9 @@ def test_the_stamp_of_a_minute_changes_when_it_grows(trial, made):
 def test_no_score_is_more_than_all_of_its_ceiling(trial, made, score, says):
     """The ceiling is 0.9, and 95 % of windows of the model score 0.8 to 0.95."""
     made["round"](trial, 180, score)
-    assert state_of(trial).look()["scores"][-1]["says"] == says
+    row = state_of(trial).look()["scores"][-1]
+    assert row["says"] == says
+    assert row["above"] == says.startswith("above")
 
 
 def test_findings_are_sentences(trial):

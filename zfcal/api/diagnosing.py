@@ -10,21 +10,25 @@ from typing import Any, Literal, overload
 from zfcal.api import tables
 from zfcal.api.trials import TrialPath, heard_by, tables_of, task_of, work_of
 from zfcal.api.values import (
+    Names,
     PathLike,
     Stretch,
     existing,
     flag,
+    formats,
     number,
     one_of,
     place,
     span,
     taken,
     whole,
+    width_mm,
 )
 from zfcal.diagnose.document import read_document
 from zfcal.errors import OptionError
 from zfcal.report.diagnosis.render_pool import RenderPool
 from zfcal.report.diagnosis.words import fired_control, verdict_sentence
+from zfcal.report.options import Printing
 from zfcal.stages.diagnose.diagnose import DiagnoseOptions, open_case
 from zfcal.stages.diagnose.diagnose import diagnose as diagnose_trial
 from zfcal.stages.diagnose.findings import FILE
@@ -38,6 +42,8 @@ _FORMS = {
     "seed": whole(0),
     "workers": whole(1),
     "out": place,
+    "format": formats,
+    "width": width_mm,
 }
 
 
@@ -69,6 +75,23 @@ def diagnosis_of(options: Mapping[str, Any]) -> DiagnoseOptions:
         n_workers=asked["workers"],
         out_dir=asked["out"],
     )
+
+
+def printing_of(options: Mapping[str, Any]) -> Printing:
+    """Return the form of the pictures, as the options of the command say.
+
+    Parameters
+    ----------
+    options
+        By the names of the arguments of `diagnose`.
+
+    Raises
+    ------
+    OptionError
+        One has another form.
+    """
+    asked = taken(options, _FORMS, needed={"quick": flag})
+    return Printing(formats=asked["format"] or ("png",), width_mm=asked["width"])
 
 
 def tell_findings(tell: Tell, root: Path, event: Event, *, in_words: bool = True) -> None:
@@ -107,6 +130,8 @@ def diagnose(
     seed: int | None = None,
     workers: int | None = None,
     out: PathLike | None = None,
+    format: Names | None = None,
+    width: float | str | None = None,
     dry_run: Literal[False] = False,
     force: bool = False,
     tell: Tell | None = None,
@@ -123,6 +148,8 @@ def diagnose(
     seed: int | None = None,
     workers: int | None = None,
     out: PathLike | None = None,
+    format: Names | None = None,
+    width: float | str | None = None,
     dry_run: bool,
     force: bool = False,
     tell: Tell | None = None,
@@ -138,6 +165,8 @@ def diagnose(
     seed: int | None = None,
     workers: int | None = None,
     out: PathLike | None = None,
+    format: Names | None = None,
+    width: float | str | None = None,
     dry_run: bool = False,
     force: bool = False,
     tell: Tell | None = None,
@@ -168,6 +197,11 @@ def diagnose(
         Threads; None for one a core. The numbers do not depend on it.
     out
         Folder that the findings go into; None for the usual one.
+    format
+        Of the pictures: ``png``, ``svg`` and ``pdf``, one or several; by default ``png``.
+    width
+        Of the pictures on paper: ``single`` (85 mm), ``double`` (174 mm) or millimetres. None for
+        the screen.
     dry_run
         Write nothing; `tell` hears what would be made and why.
     force
@@ -206,10 +240,11 @@ def diagnose(
     >>> found.attrs["verdict"]  # 200 s are too little to name an effect
     'untestable'
     """
-    chosen, task, root = diagnosis_of(locals()), task_of(locals()), work_of(trial).root
+    given = locals()
+    chosen, task, root = diagnosis_of(given), task_of(given), work_of(trial).root
     hears = functools.partial(tell_findings, heard_by(tell), root)
     # Processes of its own would import the script that calls this once more.
-    with RenderPool(ahead=False) as pool:
+    with RenderPool(ahead=False, printing=printing_of(given)) as pool:
         made = diagnose_trial(root, chosen, hears, task=task, draw=pool)
     if made is None and task.dry_run:
         return None

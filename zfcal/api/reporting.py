@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
 from zfcal.api.values import Names, PathLike, flag, formats, one_of, place, taken, width_mm
-from zfcal.errors import DamagedError, InputError
+from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.report.options import AS_USUAL, FILMS, Printing, ReportOptions
 from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
@@ -33,7 +33,7 @@ def write_page(
     task: Task,
     how: ReportOptions = AS_USUAL,
 ) -> Path:
-    """Write the report of trials, unless it is up to date.
+    """Write the report of trials, unless it is up to date; of several, then that of each.
 
     Parameters
     ----------
@@ -61,8 +61,24 @@ def write_page(
     if not roots:
         raise InputError("A report needs at least one trial.")
     roots = each_once(roots)
-    folder = _TOGETHER if out is None and len(roots) > 1 else out
+    if len(roots) == 1:
+        return _write_one(roots, out, tell, task=task, how=how)
+    # First that of the set: where its trials or options do not go together, nothing is written.
+    page = _write_one(roots, out or _TOGETHER, tell, task=task, how=how)
+    failed = None
+    for root in roots:
+        try:
+            _write_one([root], None, tell, task=task, how=how)
+        except ZfcalError as error:
+            failed = failed or error
+    if failed is not None:
+        raise failed
+    return page
 
+
+def _write_one(
+    roots: Sequence[Path], folder: Path | None, tell: Tell, *, task: Task, how: ReportOptions
+) -> Path:
     def work() -> None:
         reason = report_reason(roots, folder, how) or ("forced" if task.force else None)
         if reason is None:
@@ -106,14 +122,16 @@ def report(
     """Write a page with figures, of one trial or of several in one report: ``zfcal report``.
 
     The page holds its figures; they lie beside it as files too. Over several trials it shows mean
-    and standard deviation per window. What is up to date stays.
+    and standard deviation per window, and a table whose rows lead to the page of each trial, which
+    is written as well. What is up to date stays.
 
     Parameters
     ----------
     trials
         One trial or several: directories, or their tables. One that is named twice counts once.
     out
-        Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``.
+        Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``. The
+        pages of several trials are in ``TRIAL/report`` all the same.
     format
         Of the figures: ``png``, ``svg`` and ``pdf``, one or several; by default ``png``.
     width

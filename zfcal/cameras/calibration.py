@@ -267,10 +267,7 @@ def _corner_pairs(
 
 
 def _check_convex(corners: Floats) -> None:
-    sides = np.roll(corners, -1, axis=0) - corners
-    after = np.roll(sides, -1, axis=0)
-    turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
-    if not (np.all(turns > 0) or np.all(turns < 0)):
+    if not cv2.isContourConvex(corners.astype(np.float32)):
         raise InputError(
             "The four corners cross over: they are not in order round the arena.",
             hint="Give lower left, lower right, upper right, upper left, as the arena has them.",

@@ -20,7 +20,7 @@ from zfcal.readers.clock import check_declared, check_rate, frames_of
 
 _COUNTED = (
     "Times are whole seconds: each is taken as the number of a frame, at {fps:g} frames per "
-    "second, as sleap-io has it when it is not told a rate."
+    "second, as sleap-io has it where the file has no rate."
 )
 
 _SAME = 0.05

@@ -62,7 +62,7 @@ def _lead(found: Followed) -> str:
     when = (
         ""
         if math.isnan(delay.value)
-        else f" The delay is {delay.value:+.1f} s, in {_windows(delay.n_windows)} that have one."
+        else f" The delay is {delay.value:+.1f} s, in {_windows(delay.n_windows)} with one."
     )
     between = ""
     if not math.isnan(lead.ceiling_low):
@@ -103,4 +103,4 @@ def _share(level: Level) -> str:
 
 
 def _windows(n: int) -> str:
-    return "one window" if n == 1 else f"{n} windows"
+    return f"{n} window{'' if n == 1 else 's'}"

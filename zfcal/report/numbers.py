@@ -12,6 +12,7 @@ from zfcal.artifacts.lineage import to_json
 from zfcal.report.driven import driven_rows
 from zfcal.report.figures.parameters import outside_of, values_of
 from zfcal.report.standing import share_of
+from zfcal.report.tracking_words import known_of
 from zfcal.report.views import FEATURE_NAMES, MODEL, ROBOT, SOCIAL, Course, Mark, TrialView
 
 _COMPARED = {
@@ -46,6 +47,8 @@ class Table:
         What to press to see it; always open if empty.
     note
         How to read it.
+    links
+        Addresses to which the first cells of the rows lead; none without.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Table:
     wide: Sequence[int] = ()
     folded: str = ""
     note: str = ""
+    links: Sequence[str] = ()
 
 
 def tables(view: TrialView) -> list[Table]:
@@ -73,8 +77,16 @@ def tables(view: TrialView) -> list[Table]:
     return [table for table in made if table.rows]
 
 
-def trials_table(views: Sequence[TrialView]) -> Table:
-    """Return a row per trial: its score, its ceiling and its robot."""
+def trials_table(views: Sequence[TrialView], links: Sequence[str] = ()) -> Table:
+    """Return a row per trial: how it was tracked, its score, its ceiling and its robot.
+
+    Parameters
+    ----------
+    views
+        The trials.
+    links
+        Where the page of each is; none without.
+    """
     rows = []
     for view in views:
         mean, robot = view.course(MODEL, "S").mean(), view.integration.robot.get("S")
@@ -84,21 +96,25 @@ def trials_table(views: Sequence[TrialView]) -> Table:
             [
                 view.name,
                 f"{view.tracked_s / 60:.1f}",
+                known_of(view) or NONE,
                 str(n),
                 *_cells(mean),
-                *(_cells(robot)[:2] if robot is not None else (NONE, NONE)),
+                *(_cells(robot) if robot is not None else (NONE,) * 3),
                 number(halves),
             ]
         )
-    heads = ("trial", "min", "windows", "model S, mean", "ceiling", "S / ceiling",
-             "robot S, pooled", "fish in its place", "S of two halves")  # fmt: skip
+    heads = ("trial", "min", "fish known", "windows", "model S", "ceiling", "of ceiling",
+             "robot S", "fish in its place", "of that", "S of two halves")  # fmt: skip
     return Table(
         name="trials",
         title="Trials",
         heads=heads,
         rows=rows,
         numbers=range(1, len(heads)),
-        note="Means over the windows of each trial.",
+        links=links,
+        note="S of the model is the mean over the windows, S of the robot that of all windows "
+        "together. Fish known: the share of the fish's positions that was tracked."
+        + (" The name of a trial leads to its own page." if links else ""),
     )
 
 

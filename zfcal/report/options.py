@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 from zfcal.artifacts.lineage import JSON
 
@@ -30,6 +31,24 @@ class Printing:
 
     formats: tuple[str, ...] = ("png",)
     width_mm: float | None = None
+
+    def as_lineage(self) -> dict[str, JSON]:
+        """Return what differs from the usual, as what is made holds it."""
+        said: dict[str, JSON] = {}
+        if self.formats != ("png",):
+            said["format"] = list(self.formats)
+        if self.width_mm is not None:
+            said["width_mm"] = self.width_mm
+        return said
+
+
+def printing_of(said: Mapping[str, Any]) -> Printing:
+    """Return the form that `Printing.as_lineage` gave.
+
+    >>> printing_of({"format": ["pdf"]})
+    Printing(formats=('pdf',), width_mm=None)
+    """
+    return Printing(formats=tuple(said.get("format", ("png",))), width_mm=said.get("width_mm"))
 
 
 FOR_THE_SCREEN = Printing()
@@ -58,10 +77,7 @@ class ReportOptions:
         said: dict[str, JSON] = {}
         if self.published:
             said["published"] = True
-        if self.printing.formats != FOR_THE_SCREEN.formats:
-            said["format"] = list(self.printing.formats)
-        if self.printing.width_mm is not None:
-            said["width_mm"] = self.printing.width_mm
+        said |= self.printing.as_lineage()
         if self.film is not None:
             said["film"] = self.film
         return said

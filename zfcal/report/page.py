@@ -7,10 +7,12 @@ give the same bytes: nothing of the day or the machine is in it.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from urllib.parse import quote
 
 from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole, write_whole
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
@@ -107,7 +109,8 @@ def write_report(
         write_text_whole(place.folder / _TABLE, intervals_csv(views))
         written.append(place.folder / _TABLE)
     page = place.folder / PAGE
-    write_text_whole(page, render_page(views, pictures, lineage, how.printing.formats))
+    links = _links(roots, place.folder) if len(views) > 1 else []
+    write_text_whole(page, render_page(views, pictures, lineage, how.printing.formats, links))
     written.append(page)
     numbers = place.folder / _NUMBERS
     _remove_outdated(place.folder, {path.name for path in written})
@@ -178,6 +181,17 @@ def _place(roots: Sequence[Path], out_dir: Path | None) -> _Place:
     if len({root.resolve() for root in roots}) < len(roots):
         raise InputError("The same trial is named twice: it would count twice in every mean.")
     return _Place(folder=out_dir, base=out_dir)
+
+
+def _links(roots: Sequence[Path], folder: Path) -> list[str]:
+    """Return where each trial's own page is, as a page in a folder names it."""
+    pages = [root.resolve() / _FOLDER / PAGE for root in roots]
+    try:
+        ways = [os.path.relpath(page, folder.resolve()) for page in pages]
+    except ValueError:
+        # On another drive, where a system has drives.
+        return []
+    return [quote(Path(way).as_posix()) for way in ways]
 
 
 def _lineage(roots: Sequence[Path], place: _Place, how: ReportOptions) -> Lineage:

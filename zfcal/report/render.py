@@ -23,6 +23,7 @@ def render_page(
     pictures: Sequence[Picture],
     lineage: Lineage,
     formats: Sequence[str] = ("png",),
+    links: Sequence[str] = (),
 ) -> str:
     """Return the page of a trial, or of several, as HTML.
 
@@ -36,8 +37,10 @@ def render_page(
         Of the report, which stands in the page as well.
     formats
         Endings of the files that the pictures are beside the page.
+    links
+        Where the pages of several trials are, each its own.
     """
-    content = _of_one(views[0]) if len(views) == 1 else _of_several(views)
+    content = _of_one(views[0]) if len(views) == 1 else _of_several(views, links)
     content["left_out"] = [line for view in views for line in view.left_out]
     return render(content, list(map(section_of, pictures)), lineage.as_dict(), formats)
 
@@ -88,14 +91,14 @@ def _of_one(view: TrialView) -> dict[str, Any]:
     }
 
 
-def _of_several(views: Sequence[TrialView]) -> dict[str, Any]:
+def _of_several(views: Sequence[TrialView], links: Sequence[str]) -> dict[str, Any]:
     arena = views[0].arena
     return {
         "title": f"{len(views)} trials in the arena {arena.name}",
         "facts": ", ".join(view.name for view in views),
         "statements": statements_of_trials(views),
         "gaps": gaps_of_trials(views),
-        "tables": [trials_table(views), *interval_tables(views), lineage_table(views)],
+        "tables": [trials_table(views, links), *interval_tables(views), lineage_table(views)],
     }
 
 

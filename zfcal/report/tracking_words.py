@@ -58,6 +58,14 @@ def tracking_statement(view: TrialView) -> Statement | None:
     )
 
 
+def known_of(view: TrialView) -> str:
+    """Return the share of the positions of fish that is known, as text; empty without tracks."""
+    seen, trial = view.seen, view.trial
+    if seen is None or not seen.n_points or not trial.n_fish:
+        return ""
+    return _percent(_share(seen, FISH, trial.n_fish))
+
+
 def _share(seen: Seen, kind: int, n_agents: int) -> float:
     """Return how many of the positions that there could be are known."""
     points = int(seen.visits[kind].zones.sum()) if kind in seen.visits else 0

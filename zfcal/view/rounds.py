@@ -46,8 +46,8 @@ def scores_of(reader: Reader) -> list[dict[str, Any]]:
     -------
     list of dict
         ``end_s``; ``compared`` (such as ``model-vs-control``); ``value``; and ``ceiling`` with
-        its ``low`` and ``high``, null where there are none; ``says``, how they stand to each
-        other. In the order of time.
+        its ``low`` and ``high``, null where there are none; ``above``, whether it is above that
+        range; ``says``, how they stand to each other. In the order of time.
     """
     paths = [
         *reader.files("scores", ".parquet").values(),
@@ -64,6 +64,7 @@ def _scores(path: Path) -> list[dict[str, Any]]:
             "end_s": row["window_end_s"],
             "compared": row["compared"],
             **{key: _number(row[key]) for key in _MARKS},
+            "above": is_above(_mark(row)),
             "says": _standing(row),
         }
         for row in rows
@@ -73,10 +74,14 @@ def _scores(path: Path) -> list[dict[str, Any]]:
     ]
 
 
+def _mark(row: dict[str, Any]) -> Mark:
+    value, low, high, ceiling = (math.nan if row[key] is None else row[key] for key in _MARKS)
+    return Mark(value=value, low=low, high=high, ceiling=ceiling)
+
+
 def _standing(row: dict[str, Any]) -> str:
     """Return how a score stands to its ceiling: never more than all of it."""
-    value, low, high, ceiling = (math.nan if row[key] is None else row[key] for key in _MARKS)
-    mark = Mark(value=value, low=low, high=high, ceiling=ceiling)
+    mark = _mark(row)
     is_model = row["compared"] == MODEL
     if is_above(mark):
         return "above the range of its ceiling" + (": it fits chance" if is_model else "")

@@ -24,6 +24,7 @@ from zfcal.stages.trial_context import Task
 from zfcal.stages.windows import LENGTH_S
 from zfcal.tracks import KINDS, Tracks, concatenate
 from zfcal.trial import CONFIG_NAME, FIRST_MODEL
+from zfcal.virtual.compiling import compiled_beside
 from zfcal.virtual.demo_steps import Step, drive_demo, tell_steps
 from zfcal.virtual.film import FilmOptions, film, frames_folder, frames_path
 
@@ -66,8 +67,9 @@ def run_demo(folder: Path, tell: Tell, *, task: Task | None = None) -> Path:
     if task.dry_run:
         tell_steps(_steps(folder, tell), tell, task)
         return trial
-    for step in _steps(folder, tell):
-        step.work(task)
+    with compiled_beside():
+        for step in _steps(folder, tell):
+            step.work(task)
     tell(
         Note(
             text=f"{trial}: a trial of {DURATION_S:g} s, tracked, analysed, calibrated and driven."

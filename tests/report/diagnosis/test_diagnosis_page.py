@@ -28,6 +28,7 @@ from zfcal.report.diagnosis.tables import tables
 from zfcal.report.diagnosis.words import statements, verdict_sentence
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import compose
+from zfcal.report.options import Printing
 
 LOADED = "--virtual-time-budget=5000"
 # Chromium's words for the two colour schemes.
@@ -125,7 +126,7 @@ def test_a_tie_names_all_that_it_may_be(make_sheet):
     assert verdict_sentence(findings) == (
         "The model lacks alignment or group-cohesion: this recording cannot tell them apart"
     )
-    assert "cannot be told from group-cohesion" in statements(findings)[0].answer
+    assert "cannot be distinguished from group-cohesion" in statements(findings)[0].answer
 
 
 @pytest.mark.parametrize(
@@ -363,6 +364,35 @@ def test_why_a_page_is_drawn_again(make_sheet, tmp_path, undrawn):
     assert "does not say what it shows" in diagnosis_page.reason(tmp_path, "f" * 64)
 
 
+def test_pictures_in_other_formats_and_at_a_width(make_sheet, tmp_path):
+    """PDF alone, 85 mm wide on paper; the PNGs of before go, and the page names the new files."""
+    sheet = make_sheet(names=())
+    diagnosis_page.write(tmp_path, sheet)
+    assert (tmp_path / "screened.png").exists()
+    form = Printing(formats=("pdf", "svg"), width_mm=85.0)
+    assert "format or width" in diagnosis_page.reason(tmp_path, "f" * 64, form)
+    page, *pictures = diagnosis_page.write(tmp_path, sheet, printing=form)
+    assert [path.name for path in pictures] == ["screened.pdf", "screened.svg"]
+    assert not (tmp_path / "screened.png").exists()
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", pictures[0].read_bytes())
+    assert float(box.group(1)) == pytest.approx(85.0 / 25.4 * 72, abs=0.5)
+    assert "<code>screened.pdf</code>, <code>screened.svg</code>" in page.read_text()
+    assert diagnosis_page.reason(tmp_path, "f" * 64, form) is None
+    assert "format or width" in diagnosis_page.reason(tmp_path, "f" * 64, Printing())
+
+
+def test_whoever_names_no_form_keeps_that_of_the_page(make_sheet, tmp_path):
+    """An extension draws the page anew, and the figures of a paper stay."""
+    sheet = make_sheet(names=())
+    diagnosis_page.write(tmp_path, sheet, printing=Printing(formats=("svg",), width_mm=174.0))
+    before = (tmp_path / "screened.svg").read_bytes()
+    assert diagnosis_page.reason(tmp_path, "f" * 64) is None
+    (tmp_path / "screened.svg").unlink()
+    written = diagnosis_page.write(tmp_path, sheet)
+    assert [path.name for path in written] == ["report.html", "screened.svg"]
+    assert (tmp_path / "screened.svg").read_bytes() == before
+
+
 def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
     """They would pass for current; other files stay."""
     diagnosis_page.write(tmp_path, make_sheet())
@@ -408,6 +438,7 @@ def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
 ALONE = """
 import multiprocessing, os, signal
 from zfcal.report.diagnosis.render_pool import RenderPool
+from zfcal.report.options import Printing
 with RenderPool() as pool:
     pool.prepare()
     print(*(hand.pid for hand in multiprocessing.active_children()), flush=True)

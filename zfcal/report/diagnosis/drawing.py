@@ -15,12 +15,24 @@ from zfcal.report.diagnosis.overview import gap_picture, screened_picture
 from zfcal.report.diagnosis.tables import tables
 from zfcal.report.diagnosis.words import facts, statements, verdict_sentence
 from zfcal.report.figures.panels import Picture, png_of
+from zfcal.report.figures.printing import printed
+from zfcal.report.options import Printing
 from zfcal.report.render import render, section_of
 
 
-def pngs_of(sheet: Sheet) -> dict[str, bytes]:
-    """Return the pictures of findings as PNGs, by their name, in the order they are told."""
-    return {picture.name: png_of(picture) for picture in pictures_of(sheet)}
+def files_of(sheet: Sheet, printing: Printing) -> dict[str, bytes]:
+    """Return the pictures of findings as files, by their name, in their order on the page."""
+    return {
+        f"{picture.name}.{kind}": _file_of(picture, kind, printing)
+        for picture in pictures_of(sheet)
+        for kind in printing.formats
+    }
+
+
+def _file_of(picture: Picture, kind: str, printing: Printing) -> bytes:
+    if kind == "png" and printing.width_mm is None:
+        return png_of(picture)
+    return printed(picture, kind, width_mm=printing.width_mm)
 
 
 def sections_of(sheet: Sheet) -> list[Section]:
@@ -28,7 +40,12 @@ def sections_of(sheet: Sheet) -> list[Section]:
     return list(map(section_of, pictures_of(sheet)))
 
 
-def page_of(sheet: Sheet, sections: Sequence[Section], provenance: Mapping[str, Any]) -> str:
+def page_of(
+    sheet: Sheet,
+    sections: Sequence[Section],
+    provenance: Mapping[str, Any],
+    formats: Sequence[str],
+) -> str:
     """Return the page as HTML.
 
     Parameters
@@ -39,8 +56,10 @@ def page_of(sheet: Sheet, sections: Sequence[Section], provenance: Mapping[str, 
         From `sections_of`.
     provenance
         What stands in the page of where it comes from.
+    formats
+        In which the pictures lie beside it.
     """
-    return render(_content(sheet), sections, provenance)
+    return render(_content(sheet), sections, provenance, formats)
 
 
 def pictures_of(sheet: Sheet) -> list[Picture]:

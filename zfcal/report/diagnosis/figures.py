@@ -67,7 +67,7 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
             Entry(label="model with it", colour=WITH, mark="line", marker="D"),
             Entry(label="95 % of a right model", colour=theme.BAND, mark="band"),
         ),
-        note="In all panels the score tells how much more of the effect the fish show than the "
+        note="In all panels the score shows how much more of the effect the fish show than the "
         "model expects: zero where the model is right, in standard deviations of a single step. "
         "The map is of the model without the effect.",
     )

@@ -50,7 +50,7 @@ def screened_picture(screened: Sequence[Screened], found: Collection[str]) -> Pi
     ordered = sorted(asked, key=lambda each: abs(each.z))
     best = ordered[-1]
     panel = Panel(
-        title="How loudly each effect is asked for",
+        title="How strongly each effect stands out",
         alt=f"z of {len(asked)} candidates; the largest in size is {best.name} with {best.z:.1f}.",
         draw=partial(_draw_screened, screened=[(each, _mark(each, found)) for each in ordered]),
         size_in=(max(PANEL_IN[0], 4.6), 0.9 + _ROW_IN * len(ordered)),

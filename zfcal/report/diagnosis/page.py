@@ -14,15 +14,24 @@ from zfcal.artifacts.lineage import package_version
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.diagnose.document import Sheet
 from zfcal.report.contents import Section
+from zfcal.report.options import FORMATS, Printing, printing_of
 
 T = TypeVar("T")
 
 PAGE = "report.html"
 
+_ENDINGS = tuple(f".{kind}" for kind in FORMATS)
+
 _EMBEDDED = re.compile(r'<script type="application/json" id="provenance">(.*?)</script>', re.DOTALL)
 
 
-def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path]:
+def write(
+    folder: Path,
+    sheet: Sheet,
+    pool: Executor | None = None,
+    *,
+    printing: Printing | None = None,
+) -> list[Path]:
     """Draw pictures and page of findings.
 
     Parameters
@@ -33,6 +42,8 @@ def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path
         What they show.
     pool
         Whose workers draw; None for whoever calls.
+    printing
+        In which form pictures are files; None for that of the page that is there.
 
     Returns
     -------
@@ -46,20 +57,23 @@ def write(folder: Path, sheet: Sheet, pool: Executor | None = None) -> list[Path
         The disk is full, or the place cannot be written.
     """
     ask = _at_once if pool is None else pool.submit
-    drawn, sections = ask(_pngs, sheet), ask(_sections, sheet)
+    form = printing or printing_of((_provenance(folder / PAGE) or {}).get("printing", {}))
+    drawn, sections = ask(_pictures, sheet, form), ask(_sections, sheet)
     hashes = {}
-    for name, png in drawn.result().items():
-        path = folder / f"{name}.png"
-        write_bytes_whole(path, png)
+    for name, picture in drawn.result().items():
+        path = folder / name
+        write_bytes_whole(path, picture)
         hashes[path.name] = sha256_of(path)
     _remove_outdated(folder, set(hashes))
     provenance = {**sheet.provenance, "pictures": hashes, "version": package_version()}
-    page = ask(_page, sheet, sections.result(), provenance)
+    if said := form.as_lineage():
+        provenance["printing"] = said
+    page = ask(_page, sheet, sections.result(), provenance, form.formats)
     write_text_whole(folder / PAGE, page.result())
     return files(folder)
 
 
-def reason(folder: Path, findings_sha256: str) -> str | None:
+def reason(folder: Path, findings_sha256: str, printing: Printing | None = None) -> str | None:
     """Return why a page must be drawn; None if it is whole and shows the findings.
 
     Parameters
@@ -68,6 +82,8 @@ def reason(folder: Path, findings_sha256: str) -> str | None:
         Where it lies.
     findings_sha256
         Of the findings that it has to show.
+    printing
+        In which form pictures have to be files; None for any.
     """
     page = folder / PAGE
     if not page.is_file():
@@ -77,6 +93,8 @@ def reason(folder: Path, findings_sha256: str) -> str | None:
         return "damaged: it does not say what it shows"
     if said.get("findings") != findings_sha256:
         return "the findings changed"
+    if printing is not None and said.get("printing", {}) != printing.as_lineage():
+        return "format or width of the pictures changed"
     for name, digest in said.get("pictures", {}).items():
         path = folder / name
         if not path.is_file():
@@ -110,10 +128,10 @@ def _at_once(work: Callable[..., T], *args: Any) -> Future[T]:
 # Matplotlib is slow to load: whoever draws loads it, and a page that is up to date needs nobody.
 
 
-def _pngs(sheet: Sheet) -> dict[str, bytes]:
-    from zfcal.report.diagnosis.drawing import pngs_of
+def _pictures(sheet: Sheet, printing: Printing) -> dict[str, bytes]:
+    from zfcal.report.diagnosis.drawing import files_of
 
-    return pngs_of(sheet)
+    return files_of(sheet, printing)
 
 
 def _sections(sheet: Sheet) -> list[Section]:
@@ -122,17 +140,22 @@ def _sections(sheet: Sheet) -> list[Section]:
     return sections_of(sheet)
 
 
-def _page(sheet: Sheet, sections: Sequence[Section], provenance: Mapping[str, Any]) -> str:
+def _page(
+    sheet: Sheet,
+    sections: Sequence[Section],
+    provenance: Mapping[str, Any],
+    formats: Sequence[str],
+) -> str:
     from zfcal.report.diagnosis.drawing import page_of
 
-    return page_of(sheet, sections, provenance)
+    return page_of(sheet, sections, provenance, formats)
 
 
 def _remove_outdated(folder: Path, made: set[str]) -> None:
     """Remove pictures of an older page that this one has not: they would pass for current."""
     before = (_provenance(folder / PAGE) or {}).get("pictures", {})
     for name in set(before) - made:
-        if Path(name).name == name and name.endswith(".png"):
+        if Path(name).name == name and name.endswith(_ENDINGS):
             try:
                 (folder / name).unlink(missing_ok=True)
             except OSError as error:

@@ -18,6 +18,7 @@ from typing import Self
 
 from zfcal.diagnose.document import Sheet
 from zfcal.report.diagnosis import page as diagnosis_page
+from zfcal.report.options import Printing
 
 _HANDS = 2
 """One for the PNGs, one for the page."""
@@ -30,10 +31,13 @@ class RenderPool:
     ----------
     ahead
         Whether processes get ready when they are told that there will be something to draw.
+    printing
+        In which form pictures are files; None for that of the page that is there.
     """
 
-    def __init__(self, *, ahead: bool = True) -> None:
+    def __init__(self, *, ahead: bool = True, printing: Printing | None = None) -> None:
         self._ahead = ahead
+        self._printing = printing
         self._pool: ProcessPoolExecutor | None = None
         self._hands: set[BaseProcess] = set()
 
@@ -56,7 +60,7 @@ class RenderPool:
 
     def reason(self, folder: Path, findings_sha256: str) -> str | None:
         """Return why a page must be drawn, as `page.reason`."""
-        return diagnosis_page.reason(folder, findings_sha256)
+        return diagnosis_page.reason(folder, findings_sha256, self._printing)
 
     def files(self, folder: Path) -> list[Path]:
         """Return the page that is there and its pictures."""
@@ -66,11 +70,11 @@ class RenderPool:
         """Draw pictures and page as `page.write` does."""
         if self._pool is not None:
             try:
-                return diagnosis_page.write(folder, sheet, self._pool)
+                return diagnosis_page.write(folder, sheet, self._pool, printing=self._printing)
             except BrokenExecutor:
                 # One was killed, for want of memory, say: it can be done here as well.
                 self._let_go(at_once=True)
-        return diagnosis_page.write(folder, sheet)
+        return diagnosis_page.write(folder, sheet, printing=self._printing)
 
     def _begin(self) -> bool:
         """Start the processes; whether they could be."""

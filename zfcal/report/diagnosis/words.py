@@ -112,7 +112,7 @@ def _of_controls(findings: Findings) -> Iterator[Statement]:
 def _of_effect(effect: EffectFound, number: int) -> Statement:
     parts = [effect.says, *_whither(effect.strength)]
     if effect.ties:
-        parts.append(f"On this recording it cannot be told from {_listed(effect.ties)}.")
+        parts.append(f"On this recording it cannot be distinguished from {_listed(effect.ties)}.")
     parts.append(f"By chance alone in {_percent(effect.p)} of recordings.")
     gain = f"{effect.gain_nats_per_step:+.4f} nats"
     return Statement(

@@ -35,7 +35,7 @@ _MANY_ZONES = 5
 _READING = (
     "Each bar is the share of all n observations of the fish in its zone. A last bin that holds "
     "all that lies beyond, however far, stands apart and has a ≥. In the transition tables a row "
-    "tells where an animal is one step later."
+    "shows where an animal is one step later."
 )
 
 

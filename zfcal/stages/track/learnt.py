@@ -142,3 +142,24 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
             "px many are missed, and headings are a guess. Take images of a higher resolution.",
             warning=True,
         )
+
+
+def remedy(learnt: Mapping[str, JSON]) -> str:
+    """Return what to try where few animals were found.
+
+    Parameters
+    ----------
+    learnt
+        From `learnt_by`; empty where nothing was learnt.
+    """
+    if not learnt:
+        return "Look at --contact-sheet; --start leaves out what comes before the fish."
+    taken, film = str(learnt["polarity"]), learnt["film_polarity"]
+    if isinstance(film, str) and film != taken:
+        other = f"Try --{film}"
+    else:
+        other = f"Try {' or '.join(f'--{each}' for each in POLARITIES if each != taken)}"
+    return (
+        f"Fish count as {_SAYS[taken]}, and as {learnt['min_blob_px']:.0f} px or larger. {other} "
+        "(with --force), or a smaller --min-blob-px, and look at --contact-sheet."
+    )

@@ -16,7 +16,7 @@ from zfcal.cameras.stamps import Tally
 from zfcal.stages.camera.rig import Feed
 from zfcal.stages.events import LeftOut, Note, Result, Tell
 from zfcal.stages.track.below import Below
-from zfcal.stages.track.learnt import learnt_by, notes_of
+from zfcal.stages.track.learnt import learnt_by, notes_of, remedy
 from zfcal.stages.track.plan import Plan
 from zfcal.stages.track.tracker_noise import losses, tracker_noise
 from zfcal.stages.track_window import NOISE_KEY
@@ -42,6 +42,9 @@ _HINTS = {
 }
 _INEXACT = {"too few", "forced", "unclaimed"}
 """Words of frames in which the animals were not all seen for themselves."""
+
+_FEW = 0.5
+"""Below this share of all fish, a warning says so."""
 
 _NO_LED_S = 5.0
 _LATENCIES = 100_000
@@ -86,6 +89,7 @@ class Outcome:
         self._exact = 0
         self._emitted = 0
         self._guesses = self._rows = 0
+        self._fish = self._with_fish = 0
         self.learnt: Mapping[str, JSON] = {}
         self._told = 0
         self._heard: Learnt | None = None
@@ -148,6 +152,9 @@ class Outcome:
         have to be, that are no guesses, and beside whom nothing like an animal is left over.
         """
         guesses = sum(agent.confidence < GUESS for agent in poses.agents)
+        fish = sum(agent.kind == FISH for agent in poses.agents)
+        self._fish += fish
+        self._with_fish += fish > 0
         self._rows += len(poses.agents)
         self._guesses += guesses
         emitted = len(poses.agents) == self._plan.opened.trial.n_agents
@@ -184,12 +191,27 @@ class Outcome:
                 "was found. Give an image of the empty tank with --background."
             )
             self._tell(Note(text=text, warning=True))
+        self._warn_of_few()
         self._tell(Result(value=self._numbers()))
         for feed in self._feeds:
             for problem in feed.source.problems:
                 self._tell(
                     LeftOut(path=Path(feed.source.name), problem=problem.says, hint=problem.hint)
                 )
+
+    def _warn_of_few(self) -> None:
+        """Warn where fewer than half of the fish were found, and say what to try."""
+        frames, n_fish = self._tally.frames, self._plan.opened.trial.n_fish
+        if not frames or self._bad["no background"] or self._fish >= _FEW * n_fish * frames:
+            return
+        found = (
+            f"no fish found in any of {frames} frames"
+            if not self._fish
+            else f"only {self._fish / frames:.2g} of {n_fish} fish found in a frame on average, "
+            f"and none in {frames - self._with_fish} of {frames} frames"
+        )
+        text = f"{self._plan.overhead.source}: {found}. {remedy(self.learnt)}"
+        self._tell(Note(text=text, warning=True))
 
     def _numbers(self) -> dict[str, JSON]:
         took_ms = [1000 * took for took in self._took_s]
@@ -203,6 +225,8 @@ class Outcome:
             "exact": self._exact,
             "as_many_rows": self._emitted,
             "guesses": self._guesses,
+            "fish": self._fish,
+            "without_fish": self._tally.frames - self._with_fish,
             "learnt": dict(self.learnt),
             "bad_frames": dict(self._bad),
             "leds": {} if self._below is None else dict(self._below.counts),

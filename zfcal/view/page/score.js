@@ -49,8 +49,8 @@ function showRounds({ model, robot, skipped }, second, end) {
     ...ceilingOf(model, x, y),
     line(robot, x, y, "robot"),
     line(model, x, y, "model"),
-    ...robot.map((r) => shape(`M${x(r.end_s) - 3} ${y(r.value) - 3} h6 v6 h-6 Z`, "robot")),
-    ...model.map((r) => shape(`M${x(r.end_s)} ${y(r.value) - 5.5} l5 9 h-10 Z`, "model")),
+    ...robot.map((r) => point(r, `M${x(r.end_s) - 3} ${y(r.value) - 3} h6 v6 h-6 Z`, "robot")),
+    ...model.map((r) => point(r, `M${x(r.end_s)} ${y(r.value) - 5.5} l5 9 h-10 Z`, "model")),
     ...skipped.map((s) => stroke(`M${x(s) - 4} ${floor - 9} l8 8 m0 -8 l-8 8`, "muted", 2)),
     stroke(`M${x(Math.min(second, end))} ${PAD.top} V${floor}`, "ink", 1.2),
   ];
@@ -61,11 +61,22 @@ function showRounds({ model, robot, skipped }, second, end) {
     entry("triangle", "model", "S of the model"),
     entry("dash", "band", "its ceiling, and 95 % of what that is the mean of"),
     ...(robot.length ? [entry("square", "robot", "S of the robot among fish")] : []),
+    ...(model.some((r) => r.above)
+      ? [entry("hollow triangle", "model", "above the range of its ceiling: fits chance")]
+      : []),
+    ...(robot.some((r) => r.above)
+      ? [entry("hollow square", "robot", "above the range of its ceiling")]
+      : []),
     ...(skipped.length ? [entry("cross", "muted", "window passed over")] : []),
   ]);
 }
 
 const shape = (d, colour, opacity = 1) => draw("path", { d, fill: colour, opacity });
+// Hollow above the range of the ceiling: filled with the panel's ground, so that no line shows through.
+const point = ({ above }, d, colour) =>
+  above
+    ? draw("path", { d, fill: "card", stroke: colour, "stroke-width": 1.6, class: "above" })
+    : shape(d, colour);
 const stroke = (d, colour, width, more = {}) =>
   draw("path", { d, stroke: colour, fill: "none", "stroke-width": width, ...more });
 const text = (x, y, said, anchor) => draw("text", { x, y, "text-anchor": anchor }, said);
@@ -105,5 +116,6 @@ function ceilingOf(model, x, y) {
 function inWords(model) {
   if (!model.length) return "No rounds yet";
   const said = model.map((r) => `${clock(r.end_s)}: ${withCeiling(r, 2)}`);
-  return `S of the model and its ceiling by the end of each window. ${said.join("; ")}`;
+  const hollow = model.some((r) => r.above) ? " Hollow marks are above the range of the ceiling." : "";
+  return `S of the model and its ceiling by the end of each window. ${said.join("; ")}.${hollow}`;
 }

@@ -49,6 +49,8 @@ const line = (d, colour, width, more = {}) =>
 const KEYS = {
   triangle: (c) => draw("path", { d: "M9 2 L15 12 L3 12 Z", fill: c }),
   square: (c) => draw("rect", { x: 4, y: 2, width: 10, height: 10, fill: c }),
+  "hollow triangle": (c) => line("M9 3 L14 11.5 L4 11.5 Z", c, 1.6),
+  "hollow square": (c) => line("M5 3 h8 v8 h-8 Z", c, 1.6),
   fish: (c) => draw("path", { d: "M2 7 C7 1 13 2 15 7 C13 12 7 13 2 7 Z", fill: c }),
   ring: (c) => draw("circle", { cx: 9, cy: 7, r: 5, fill: "none", stroke: c, "stroke-width": 2 }),
   bar: (c) => draw("rect", { x: 1, y: 2, width: 16, height: 10, rx: 2, fill: c, opacity: 0.45 }),
