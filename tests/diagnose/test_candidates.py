@@ -9,11 +9,13 @@ from zfcal.diagnose.candidates import (
     askable,
     candidates_of,
     company_of,
+    further_forms,
     in_model,
     not_forms_of,
 )
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.generic import generic_effects
+from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import make_scene
 
 
@@ -147,3 +149,31 @@ def test_other_forms_of_what_is_known_are_not_asked_for(tank):
     assert "generic:speed:wall" not in {
         each.name for each in not_forms_of(generic, {"generic:speed:wall"})
     }
+
+
+def forms_of(scene, name, key):
+    """Return the values of a shape at which features alone find an effect."""
+    return {each.shape[key] for each in further_forms(find_effect(name), scene)}
+
+
+def test_one_fish_is_asked_for_where_it_is_the_same_all_the_time(scene_of):
+    """Five fish: each; without the one whose track breaks; none behind a robot."""
+    scene = scene_of()
+    assert forms_of(scene, "leader-following", "who") == {-1.0, 0.0, 1.0, 2.0, 3.0, 4.0}
+    tracks = scene.tracks.copy()
+    tracks[100:, 1] = tracks.max() + 1
+    broken = dataclasses.replace(scene, tracks=tracks)
+    assert forms_of(broken, "leader-following", "who") == {-1.0, 0.0, 2.0, 3.0, 4.0}
+    states = scene.states.copy()
+    states[:, KIND] = [1.0, 0.0, 0.0, 0.0, 0.0]
+    first = dataclasses.replace(scene, states=states)
+    assert forms_of(first, "leader-following", "who") == {-1.0}
+
+
+def test_no_response_is_later_than_it_can_be(scene_of):
+    """By half a step of a recording to two, of those that are 2 s at most."""
+    scene = scene_of()
+    here = forms_of(scene, "reaction-delay", "delay_s")
+    assert {0.5 * scene.dt_s, scene.dt_s, 1.5 * scene.dt_s, 2 * scene.dt_s} <= here
+    slow = dataclasses.replace(scene, dt_s=1.25)
+    assert max(forms_of(slow, "reaction-delay", "delay_s")) <= 2.0

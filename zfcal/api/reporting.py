@@ -67,6 +67,8 @@ def write_page(
     page = _write_one(roots, out or _TOGETHER, tell, task=task, how=how)
     failed = None
     for root in roots:
+        if out is not None and out.resolve() == (root / "report").resolve():
+            continue  # There is the page of the set, as asked.
         try:
             _write_one([root], None, tell, task=task, how=how)
         except ZfcalError as error:

@@ -11,6 +11,7 @@ from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
 from zfcal.model.kernels.rooms import find_rooms
+from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
 
@@ -132,16 +133,39 @@ def candidates_of(
 def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
     """Return an effect at the shapes in which features alone may find it.
 
-    One that responds late may do so by half a step of the recording, by one, and so on.
+    One that responds late may do so by half a step of the recording, by one, and so on. One that
+    is about a certain agent is asked of fish that are the same from beginning to end.
     """
-    shapes = list(effect.further_shapes(scene.arena))
+    sure = _lasting_fish(scene)
+    shapes = [
+        shape
+        for shape in effect.further_shapes(scene.arena)
+        if "who" not in shape or shape["who"] in sure
+    ]
     if effect.lag is not None:
+        (longest_s,) = (each.high for each in effect.parameters if each.name == effect.lag)
         shapes += [
             {effect.lag: steps * scene.dt_s, "felt_m": 0.0, "whole": whole}
             for whole in (1.0, 0.0)
             for steps in _LATE_STEPS
+            if steps * scene.dt_s <= longest_s
         ]
     return tuple(_at(effect, shape) for shape in shapes)
+
+
+def _lasting_fish(scene: Scene) -> list[int]:
+    """Return the columns of fish that hold one track each; none where a robot stands among them.
+
+    A simulation and a robot's drive have fish first.
+    """
+    is_robot = scene.states[0, KIND] > 0
+    if (np.diff(is_robot.astype(int)) < 0).any():
+        return []
+    return [
+        column
+        for column in np.flatnonzero(~is_robot).tolist()
+        if len(np.unique(scene.tracks[scene.tracks[:, column] >= 0, column])) == 1
+    ]
 
 
 def askable(scene: Scene, model: Parameters) -> tuple[tuple[Effect, ...], dict[str, str]]:

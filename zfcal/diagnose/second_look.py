@@ -81,7 +81,8 @@ def second_look(case: Case, before: Found) -> Found | None:
     n = next((k for k, step in enumerate(before.steps) if _on_headings(step)), len(before.steps))
     there = before.steps[n] if n < len(before.steps) else None
     screen = before.steps[n - 1].choice.best.screen if n else case.screen
-    looks = _Looks(case=case, screen=screen, beside=tuple(known))
+    has_later = any(_on_headings(step) for step in before.steps[n + 1 :])
+    looks = _Looks(case=case, screen=screen, beside=tuple(known), has_later=has_later)
     first = _named(looks, there=there)
     found = before if first is None else _with(before, n, first)
     if first is not None:
@@ -156,7 +157,7 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
         return None
     found, score = _in_the_model(case, screen, told.gain.name)
     same = None if there is None or there.choice.best.name != found.name else there.choice.best
-    if same is not None and not found.worth > same.worth:
+    if same is not None and (looks.has_later or not found.worth > same.worth):
         return None
     ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
     step = Step(
@@ -194,12 +195,16 @@ class _Looks:
         named.
     without_noise
         Whether what seemed to be noise is explained.
+    has_later
+        Whether more on headings was named after what is held against features: that was
+        confirmed beside the form that it has.
     """
 
     case: Case
     screen: Screen
     beside: tuple[Effect, ...]
     without_noise: bool = False
+    has_later: bool = False
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:

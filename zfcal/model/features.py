@@ -61,8 +61,8 @@ class Seen:
         To the left; 0 where it is not known.
     time : ndarray, shape (step,)
         Share of the recording that has passed.
-    left_s : ndarray, shape (step,)
-        Since another one left the room.
+    left_s, left_at_all_s : ndarray, shape (step,)
+        Since another one that is still away left the room; since any other one did.
     """
 
     attention: Floats
@@ -93,6 +93,7 @@ class Seen:
     last_turn_rad: Floats
     time: Floats
     left_s: Floats
+    left_at_all_s: Floats
 
     @property
     def nearest(self) -> Floats:

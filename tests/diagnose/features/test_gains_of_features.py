@@ -8,14 +8,14 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import logit
 
-from zfcal.diagnose.features.asking import gains_of, kind_of
+from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
 from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.extended import LAPSE, maximise
+from zfcal.model.extended import LAPSE, maximise, with_effect
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
 
 
@@ -272,3 +272,36 @@ def test_what_fish_are_drawn_to_of_each_that_they_see_is_cohesion(base, hidden):
     nats = {each.label: each.nats for each in found}
     assert nats["drawn to each seen"] == max(nats.values())
     assert nats["drawn to each seen"] > nats["drawn to each"] + 3
+
+
+def test_beside_an_effect_nothing_is_gained_by_less_than_none(base, worlds):
+    """A model that has the effect, and fish that do as it says: no name is missing beside it.
+
+    Components that took away more than there is would make densities negative where no heading
+    was taken, and gain for ever.
+    """
+    scene, fitted = base
+    model = with_effect(fitted.parameters, "alignment", {"weight": 30.0, "kappa": 8.0})
+    there = maximise(scene, model, start=fitted.x, rounds=0)
+    drawn = worlds.redrawn(scene, there, np.random.default_rng(8), np.ones_like)
+    law = Law(scene=drawn, fitted=maximise(drawn, model))
+    effect = find_effect("alignment")
+    gained = fits_beside(law, [effect]).null_log_p.sum() - Fits(law=law).null_log_p.sum()
+    assert -0.1 < gained < 30
+    others = [each for each in all_effects() if each.name != "alignment"]
+    assert tell(gains_of(law, others, beside=[effect])) is None
+
+
+def test_a_model_may_have_too_much_of_a_component(base, worlds):
+    """Twice as heavy as it is: the column of its weight takes the half away."""
+    scene, fitted = base
+    given = {"weight": 30.0, "kappa": 8.0}
+    half = with_effect(fitted.parameters, "alignment", {**given, "weight": 15.0})
+    there = maximise(scene, half, start=fitted.x, rounds=0)
+    drawn = worlds.redrawn(scene, there, np.random.default_rng(8), np.ones_like)
+    double = with_effect(fitted.parameters, "alignment", given)
+    too_much = maximise(drawn, double, start=fitted.x, rounds=0)
+    right = maximise(drawn, half, start=fitted.x, rounds=0)
+    found = [Fits(law=Law(scene=drawn, fitted=each)).null_log_p.sum() for each in (too_much, right)]
+    assert np.nansum(too_much.log_p) < np.nansum(right.log_p) - 10
+    assert found[0] == pytest.approx(found[1], abs=3)

@@ -175,3 +175,44 @@ def test_a_share_of_the_last_turn_can_be_gone_on_with(ask, form, follows, turned
     )  # fmt: skip
     assert asked.rotation() == pytest.approx(turned)
     assert asked.factor(2.0) == 1.0
+
+
+@pytest.mark.parametrize(("back", "weight"), [(0.0, 0.0), (1.0, 0.2)])
+def test_one_that_came_back_has_left_all_the_same(ask, back, weight):
+    """It is in the room again, a second after it had left that."""
+    rows = {
+        "X": [0.0, 0.1], "ROOM": 1.0, "MOUTH_X": 1.0, "MOUTH_M": 0.3, "TIME": 50.0,
+        "LEFT_FROM": [0.0, 1.0], "LEFT_AT_S": [-1e9, 49.0],
+    }  # fmt: skip
+    given = {"strength": 2.0, "memory_s": 4.0, "drawn": 1.0, "back": back}
+    asked = ask("collective-departure", given, **rows)
+    assert asked.component()[0] == pytest.approx(weight, rel=0.01)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_some_headings_can_be_drawn_to_a_side(ask, side):
+    """Left of a heading upward is the way to -x; not along a wall."""
+    given = {"strength": side * 2.0, "drawn": 1.0}
+    weight, (x, y, kappa) = ask("turning-bias", given, HX=0.0, HY=1.0).component()
+    assert (weight, x, y, kappa) == pytest.approx((0.2, -side, 0.0, 4.0))
+    assert ask("turning-bias", given, FOLLOWS=1.0).component()[0] == 0.0
+    assert ask("turning-bias", given).factor(1.0) == 1.0
+
+
+@pytest.mark.parametrize(("strength", "toward"), [(2.0, math.pi / 2), (-2.0, 0.0)])
+def test_some_headings_can_be_drawn_on_as_a_fish_turned(ask, strength, toward):
+    """After 45 degrees to the left: 45 more, or back again."""
+    side = math.sqrt(0.5)
+    asked = ask(
+        "turning-memory", {"strength": strength, "drawn": 1.0}, HX=side, HY=side, PAST_HX=1.0
+    )
+    weight, (x, y, kappa) = asked.component()
+    assert (weight, kappa) == pytest.approx((0.2, 9.0))
+    assert (x, y) == pytest.approx((math.cos(toward), math.sin(toward)))
+    assert ask("turning-memory", {"strength": strength, "drawn": 1.0}).component()[0] == 0.0
+
+
+def test_nobody_of_unknown_speed_is_the_fastest(ask):
+    """One that has just come into sight has none yet."""
+    asked = ask("leader-following", {"strength": 1.0, "fastest": 1.0}, SPEED=[0.1, math.nan, 0.06])
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])

@@ -103,22 +103,22 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
             for each in chosen:
                 if isinstance(each, Component | Turned):
-                    also.append(_either_way(each, law.most))
+                    also.append(_either_way(each))
                 elif isinstance(each, Tilt) or law.between:
                     law = _absorbed(law, each)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
 
 
-def _either_way(feature: Component | Turned, most: float) -> Component | Turned:
-    """Return a feature that may also take away: a model's form of its effect may have too much.
+def _either_way(feature: Component | Turned) -> Component | Turned:
+    """Return a feature that may go either way: a model's form of its effect may have too much.
 
-    Of a component no more than ``most``, the largest weight that one has in the model.
+    Of a component there cannot be less than none. A model that has too much of one has less of
+    its own (`Law.own_parameters`).
     """
     if isinstance(feature, Turned):
         return replace(feature, low=None)
-    low = -most if feature.low == 0.0 else feature.low
-    return replace(feature, low=low, high=feature.high or None)
+    return replace(feature, high=feature.high or None)
 
 
 def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:

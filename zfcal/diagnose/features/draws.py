@@ -16,6 +16,8 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,
+    LEFT_AT_S,
+    LEFT_FROM,
     LEFT_S,
     MOUTH_X,
     MOUTH_Y,
@@ -118,7 +120,8 @@ def drawn(steps: Steps, noise_m: float, random: np.random.Generator) -> Draw:
         tank_of(arena),
     )  # fmt: skip
     # Speeds decide who is fast, and are not what is in doubt.
-    made[:, [SPEED, ROOM, LEFT_S]] = states[:, [SPEED, ROOM, LEFT_S]]
+    kept = [SPEED, ROOM, LEFT_S, LEFT_AT_S, LEFT_FROM]
+    made[:, kept] = states[:, kept]
     return draw_of(steps, made, view_of(replace(steps.scene, states=made), steps.parameters))
 
 
@@ -205,6 +208,9 @@ def _seen(
     turned = np.arctan2(
         past[:, 0] * heading[:, 1] - past[:, 1] * heading[:, 0], (past * heading).sum(axis=1)
     )
+    left_here = here & (theirs(LEFT_FROM, at) == own[:, ROOM, None]) & (own[:, ROOM, None] > 0)
+    since_s = own[:, TIME, None] - theirs(LEFT_AT_S, at)
+    left_at_all_s = np.where(left_here, since_s, np.inf).min(axis=1)
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
@@ -234,6 +240,7 @@ def _seen(
         last_turn_rad=turned,
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
+        left_at_all_s=left_at_all_s,
     )
 
 

@@ -34,6 +34,9 @@ DRAWS = 8
 _TURN_RAD = 0.02
 """Half of the angle between the two laws whose difference stands for the derivative."""
 
+_WEIGHT = (-0.98, 6.0)
+"""Bounds of what is added to the weight of the model's components, as a share of it."""
+
 _MORE = 1.1
 """By this factor a concentration is changed for the law's derivative."""
 
@@ -275,11 +278,6 @@ class Law:
         known = np.array([zone.follows_walls for zone in self.scene.arena.zones])
         return np.asarray(known[self.turns.zone - 1])
 
-    @property
-    def most(self) -> float:
-        """The largest weight of a component that effects of the model add to the mixture."""
-        return float(self.fitted.view.parts[:, :, 0].max(initial=0.0))
-
     @cached_property
     def own(self) -> Columns:
         """The own stimulus alone, shape (step, 1)."""
@@ -288,20 +286,29 @@ class Law:
     @cached_property
     def base(self) -> Columns:
         """The law as it is, shape (step, 1)."""
-        made = [self.own, self._neighbours()]
-        parts = self.fitted.view.parts
+        made = [self.own, self._neighbours(), *self._components]
+        return sum(m[0] for m in made), sum(m[1] for m in made)  # type: ignore[return-value]
+
+    @cached_property
+    def _components(self) -> list[Columns]:
+        """Components of effects that the model has, each of shape (step, 1)."""
+        parts, made = self.fitted.view.parts, []
         for c in range(parts.shape[1]):
             own = parts[self.rows, c]
             at, over = self.bells(own[:, None, 1:3], own[:, 3])
             made.append((own[:, :1] * at, own[:, :1] * over))
-        return sum(m[0] for m in made), sum(m[1] for m in made)  # type: ignore[return-value]
+        return made
 
     def _neighbours(self, more: float = 1.0) -> Columns:
         return self.mean([self._social(d.toward, d.angle_sr, more) for d in self.draws])
 
     @cached_property
     def own_parameters(self) -> tuple[list[Columns], list[tuple[float, float]]]:
-        """Columns of the base's parameters in each zone, and bounds of what they may change by."""
+        """Columns of the model's own parameters, and bounds of what they may change by.
+
+        Those of the base in each zone; and of all components of its effects together, how heavy
+        they are.
+        """
         own = self.own
         own_more = self.mean([self._own(d.base, _MORE) for d in self.draws])
         social, social_more = self._neighbours(), self._neighbours(_MORE)
@@ -317,6 +324,11 @@ class Law:
                 if np.abs(at * here).max(initial=0.0) > 0:
                     columns.append((at * here, over * here))
                     bounds.append(limits)
+        if self._components:
+            columns.append(
+                tuple(np.sum(each, axis=0) for each in zip(*self._components, strict=True))
+            )
+            bounds.append(_WEIGHT)
         return columns, bounds
 
     @cached_property

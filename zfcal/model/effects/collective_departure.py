@@ -6,20 +6,43 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import beyond, needs_neighbour, tilt, way_out
+from zfcal.model.effects.forms import Hooked, beyond, needs_neighbour, tilt, way_out
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, hats, only
-from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR
-from zfcal.model.kernels.state import LEFT_S, MOUTH_X, MOUTH_Y, ROOM
+from zfcal.model.kernels.state import (
+    LEFT_AT_S,
+    LEFT_FROM,
+    LEFT_S,
+    MOUTH_X,
+    MOUTH_Y,
+    NEVER_S,
+    ROOM,
+    TIME,
+    ZONE,
+)
 
 _KAPPA = 3.0
 _PER_STRENGTH = 0.1
 
 
+@inlined
+def since(state: Hooked, n: int, i: int, back: float) -> float:
+    """Return how long ago another one left the agent's room; whether it came back, if asked."""
+    if not back > 0.0:
+        return float(state[LEFT_S * n + i])
+    found = NEVER_S
+    for j in range(n):
+        here = state[ZONE * n + j] > 0.0 and state[LEFT_FROM * n + j] == state[ROOM * n + i]
+        if j != i and here:
+            found = min(found, state[TIME * n + i] - state[LEFT_AT_S * n + j])
+    return found
+
+
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Add a component about the direction of the way out while another's leaving is fresh."""
-    since_s = state[LEFT_S * n + i]
+    since_s = since(state, n, i, parameters[4])
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 0.0
     out[0], out[1], out[2] = state[MOUTH_X * n + i], state[MOUTH_Y * n + i], _KAPPA
@@ -32,7 +55,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     """Weigh headings by the way out while another's leaving is fresh."""
     if parameters[3] > 0.0:
         return 1.0
-    since_s = state[LEFT_S * n + i]
+    since_s = since(state, n, i, parameters[4])
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 1.0
     fresh = 1.0 - beyond(since_s, parameters[1])
@@ -50,6 +73,10 @@ def _freshly_left(seen: Seen) -> Floats:
     return hats(seen.left_s, _KNOTS_S)[:, :-1]
 
 
+def _left_at_all(seen: Seen) -> Floats:
+    return hats(seen.left_at_all_s, _KNOTS_S)[:, :-1]
+
+
 def _way_out(seen: Seen) -> Floats:
     return only(seen.way_out)
 
@@ -64,6 +91,7 @@ def _leaning(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Leaving(label="time", weights=_freshly_left),
+    Leaving(label="time, though it came back", weights=_left_at_all),
     Component(label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0),
     Tilt(label="leaning to the way out", vectors=_leaning),
 )
@@ -104,6 +132,13 @@ EFFECT = Effect(
             says="0: all headings lean toward the way out; 1: some are drawn about its direction, "
             "as a component of the weight 0.1 per strength.",
         ),
+        EffectParameter(
+            name="back",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: the leaving of those that are still away; 1: of those that came back as well.",
+        ),
     ),
     probe=0.01,
     component=component,
@@ -116,11 +151,18 @@ EFFECT = Effect(
         for memory_s in (2.0, 5.0, 12.0)
     ),
     further_shapes=lambda _arena: tuple(
-        {"memory_s": memory_s, "drawn": 1.0} for memory_s in (1.0, 2.0, 4.0, 8.0)
+        {"memory_s": memory_s, **form}
+        for form in (
+            {"drawn": 1.0},
+            {"drawn": 1.0, "back": 1.0},
+            {"heading_share": 0.0, "back": 1.0},
+            {"back": 1.0},
+        )
+        for memory_s in (1.0, 2.0, 4.0, 8.0)
     ),
     lacks=_lacks,
     identity_s=10.0,
-    fixed=("heading_share", "drawn"),
+    fixed=("heading_share", "drawn", "back"),
     needs={"component": ("drawn",)},
     features=lambda _arena: _FEATURES,
 )

@@ -21,6 +21,8 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
     if parameters[2] >= 0.0:
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
+        if not state[SPEED * n + j] >= 0.0:  # Of unknown speed: it has just come into sight.
+            return 1.0
         for k in range(n):
             if sight[i * n + k] > 0.0 and state[SPEED * n + k] > state[SPEED * n + j]:
                 return 1.0

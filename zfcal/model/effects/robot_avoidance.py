@@ -77,6 +77,10 @@ def _robots(seen: Seen) -> Floats:
     return hats(seen.distance_m, _KNOTS_M) * seen.is_robot[..., None]
 
 
+def _seen_robots(seen: Seen) -> Floats:
+    return _robots(seen) * seen.in_sight[..., None]
+
+
 def _leaning(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
 
@@ -85,6 +89,7 @@ _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention),
     Component(label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0),
     Component(label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0),
+    Component(label="drawn to it", toward="bearing", weights=_seen_robots, kappa=5.0),
     Tilt(label="leaning", vectors=_leaning),
 )
 

@@ -9,13 +9,39 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.state import FOLLOWS, HX, HY
+
+_KAPPA = 4.0
+_PER_STRENGTH = 0.1
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of the turn that they are; left is positive."""
+    if parameters[2] > 0.0:
+        return 1.0
     return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the left of the heading, or the right; not along a wall."""
+    if state[FOLLOWS * n + i] > 0.0:
+        return 0.0
+    side = 1.0 if parameters[0] > 0.0 else -1.0
+    out[0], out[1] = -side * state[HY * n + i], side * state[HX * n + i]
+    out[2] = _KAPPA
+    return _PER_STRENGTH * abs(parameters[0]) * parameters[2]
+
+
+def _sides(seen: Seen) -> Floats:
+    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
+    return np.stack([left, -left], axis=1)
+
+
+def _one_side(seen: Seen) -> Floats:
+    return np.where(seen.follows_walls, 0.0, 1.0)[:, None, None] * np.eye(2)
 
 
 def _left(seen: Seen) -> Floats:
@@ -36,6 +62,7 @@ def _half(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
+    Component(label="drawn to a side", toward=_sides, weights=_one_side, kappa=_KAPPA),
     Tilt(label="leaning", vectors=_left),
     Component(
         label="along the wall", toward=_both_ways, weights=_half, kappa="own", low=-0.98, high=0.98
@@ -65,12 +92,23 @@ EFFECT = Effect(
             says="0: left of the present heading everywhere; 1: where fish follow walls, left of "
             "the way along the wall.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: all headings lean to the side; 1: some are drawn at right angles to it, as "
+            "a component of the weight 0.1 per strength; not along a wall.",
+        ),
     ),
     probe=0.01,
+    component=component,
     factor=factor,
     harmonics=2,
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
-    fixed=("along_walls",),
+    further_shapes=lambda _arena: ({"drawn": 1.0},),
+    fixed=("along_walls", "drawn"),
+    needs={"component": ("drawn",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,
 )

@@ -11,16 +11,17 @@ from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import FACTOR, ROTATION
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
 
 _PER_STRENGTH = 0.1
+_KAPPA = 9.0
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of their turn times that of the last turn."""
-    if parameters[3] > 0.0:
+    if parameters[3] > 0.0 or parameters[4] > 0.0:
         return 1.0
     hx, hy = state[HX * n + i], state[HY * n + i]
     px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
@@ -39,6 +40,20 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     on = px * hx + py * hy
     last = math.atan2(px * hy - py * hx, on) * max(0.0, on) ** parameters[2]
     return _PER_STRENGTH * parameters[0] * last
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the heading that the last turn leads on to; not along a wall."""
+    if state[FOLLOWS * n + i] > 0.0:
+        return 0.0
+    hx, hy = state[HX * n + i], state[HY * n + i]
+    px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
+    c, s = px * hx + py * hy, px * hy - py * hx
+    if parameters[0] < 0.0:
+        s = -s
+    out[0], out[1], out[2] = c * hx - s * hy, s * hx + c * hy, _KAPPA
+    return _PER_STRENGTH * abs(parameters[0]) * parameters[4] if s != 0.0 else 0.0
 
 
 def _shuffled(states: Floats, _dt_s: float, random: np.random.Generator) -> Floats:
@@ -74,9 +89,18 @@ def _one(seen: Seen) -> Floats:
 
 
 def _heading_before(seen: Seen) -> Floats:
-    c, s = np.cos(seen.last_turn_rad), np.sin(seen.last_turn_rad)
-    x, y = seen.own_heading[:, 0], seen.own_heading[:, 1]
-    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+    return turned(seen.own_heading, -seen.last_turn_rad)
+
+
+def turned(ways: Floats, angle_rad: Floats) -> Floats:
+    """Return unit vectors turned to the left, shape (step, 2)."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    x, y = ways[:, 0], ways[:, 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def _on(seen: Seen) -> Floats:
+    return only(turned(seen.own_heading, seen.last_turn_rad))
 
 
 def _leaning(seen: Seen) -> Floats:
@@ -90,6 +114,7 @@ _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=_last_turn, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
+    Component(label="drawn on as it turned", toward=_on, weights=_one, kappa=_KAPPA),
     Tilt(label="leaning to the heading before", vectors=_leaning),
 )
 
@@ -131,21 +156,33 @@ EFFECT = Effect(
             says="1: the own direction, and that along a wall if along_walls is 1, is turned on by "
             "a tenth of the last turn per strength.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: some headings are drawn about the one that the last turn leads on to, or back "
+            "to, as a component of the weight 0.1 per strength; not along a wall.",
+        ),
     ),
     probe=0.01,
+    component=component,
     factor=factor,
     rotation=rotation,
     harmonics=2,
     shapes=lambda _arena: tuple(
         {"along_walls": along, "forgets_wide": wide} for along in (0.0, 1.0) for wide in (0.0, 1.0)
     ),
-    further_shapes=lambda _arena: tuple(
-        {"turning": 1.0, "along_walls": along, "forgets_wide": wide}
-        for along in (0.0, 1.0)
-        for wide in (0.0, 1.0)
+    further_shapes=lambda _arena: (
+        {"drawn": 1.0},
+        *(
+            {"turning": 1.0, "along_walls": along, "forgets_wide": wide}
+            for along in (0.0, 1.0)
+            for wide in (0.0, 1.0)
+        ),
     ),
-    fixed=("along_walls", "forgets_wide", "turning"),
-    needs={"rotation": ("turning",)},
+    fixed=("along_walls", "forgets_wide", "turning", "drawn"),
+    needs={"rotation": ("turning",), "component": ("drawn",)},
     identity_s=0.8,
     shown_against="turn",
     # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep

@@ -207,7 +207,7 @@ class Outcome:
         found = (
             f"no fish found in any of {frames} frames"
             if not self._fish
-            else f"only {self._fish / frames:.2g} of {n_fish} fish found in a frame on average, "
+            else f"only {self._fish / frames:.1f} of {n_fish} fish found in a frame on average, "
             f"and none in {frames - self._with_fish} of {frames} frames"
         )
         text = f"{self._plan.overhead.source}: {found}. {remedy(self.learnt)}"
