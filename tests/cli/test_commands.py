@@ -226,6 +226,17 @@ def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
     }
 
 
+def test_a_report_over_several_trials_stays_where_it_was_asked_for(zfcal, trial):
+    """In the folder of one of them: the page of that trial alone is not written over it."""
+    zfcal("analyse", "trial")
+    zfcal("init", "other", "--side-m", "1", "--fish", "3", "--robot", "--fps", "5")
+    assert zfcal("report", "trial", "other", "-o", "trial/report").code == 0
+    page = (trial / "report" / "index.html").read_text()
+    assert "other" in page
+    assert (trial.parent / "other" / "report" / "index.html").exists()
+    assert "nothing to do" in zfcal("report", "trial", "other", "-o", "trial/report").err
+
+
 @pytest.mark.slow
 def test_a_report_names_what_is_damaged_each_time(zfcal, trial):
     """Up to date is not whole: exit 3 of the second run too, until the file is mended."""
