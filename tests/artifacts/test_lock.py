@@ -149,9 +149,8 @@ FORKING = """
     from zfcal.artifacts.lock import lock
 
     with lock(Path(sys.argv[1]), "analyse"):
-        child = os.fork()
-        if child:
-            print(child, flush=True)
+        if not os.fork():
+            print(os.getpid(), flush=True)  # By now the fork has let go of what it inherited.
         time.sleep(60)
 """
 

@@ -210,7 +210,7 @@ def _seen(
     )
     left_here = here & (theirs(LEFT_FROM, at) == own[:, ROOM, None]) & (own[:, ROOM, None] > 0)
     since_s = own[:, TIME, None] - theirs(LEFT_AT_S, at)
-    left_at_all_s = np.where(left_here, since_s, np.inf).min(axis=1)
+    left_at_all_s = np.where(left_here, since_s, np.inf).min(axis=1, initial=np.inf)
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
