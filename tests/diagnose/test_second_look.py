@@ -18,7 +18,7 @@ from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.second_look import Found, _noise_nats, _stays, second_look
+from zfcal.diagnose.second_look import Found, _bound, _noise_nats, _stays, second_look
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
@@ -314,3 +314,11 @@ def test_a_second_effect_is_named_beside_the_first(question):
     now = second_look(open_case(question(both)), NOTHING)
     assert {each.choice.best.name for each in now.steps} == set(both)
     assert all(not each.choice.ties for each in now.steps)
+
+
+def test_noise_seldom_gains_more_than_its_bound():
+    """Of three features of which six replicates are known one exceeds it in 2 % of cases."""
+    rng = np.random.default_rng(5)
+    gains = rng.normal(40.0, 6.0, (4000, 7, 3))
+    beyond = [(case[6] > _bound(case[:6])).any() for case in gains]
+    assert 0.014 < np.mean(beyond) < 0.026

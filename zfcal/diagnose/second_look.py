@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
+from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms, in_model
@@ -331,8 +331,9 @@ def _stays(there: Refit, told: Told, law: Law) -> bool:
 
 
 def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()) -> list[float]:
-    """Return what features gain on replicates of the model: their mean and two deviations more.
+    """Return what features may gain on one more replicate of the model: a bound by Student's t.
 
+    Of all features that are asked one exceeds its bound by chance in 2 % of cases (Bonferroni).
     The model is that without the effects that were found; their features are fitted as well.
     """
     keys = [gain.key for gain in clear]
@@ -348,7 +349,14 @@ def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()
 
     n_workers = case.question.n_workers
     rows = np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))
-    return list(np.maximum(rows.mean(axis=0) + 2.0 * rows.std(axis=0, ddof=1), 0.0))
+    return list(_bound(rows))
+
+
+def _bound(rows: Floats) -> Floats:
+    """Return what one more row, shape (row, feature), exceeds anywhere in 2 % of cases."""
+    n, n_features = rows.shape
+    times = stdtrit(n - 1, 1 - LEVEL / n_features) * np.sqrt(1 + 1 / n)
+    return np.maximum(rows.mean(axis=0) + times * rows.std(axis=0, ddof=1), 0.0)
 
 
 def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:

@@ -238,8 +238,9 @@ class Fits:
 
             def scores() -> Floats:
                 # At a floor the law does not change.
-                by_top = np.where(top > _LEAST * base_at, share / top, 0.0)
-                by_whole = np.where(whole > least, share / whole, 0.0)
+                nothing = np.zeros_like(share)
+                by_top = np.divide(share, top, out=nothing.copy(), where=top > _LEAST * base_at)
+                by_whole = np.divide(share, whole, out=nothing, where=whole > least)
                 return np.column_stack([by_top[:, None] * at - by_whole[:, None] * over, slope])
 
             return value, scores
