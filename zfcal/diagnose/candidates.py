@@ -100,6 +100,7 @@ def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
 
 
 _LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
+"""Steps of a recording by which a response may be late, beside those delays that a file names."""
 
 
 def _at(effect: Effect, values: Mapping[str, float]) -> Candidate:

@@ -21,6 +21,7 @@ _PART = 1e-3
 """Share of what a step promises that it has to gain."""
 
 _RIDGE = 1e-9
+"""Added to the squares of scores of length one: columns may be sums of each other."""
 
 Bounds: TypeAlias = tuple[float | None, float | None]
 Objective: TypeAlias = Callable[[Floats], tuple[float, Callable[[], Floats]]]
@@ -42,6 +43,10 @@ def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Floats:
         Where the search begins.
     bounds
         Of all arguments but the lapse.
+
+    Returns
+    -------
+    ndarray, shape (strength,)
     """
     all_ = [*bounds, (float(logit(LAPSE[0])), float(logit(LAPSE[1])))]
     low = np.array([-np.inf if pair[0] is None else pair[0] for pair in all_])
