@@ -97,6 +97,19 @@ def check_genomes(genes: ArrayLike, template: Parameters) -> None:
         )
 
 
+_SETTLED_DECIMALS = 9
+"""Of genes that go from a fit into a search: a millionth of any interval, and far beyond the last
+digits in which compiled code differs."""
+
+
+def settled(genes: ArrayLike) -> Floats:
+    """Return genes without the last digits, which are another processor's or compiler's choice.
+
+    A search makes much of little: two that begin a last digit apart end elsewhere.
+    """
+    return np.round(np.asarray(genes, dtype=np.float64), _SETTLED_DECIMALS)
+
+
 def to_genome(parameters: Parameters) -> Floats:
     """Return the genes in [0, 1] of a model and its effects, shape (gene,), cut off beyond."""
     low, high = genome_ranges(parameters)

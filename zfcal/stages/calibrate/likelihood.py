@@ -16,7 +16,13 @@ from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed
 from zfcal.errors import InputError
 from zfcal.model.effects import find_effect
-from zfcal.model.effects.genome import genome_names, genome_ranges, strengths_of, to_genome
+from zfcal.model.effects.genome import (
+    genome_names,
+    genome_ranges,
+    settled,
+    strengths_of,
+    to_genome,
+)
 from zfcal.model.extended import bounds_of, maximise, with_effect
 from zfcal.model.likelihood import IDENTIFIED, Fit, fit
 from zfcal.model.scene import Moves, Scene, make_scene, thin
@@ -44,13 +50,15 @@ class Estimate:
 
     @property
     def genes(self) -> Floats:
-        """The estimate as a population of one, shape (1, gene)."""
-        return to_genome(self.found.parameters)[None, :]
+        """The estimate as a population of one, shape (1, gene), see `settled`."""
+        return settled(to_genome(self.found.parameters))[None, :]
 
     @property
     def table(self) -> dict[str, JSON]:
         """The estimate as the table ``[result.likelihood]`` of a model file."""
-        values = _values(self.found.parameters)
+        low, high = genome_ranges(self.found.parameters)
+        found = (low + self.genes[0] * (high - low)).tolist()
+        values = dict(zip(genome_names(self.found.parameters), found, strict=True))
         return {
             "nats_per_step": self.found.nats_per_step,
             "n_steps": self.found.n_steps,
@@ -65,12 +73,6 @@ class Estimate:
                 for name, (low, high) in self.found.interval.items()
             },
         }
-
-
-def _values(parameters: Parameters) -> dict[str, float]:
-    low, high = genome_ranges(parameters)
-    values = low + to_genome(parameters) * (high - low)
-    return dict(zip(genome_names(parameters), values.tolist(), strict=True))
 
 
 def estimate(
@@ -145,7 +147,7 @@ def remembered(
         found = _with_speeds(faded, fit(faded, template, level=None))
     except InputError:
         return None
-    return to_genome(found.parameters) if math.isfinite(found.nats_per_step) else None
+    return settled(to_genome(found.parameters)) if math.isfinite(found.nats_per_step) else None
 
 
 def memory_span(end_s: int) -> tuple[int, int]:

@@ -36,6 +36,7 @@ from zfcal.diagnose.heldout import (
 from zfcal.diagnose.placebo import placebo_for
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
+from zfcal.model.effects.genome import settled
 from zfcal.model.simulate import Counts
 from zfcal.parameters import Parameters, to_genes
 from zfcal.stages.calibrate.result import result_table, score_table
@@ -166,7 +167,7 @@ class Extension:
                 n_workers=self.calibration.workers,
             ),
             control=control,
-            guests=to_genes(screen.fitted.parameters)[None, :],
+            guests=settled(to_genes(screen.fitted.parameters))[None, :],
             moves_effects=False,
             seeds=SeedSource(trial_seed=self.seed, window_end_s=int(self._span_s[1])),
         )
