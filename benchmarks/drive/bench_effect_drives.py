@@ -19,7 +19,7 @@ import dataclasses
 import json
 import sys
 import textwrap
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +34,14 @@ from zfcal.arena import Arena
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.models import write_model
+from zfcal.errors import DamagedError
 from zfcal.model.effects import find_effect
 from zfcal.parameters import natural
+from zfcal.report.gather import gather
+from zfcal.stages.events import say_nothing
+from zfcal.stages.trial_context import Task
+from zfcal.virtual.closed_loop import closed_loop
+from zfcal.virtual.trial import LOOP_SETTINGS, LoopOptions
 
 BUILD = ROOT / "build" / "effect-drives"
 HIDDEN = {
@@ -62,7 +68,7 @@ def run_one(kind: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
     folder.mkdir(parents=True, exist_ok=True)
     fish, trial = folder / "fish.toml", folder / "recorded" / "trial"
     _write_fish(fish, HIDDEN[kind])
-    _loop(folder / "recorded", seed, options.recorded, fish, "--swims", "fixed")
+    _loop(folder / "recorded", seed, options.recorded, fish, robot="fixed")
     named = _diagnosed(trial)
     starts = {"base": _estimated(folder / "base.toml", trial, None, options)}
     if named:
@@ -99,10 +105,12 @@ def _arena() -> Arena:
     return load_arena("two-rooms", Path())
 
 
-def _loop(folder: Path, seed: int, minutes: int, fish: Path, *words: str) -> Path:
-    about = ["--closed-loop", "--no-video", "--force", "--duration", f"{minutes}min"]
-    zfcal("demo", str(folder), *about, "--seed", str(seed), "--fish-model", str(fish), *words)
-    return folder / "trial"
+def _loop(folder: Path, seed: int, minutes: int, fish: Path, **how: Any) -> Path:
+    """Run what `zfcal demo --closed-loop --no-video` does, without its report."""
+    options = LoopOptions(
+        duration_s=60.0 * minutes, video=False, seed=seed, fish_model=fish, n_workers=1, **how
+    )
+    return closed_loop(folder, options, say_nothing, task=Task(force=True))
 
 
 def _effort(options: argparse.Namespace) -> list[str]:
@@ -129,12 +137,14 @@ def _driven(
     folder: Path, seed: int, fish: Path, start: Path, options: argparse.Namespace
 ) -> dict[str, Any]:
     """Return how alike a robot and the fish are that it swims among."""
-    words = ["--generations", str(options.generations), "--publish", "likelihood"]
-    trial = _loop(folder, seed, options.minutes, fish, "--model", str(start), *words)
-    text = (trial / "report" / "integration.json").read_text(encoding="utf-8")
-    robot = json.loads(text)["trials"][0]["robot_vs_fish"]
-    features: dict[str, Any] = robot["features"] if robot else {}
-    return features
+    settings = dataclasses.replace(LOOP_SETTINGS, generations=options.generations)
+    trial = _loop(folder, seed, options.minutes, fish, model=start, settings=settings)
+    view = gather(trial, _stop, alone=False)
+    return {name: dataclasses.asdict(mark) for name, mark in view.integration.robot.items()}
+
+
+def _stop(damaged: DamagedError) -> None:
+    raise damaged
 
 
 def measure_all(options: argparse.Namespace) -> dict[str, Any]:
@@ -145,7 +155,7 @@ def measure_all(options: argparse.Namespace) -> dict[str, Any]:
     found: dict[str, Any] = {"machine": machine(), "load_before": load(), "pairs": []}
     found |= {"minutes": options.minutes, "recorded": options.recorded}
     found |= {"generations": options.generations}
-    with ThreadPoolExecutor(options.workers) as pool:
+    with ProcessPoolExecutor(options.workers) as pool:
         for each in [pool.submit(run_one, *job, options) for job in jobs]:
             pair = each.result()
             found["pairs"].append(pair)

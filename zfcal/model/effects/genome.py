@@ -107,7 +107,7 @@ def settled(genes: ArrayLike) -> Floats:
 
     A search makes much of little: two that begin a last digit apart end elsewhere.
     """
-    return np.round(np.asarray(genes, dtype=np.float64), _SETTLED_DECIMALS)
+    return np.asarray(genes, dtype=np.float64).round(_SETTLED_DECIMALS)
 
 
 def to_genome(parameters: Parameters) -> Floats:
