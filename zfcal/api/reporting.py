@@ -10,7 +10,14 @@ from zfcal.api.trials import TrialPath, heard_by, roots_of, task_of
 from zfcal.api.values import Names, PathLike, flag, formats, one_of, place, taken, width_mm
 from zfcal.errors import DamagedError, InputError, ZfcalError
 from zfcal.report.options import AS_USUAL, FILMS, Printing, ReportOptions
-from zfcal.report.page import PAGE, report_files, report_left_out, report_reason, write_report
+from zfcal.report.page import (
+    PAGE,
+    report_files,
+    report_left_out,
+    report_options,
+    report_reason,
+    write_report,
+)
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
 from zfcal.stages.stage import settled
 from zfcal.stages.trial_context import Task, at_work
@@ -34,6 +41,8 @@ def write_page(
     how: ReportOptions = AS_USUAL,
 ) -> Path:
     """Write the report of trials, unless it is up to date; of several, then that of each.
+
+    The page of each of several trials keeps the options that it was made with.
 
     Parameters
     ----------
@@ -68,9 +77,10 @@ def write_page(
     failed = None
     for root in roots:
         if out is not None and out.resolve() == (root / "report").resolve():
-            continue  # There is the page of the set, as asked.
+            continue  # The page of the set is there.
         try:
-            _write_one([root], None, tell, task=task, how=how)
+            # Each page keeps its own options: it may have a film, or figures for a journal.
+            _write_one([root], None, tell, task=task, how=report_options(root) or how)
         except ZfcalError as error:
             failed = failed or error
     if failed is not None:
@@ -125,7 +135,7 @@ def report(
 
     The page holds its figures; they lie beside it as files too. Over several trials it shows mean
     and standard deviation per window, and a table whose rows lead to the page of each trial, which
-    is written as well. What is up to date stays.
+    is written where it is missing or its inputs have changed. What is up to date stays.
 
     Parameters
     ----------
@@ -133,7 +143,8 @@ def report(
         One trial or several: directories, or their tables. One that is named twice counts once.
     out
         Folder that it goes into; None for ``TRIAL/report``, or of several trials ``report``. The
-        pages of several trials are in ``TRIAL/report`` all the same.
+        page of each of several trials is in ``TRIAL/report`` all the same. It keeps the format,
+        width, film and published scores that it was made with; a new one has those given here.
     format
         Of the figures: ``png``, ``svg`` and ``pdf``, one or several; by default ``png``.
     width

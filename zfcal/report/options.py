@@ -84,3 +84,16 @@ class ReportOptions:
 
 
 AS_USUAL = ReportOptions()
+
+
+def report_options_of(said: Mapping[str, Any]) -> ReportOptions:
+    """Return the options that `ReportOptions.as_lineage` gave.
+
+    >>> report_options_of({"published": True, "format": ["pdf"]}).printing.formats
+    ('pdf',)
+    """
+    return ReportOptions(
+        published=said.get("published", False),
+        printing=printing_of(said),
+        film=said.get("film"),
+    )

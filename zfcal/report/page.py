@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from zfcal.artifacts.atomic import storage_error, write_bytes_whole, write_text_whole, write_whole
 from zfcal.artifacts.freshness import hash_inputs, stale_reason
-from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.lineage import JSON, Lineage, read_lineage
 from zfcal.artifacts.reading.contents import sha256_of
 from zfcal.artifacts.validation import check, read_json
 from zfcal.errors import DamagedError, InputError
@@ -26,7 +26,14 @@ from zfcal.report.gather import Damage, gather, input_files
 from zfcal.report.integration import SCHEMA, integration_document
 from zfcal.report.intervals import intervals_csv
 from zfcal.report.labels import labels_of
-from zfcal.report.options import AS_USUAL, FILMS, FORMATS, Printing, ReportOptions
+from zfcal.report.options import (
+    AS_USUAL,
+    FILMS,
+    FORMATS,
+    Printing,
+    ReportOptions,
+    report_options_of,
+)
 from zfcal.report.pictures import pictures_of_trial, pictures_of_trials
 from zfcal.report.render import render_page
 from zfcal.report.seen import Seen
@@ -147,6 +154,14 @@ def report_reason(
         if sha256_of(path) != digest:
             return f"{name} was changed"
     return None
+
+
+def report_options(root: Path) -> ReportOptions | None:
+    """Return how the report of a trial was made; None if there is none, or it is damaged."""
+    try:
+        return report_options_of(read_lineage(root / _FOLDER / _NUMBERS).options)
+    except (DamagedError, InputError):
+        return None
 
 
 def report_files(roots: Sequence[Path], out_dir: Path | None = None) -> list[Path]:
