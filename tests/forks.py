@@ -108,14 +108,16 @@ def load():
     would have each page of it copied.
     """
     from brief import LESS
-    from warming import count, estimate, tracker
+    from warming import tracker
+
+    from zfcal.virtual import compiling
 
     for name in STAGES:
         import_module(name)
     settings = import_module("zfcal.calibrate.task").Settings
     settings.__init__.__kwdefaults__.update(LESS)
-    count(3)
-    estimate()
+    compiling.search()
+    compiling.estimate()
     tracker()
     gc.collect()
     gc.freeze()

@@ -30,7 +30,7 @@ def simulator() -> None:
     """Simulate a few steps of a few fish, recorded and counted."""
     from zfcal.model.simulate import simulate_tracks
 
-    tank, fish = _tank_and_fish()
+    tank, fish = tank_and_fish()
     # Recorded first: a demonstration begins with it.
     simulate_tracks(fish, tank, n_agents=3, n_steps=2, seed=1)
     _count(3)
@@ -40,7 +40,7 @@ def crowd() -> None:
     """Simulate a few steps of more fish than are looked at one by one."""
     from zfcal.model.simulate import MOST_IN_FULL, simulate_tracks
 
-    tank, fish = _tank_and_fish()
+    tank, fish = tank_and_fish()
     simulate_tracks(fish, tank, n_agents=MOST_IN_FULL + 1, n_steps=2, seed=1)
     _count(MOST_IN_FULL + 1)
 
@@ -54,7 +54,7 @@ def _count(n_agents: int) -> None:
     from zfcal.model.packing import pack
     from zfcal.model.simulate import simulate_counts
 
-    tank, fish = _tank_and_fish()
+    tank, fish = tank_and_fish()
     simulate_counts(
         pack([fish], tank),
         tank,
@@ -79,11 +79,11 @@ def estimate() -> None:
     from zfcal.model.likelihood import fit
     from zfcal.model.scene import make_scene
 
-    tank, fish = _tank_and_fish()
+    tank, fish = tank_and_fish()
     # Not simulated: that is another part.
     steps_m = np.random.default_rng(1).normal(0.0, 0.004, (200, 3, 2))
     xy_m = np.array([0.24, 0.77]) + np.clip(np.cumsum(steps_m, axis=0), -0.05, 0.05)
-    fit(make_scene(_samples(xy_m), tank), fish)
+    fit(make_scene(samples_of(xy_m), tank), fish)
 
 
 def robot() -> None:
@@ -92,7 +92,7 @@ def robot() -> None:
     from zfcal.model.packing import pack
     from zfcal.model.robot_agent import Among
 
-    tank, fish = _tank_and_fish()
+    tank, fish = tank_and_fish()
     among = Among(tank, np.zeros(1), dt_s=_DT_S)
     among.measure(0.0, np.array([[0.2, 0.77, 0.0]]))
     among.place(0.24, 0.77, 0.0)
@@ -177,13 +177,14 @@ def _start(parts: tuple[str, ...], *, stderr: int) -> subprocess.Popen[str]:
     )
 
 
-def _tank_and_fish() -> tuple[Arena, Parameters]:
+def tank_and_fish() -> tuple[Arena, Parameters]:
+    """Return the default arena, and natural fish for it."""
     tank = load_arena("two-rooms", Path())
     zones = tuple((zone.name, zone.follows_walls) for zone in tank.zones)
     return tank, natural(zones, dt_s=_DT_S)
 
 
-def _samples(xy_m: Floats) -> Samples:
+def samples_of(xy_m: Floats) -> Samples:
     """Return positions at each step, shape (step, fish, 2), as samples of a recording."""
     return Samples(
         dt_s=_DT_S,
