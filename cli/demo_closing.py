@@ -52,7 +52,7 @@ def closing(folder: Path, trial: Path, *, is_loop: bool) -> list[str]:
     commands = [
         (f"zfcal check {where}", "every file, and this computer"),
         (f"zfcal drive {where} --replay", "the log of the drive, worked out again"),
-        (f"zfcal diagnose {where} --quick", "what the model lacks; three minutes tell little"),
+        (f"zfcal diagnose {where} --quick", "what the model lacks; three minutes show little"),
     ]
     if not is_loop:
         loop = "zfcal demo loop --closed-loop --no-video --duration 5min"

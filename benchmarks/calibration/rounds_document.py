@@ -314,8 +314,8 @@ def _times(found: dict[str, Any]) -> list[str]:
         "## The estimate takes\n",
         _prose(
             f"""The load of the {found["machine"].split(", ")[1]} was {times["load"][0]:.1f} then:
-            with a load beyond the cores the wall clock tells of others, the processor time does
-            not."""
+            with a load beyond the cores the wall clock includes the work of others, the
+            processor time does not."""
         ),
         table(
             ("a window of 120 s, four fish at 5 Hz", "wall clock (s)", "processor (s)"),

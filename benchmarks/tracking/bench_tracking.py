@@ -288,9 +288,10 @@ def markdown(found: dict[str, Any]) -> str:
         tuned; matched within 20 mm. Real: against the tracks of idtracker.ai and Tracktor, which
         are not truth; matched within 25 px. *Exact*: frames with exactly as many animals as
         there are. *Of whole frames*: precision in the frames in which the truth knows everybody.
-        The reference of the eight zebrafish lacks {_lacking(found)}; who is told there counts as
-        nobody. The number of animals is told to the tracker. What counts are `tracks/`, written as
-        each minute ends; *live* are the same measures of `poses/`, written frame by frame."""
+        The reference of the eight zebrafish lacks {_lacking(found)}; tracks of
+        animals that it lacks are false positives. The tracker is given the number of animals.
+        What counts are `tracks/`, written as each minute ends; *live* are the same measures of
+        `poses/`, written frame by frame."""
     head = ("film", "method", "MOTA", "live", "IDF1", "live", "switches per fish-minute",
             "precision", "of whole frames", "recall", "median error", "95 % error", "exact",
             "times real time")  # fmt: skip
@@ -340,8 +341,8 @@ def _lacking(found: dict[str, Any]) -> str:
 
 _SCORES = """Scores of the tracks and of the truth against six other runs of the same model: the
     largest difference, and in brackets half the range that holds 95 % of the scores of those runs
-    among themselves, the ceiling's noise. The robot is the track nearest to its true place, as the
-    camera below would tell."""
+    among themselves, the ceiling's noise. The robot is the track nearest to its true place, as by
+the camera below."""
 
 
 def ratios(found: dict[str, Any]) -> dict[str, Ratio]:

@@ -228,7 +228,7 @@ def _robot(robot: dict[str, Any]) -> list[str]:
     said = f"""The same {robot["frames"]} images as a recording, tracked with both cameras. The
         robot swims by the fish's model, and so turns by more than a quarter between two images now
         and then. *Front wrong*: headings more than a right angle from the truth."""
-    head = ("robot seen", "heading told", "front wrong", "heading, median error (degrees)",
+    head = ("robot seen", "heading known", "front wrong", "heading, median error (degrees)",
             "position, 95 % error (mm)", "ids of the four fish")  # fmt: skip
     names = ("seen", "heading_told", "front_wrong", "heading_median_deg", "position_95_mm")
     rows = [[*(robot[name] for name in names), robot["fish_ids"]]]

@@ -21,7 +21,7 @@ def measures(
 ) -> dict[str, Any]:
     """Return how tracks compare with the truth.
 
-    Where the truth lacks an animal, who is told there counts as nobody: ``precision_of_whole`` is
+    A track of an animal that the truth lacks is a false positive: ``precision_of_whole`` is
     that of the frames in which the truth knows everybody.
 
     Parameters

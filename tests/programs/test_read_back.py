@@ -164,7 +164,7 @@ def test_nwb_of_sleap_io_is_read_without_it(files):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("crowd", "frame 3 has 2 instances and no track in the file tells who is who"),
+        ("crowd", "frame 3 has 2 instances and no track in the file shows which animal is which"),
         ("twice", "track 'fish_0' is twice in frame 2, expected once"),
         ("videos", "expected instances in frames of one video, got those of 2"),
         ("empty", "expected instances in frames of one video, got those of 0"),

@@ -158,7 +158,7 @@ def test_hdf5_of_deeplabcut_runs_no_pickle(golden, refused, tmp_path):
 
     message = refused(path, "deeplabcut", m_per_px=PX, keypoint="tail")
 
-    assert "it asks for os.system" in message
+    assert "it refers to os.system" in message
     assert not marker.exists()
 
 

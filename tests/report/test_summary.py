@@ -281,7 +281,7 @@ def test_no_score_is_said_to_reach_more_than_its_ceiling(make_view, course):
     said = answer_to(view, "Does the model")
 
     assert said.figure == ("100 %", "of what a perfect model would score")
-    assert "S cannot tell the two apart" in said.answer
+    assert "S cannot distinguish the two" in said.answer
     assert "112 %" not in said.answer
     assert "113 %" not in said.answer
 

@@ -88,7 +88,7 @@ def analyse(
     Parameters
     ----------
     trial
-        Its directory, or its tables. Of a file in it only the windows that it bears on are made.
+        Its directory, or its tables. Of a file in it only the windows that depend on it are made.
     control
         Robot-free trials whose fish, pooled, are the control; none for the trial's own fish.
     scoring
@@ -96,12 +96,13 @@ def analyse(
     features
         Statistics to count beside D, W, O, T and V, such as ``"residence,curvature"``.
     dry_run
-        Write nothing; `tell` hears what would be made and why.
+        Write nothing; `tell` gets what would be made, and why.
     force
         Make what is up to date again.
     tell
-        Hears of every file, of what is left out, and of progress (`zfcal.stages.events`). By
-        default what is left out is a warning, and the rest is logged as ``zfcal``.
+        Function that gets an event for every file, for what is left out, and for progress
+        (`zfcal.stages.events`). By default what is left out is a warning, and the rest is logged
+        as ``zfcal``.
 
     Returns
     -------
@@ -112,13 +113,13 @@ def analyse(
     Raises
     ------
     OptionError
-        An option has another form, or could not take effect.
+        An option has a wrong type or value, or would have no effect.
     InputError
         There is no trial, its settings are wrong, or no scoring or feature has that name.
     StorageError
         The disk is full, or a place cannot be written.
     LockedError
-        The same is at work on the trial.
+        The same command is running on the trial.
 
     Examples
     --------

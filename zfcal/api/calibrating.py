@@ -111,7 +111,7 @@ def calibrate(
     force: bool = False,
     tell: Tell | None = None,
 ) -> tables.TrialTables:
-    """Find the model that comes nearest to each window of a trial: ``zfcal calibrate``.
+    """Find the model that fits each window of a trial best: ``zfcal calibrate``.
 
     Writes ``models/E.toml``, ``models/E.parquet``, ``scores/E-model.parquet`` and
     ``scores/E-rules.parquet`` for each window that `zfcal.analyse` has measured, where they are
@@ -120,7 +120,7 @@ def calibrate(
     Parameters
     ----------
     trial
-        Its directory, or its tables. Of a file in it only the windows that it bears on are made.
+        Its directory, or its tables. Of a file in it only the windows that depend on it are made.
     generations
         Of a round; 15 unless there is a budget.
     budget
@@ -141,7 +141,7 @@ def calibrate(
         The paper's way: what is None of optimiser, seed_likelihood, publish, confirm, diversity
         and renewal is as the paper had it.
     confirm
-        So many of the best, usually 10, are simulated anew to choose one.
+        Number of the best, usually 10, that are simulated anew to choose one.
     diversity
         Distances within parents and offspring (``merged``, usual), or to the ``population``.
     renewal
@@ -153,7 +153,7 @@ def calibrate(
     seed
         Of the random numbers; None for the trial's.
     workers
-        Threads; None for one a core. The numbers do not depend on it.
+        Threads; None for one per core. The numbers do not depend on it.
     cluster
         Address of a scheduler where it is simulated, such as ``tcp://host:8786``.
     window
@@ -165,12 +165,13 @@ def calibrate(
     features
         The statistics whose similarity counts.
     dry_run
-        Write nothing; `tell` hears what would be made and why.
+        Write nothing; `tell` gets what would be made, and why.
     force
         Make what is up to date again.
     tell
-        Hears of every file, of what is left out, and of progress (`zfcal.stages.events`). By
-        default what is left out is a warning, and the rest is logged as ``zfcal``.
+        Function that gets an event for every file, for what is left out, and for progress
+        (`zfcal.stages.events`). By default what is left out is a warning, and the rest is logged
+        as ``zfcal``.
 
     Returns
     -------
@@ -181,13 +182,13 @@ def calibrate(
     Raises
     ------
     OptionError
-        An option has another form, two contradict each other, or one could not take effect.
+        An option has a wrong type or value, two contradict each other, or one has no effect.
     InputError
         There is no trial, its settings, its arena or its model is wrong, or no cluster answers.
     StorageError
         The disk is full, or a place cannot be written.
     LockedError
-        The same is at work on the trial.
+        The same command is running on the trial.
 
     Examples
     --------

@@ -153,12 +153,13 @@ def compare(
     format
         Of the picture; PNG by default.
     dry_run
-        Write nothing; `tell` hears whether the files would be made, and why.
+        Write nothing; `tell` gets whether the files would be made, and why.
     force
         Make the files again, even if they are up to date.
     tell
-        Hears of every file, and of what is left out (`zfcal.stages.events`). By default what is
-        left out, and what to beware of, are warnings, and the rest is logged as ``zfcal``.
+        Function that gets an event for every file, and for what is left out
+        (`zfcal.stages.events`). By default what is left out, and what needs care, are warnings,
+        and the rest is logged as ``zfcal``.
 
     Returns
     -------
@@ -174,13 +175,13 @@ def compare(
     Raises
     ------
     OptionError
-        An option has another form, or is about files where none is written.
+        An option has a wrong type or value, or is about files where none is written.
     InputError
         A set is empty, one is no trial, or one is in both sets.
     StorageError
         The disk is full, or the place cannot be written.
     LockedError
-        The same is at work on the first trial.
+        The same command is running on the first trial.
 
     Examples
     --------

@@ -184,7 +184,7 @@ def diagnose(
     model
         Another model than that of the newest round.
     null_replicates
-        Trials simulated without any effect, to learn what chance does: 39, unless ``quick``.
+        Trials simulated without any effect, to measure what chance does: 39, unless ``quick``.
     quick
         Take that from theory instead: seconds, less sure.
     noise_mm
@@ -194,7 +194,7 @@ def diagnose(
     seed
         Of the random numbers; None for the trial's.
     workers
-        Threads; None for one a core. The numbers do not depend on it.
+        Threads; None for one per core. The numbers do not depend on it.
     out
         Folder that the findings go into; None for the usual one.
     format
@@ -203,31 +203,31 @@ def diagnose(
         Of the pictures on paper: ``single`` (85 mm), ``double`` (174 mm) or millimetres. None for
         the screen.
     dry_run
-        Write nothing; `tell` hears what would be made and why.
+        Write nothing; `tell` gets what would be made, and why.
     force
         Make what is up to date again.
     tell
-        Hears of every file, of what is left out, and of progress (`zfcal.stages.events`). By
-        default what is left out, and a control that fired, are warnings, and the rest, such as
-        the verdict, is logged as ``zfcal``.
+        Function that gets an event for every file, for what is left out, and for progress
+        (`zfcal.stages.events`). By default what is left out, and a control that fired, are
+        warnings. The rest, such as the verdict, is logged as ``zfcal``.
 
     Returns
     -------
     TrialTables
-        Of the trial. ``findings()`` are those that were asked for: a row per effect and parameter,
+        Of the trial. ``findings()`` are those of this call: a row per effect and parameter,
         none where no effect is missing; ``attrs["verdict"]`` is the verdict. None in a dry run that
-        would make them: those that are there answer to something else.
+        would make them: those that are there have other inputs or options.
 
     Raises
     ------
     OptionError
-        An option has another form, or could not take effect.
+        An option has a wrong type or value, or would have no effect.
     InputError
         There is no trial or no model, or they do not fit each other.
     StorageError
         The disk is full, or a place cannot be written.
     LockedError
-        The same is at work on the trial.
+        The same command is running on the trial.
 
     Notes
     -----

@@ -84,7 +84,7 @@ def extend(
 ) -> Path | None:
     """Add the missing effect to the model, and show how the gap shrinks: ``zfcal extend``.
 
-    Learns from every other minute and judges on the others. Writes ``models/extended.toml``,
+    Fits on every other minute and judges on the others. Writes ``models/extended.toml``,
     and before and after into the findings and their page. Findings that are missing or stale
     are made first.
 
@@ -105,17 +105,17 @@ def extend(
     seed
         Of the random numbers; None for the trial's.
     workers
-        Threads; None for one a core. The numbers do not depend on it.
+        Threads; None for one per core. The numbers do not depend on it.
     out
         Where the model goes; None for ``models/extended.toml``, or the next number after it.
     dry_run
-        Write nothing; `tell` hears what would be made and why.
+        Write nothing; `tell` gets what would be made, and why.
     force
         Make what is up to date again.
     tell
-        Hears of every file, of what is left out, and of progress (`zfcal.stages.events`). By
-        default what is left out, and a control that fired, are warnings, and the rest is logged
-        as ``zfcal``.
+        Function that gets an event for every file, for what is left out, and for progress
+        (`zfcal.stages.events`). By default what is left out, and a control that fired, are
+        warnings. The rest is logged as ``zfcal``.
 
     Returns
     -------
@@ -126,13 +126,13 @@ def extend(
     Raises
     ------
     OptionError
-        An option has another form, or two contradict each other.
+        An option has a wrong type or value, or two contradict each other.
     InputError
         There is no trial, its tracks are too few, or an effect is unknown or there already.
     StorageError
         The disk is full, or a place cannot be written.
     LockedError
-        The same is at work on the trial.
+        The same command is running on the trial.
 
     Examples
     --------

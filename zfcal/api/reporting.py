@@ -156,12 +156,13 @@ def report(
     published
         Draw the published scores, which are of other fish, beside these.
     dry_run
-        Write nothing; `tell` hears whether it would be made, and why.
+        Write nothing; `tell` gets whether it would be made, and why.
     force
         Make it again, even if it is up to date.
     tell
-        Hears of every file, and of what is left out (`zfcal.stages.events`). By default what is
-        left out is a warning, and the rest is logged as ``zfcal``.
+        Function that gets an event for every file, and for what is left out
+        (`zfcal.stages.events`). By default what is left out is a warning, and the rest is logged
+        as ``zfcal``.
 
     Returns
     -------
@@ -171,13 +172,13 @@ def report(
     Raises
     ------
     OptionError
-        An option has another form.
+        An option has a wrong type or value.
     InputError
         There is none, one is no trial, or their arenas have other zones.
     StorageError
         The disk is full, or the place cannot be written.
     LockedError
-        The same is at work on the first trial.
+        The same command is running on the first trial.
 
     Examples
     --------

@@ -265,12 +265,13 @@ def simulate(
     photograph
         Of the empty tank from above, instead of a drawn one.
     dry_run
-        Write nothing; `tell` hears what would be made and why.
+        Write nothing; `tell` gets what would be made, and why.
     force
         Make what is up to date again.
     tell
-        Hears of every file, of what is left out, and of progress (`zfcal.stages.events`). By
-        default what is left out is a warning, and the rest is logged as ``zfcal``.
+        Function that gets an event for every file, for what is left out, and for progress
+        (`zfcal.stages.events`). By default what is left out is a warning, and the rest is logged
+        as ``zfcal``.
 
     Returns
     -------
@@ -281,13 +282,13 @@ def simulate(
     Raises
     ------
     OptionError
-        An option has another form, two contradict each other, or one could not take effect.
+        An option has a wrong type or value, two contradict each other, or one has no effect.
     InputError
         The model is not one for the trial's arena and step, or the trial holds other tracks.
     StorageError
         The disk is full, or a place cannot be written.
     LockedError
-        The same is at work on the trial.
+        The same command is running on the trial.
 
     Examples
     --------

@@ -333,7 +333,7 @@ def _check(overhead: Spots, below: Spots) -> None:
     if not extent_m >= _LEAST_EXTENT_M:
         raise InputError(
             f"The robot moved over {extent_m * _MM:.0f} mm, {_LEAST_EXTENT_M * _MM:.0f} mm are "
-            "needed to tell a turn.",
+            "needed to measure a turn.",
             hint="Record a minute in which the robot drives all over the tank.",
         )
 

@@ -304,8 +304,8 @@ def _notes(
     if fitted is not None and not fitted.focal_sd_px < 0.1 * fitted.lens.matrix[0][0]:
         notes.append(
             f"The focal length is known to {fitted.focal_sd_px:.0f} px of "
-            f"{fitted.lens.matrix[0][0]:.0f} only: a plane seen straight on does not tell it from "
-            "the distance. Positions on the plane do not suffer."
+            f"{fitted.lens.matrix[0][0]:.0f} only: a plane seen straight on does not separate "
+            "it from the distance. Positions on the plane do not suffer."
         )
     return tuple(notes)
 

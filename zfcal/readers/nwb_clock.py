@@ -211,5 +211,5 @@ def _left_out(clocks: Sequence[Clock], of: Sequence[Ints | None]) -> tuple[str, 
     if empty:
         notes.append(f"Without samples: {empty}.")
     if rateless:
-        notes.append(f"The stated rate does not tell the frames, passed over: {rateless}.")
+        notes.append(f"The stated rate does not give the frames, passed over: {rateless}.")
     return tuple(notes)

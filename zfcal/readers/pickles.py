@@ -74,7 +74,7 @@ class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         wish = _ADMITTED.get((module, name))
         if wish is None:
-            raise _RefusedError(f"it asks for {module}.{name}")
+            raise _RefusedError(f"it refers to {module}.{name}")
         return _Wish(wish, ())
 
 
@@ -187,13 +187,13 @@ def _build_scalar(wish: _Wish, done: dict[int, tuple[Any, Any]]) -> Any:
 def _build_bytes(wish: _Wish, done: dict[int, tuple[Any, Any]]) -> bytes:
     text, encoding = _plain(wish.arguments, done)
     if encoding != "latin1" or not isinstance(text, str):
-        raise _RefusedError(f"it asks for the encoding {encoding!r}")
+        raise _RefusedError(f"it has the encoding {encoding!r}")
     return text.encode("latin1")
 
 
 def _build_nothing(wish: _Wish, done: dict[int, tuple[Any, Any]]) -> bytes:
     if _plain(wish.arguments, done):
-        raise _RefusedError("it asks for bytes made of something")
+        raise _RefusedError("it builds bytes of something")
     return b""
 
 

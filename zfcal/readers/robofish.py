@@ -279,9 +279,9 @@ def _axes_note(world_cm: tuple[float, float], options: ImportOptions) -> str:
     """Say what was taken for up, since the file does not tell, and how to have it otherwise."""
     x, y = (size / 2 for size in world_cm)
     if options.flip_y:
-        return "The file does not tell which way y counts: it was turned, as --flip-y says."
+        return "The file does not state which way y counts: it was turned, as --flip-y says."
     return (
-        "The file does not tell which way y counts: upwards is taken. If it counts down (as "
+        "The file does not state which way y counts: upwards is assumed. If it counts down (as "
         f"BioTracker writes it), turn it with --flip-y and --origin 0,0 (centre) or {-x:g},{y:g} "
         f"(corner); --origin {-x:g},{-y:g} puts the lower left corner of this world at (0, 0)."
     )

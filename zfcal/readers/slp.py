@@ -113,8 +113,8 @@ def _chosen(
         twice = next((track for k, track in enumerate(tracks) if track in tracks[:k]), ...)
         if twice is None:
             raise InputError(
-                f"{path}: frame {number} has {len(some)} instances and no track in the file tells "
-                "who is who; expected a track for each animal.",
+                f"{path}: frame {number} has {len(some)} instances and no track in the file shows "
+                "which animal is which; expected a track for each animal.",
                 hint="Let SLEAP follow the animals first.",
             )
         if twice is not ...:

@@ -197,7 +197,7 @@ def _unit(individual: _Individual, options: ImportOptions) -> tuple[str, float]:
     cm_per_px = individual.columns.get("cm_per_pixel")
     if cm_per_px is None or not cm_per_px.size or not cm_per_px[0] > 0:
         raise InputError(
-            f"{individual.path}: positions are in cm and the file does not tell its cm_per_pixel, "
+            f"{individual.path}: positions are in cm and the file does not state its cm_per_pixel, "
             f"so a scale of {options.m_per_px:.6g} m per pixel cannot take effect.",
             hint="Leave --mm-per-px out, or set cm_per_pixel in TRex and export again.",
         )

@@ -53,7 +53,7 @@ def distance_statement(view: TrialView) -> Statement | None:
     if beyond:
         parts.append(
             f"Farther apart than {edge_m:.3g} m, where the last bin of D begins, are "
-            f"{_listed(far)}: D and S cannot tell these from each other."
+            f"{_listed(far)}: D and S cannot distinguish these."
         )
     parts.append(_advice(view, fish) if beyond else "")
     return Statement(

@@ -13,7 +13,7 @@ _HEAD = """\
 What fish may do beyond the base model. Each effect can stand in a model file, with its parameters:
 
 {example}
-`zfcal diagnose` asks a recording for each of them, `zfcal extend` adds the one that is missing,
+`zfcal diagnose` tests a recording for each of them, `zfcal extend` adds the one that is missing,
 and `zfcal simulate` and `calibrate` swim by it. The parameter in bold is the strength: at 0 the
 effect does nothing. Where it may be negative the second sentence holds. A parameter that the model
 file leaves out has its default.

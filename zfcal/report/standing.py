@@ -60,5 +60,5 @@ def sentence_of(mark: Mark) -> str:
     if is_above(mark):
         return "That is above the range of a perfect model."
     if mark.against_ceiling > 1:
-        return "That is no less than a perfect model scores: S cannot tell the two apart."
+        return "That is no less than a perfect model scores: S cannot distinguish the two."
     return f"It reaches {share_of(mark)} of its ceiling."

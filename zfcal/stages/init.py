@@ -184,11 +184,11 @@ def _check_alone(new: NewTrial, name: str, key: str) -> None:
     option = f"--{key.replace('_', '-')}"
     if new.arena not in {None, name}:
         raise InputError(
-            f"{option} makes an arena {name!r}, --arena asks for {new.arena!r}.",
+            f"{option} makes an arena {name!r}, --arena names {new.arena!r}.",
             hint=f"Give one of the two; {option} cannot resize another arena.",
         )
     if new.radius_m is not None and new.side_m is not None:
-        raise InputError("--radius-m and --side-m ask for two tanks: give one of them.")
+        raise InputError("--radius-m and --side-m describe two tanks: give one of them.")
 
 
 def _write_model(trial: Trial, arena: Arena, model: Parameters | None, tell: Tell) -> None:

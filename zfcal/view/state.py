@@ -27,7 +27,7 @@ _VERDICTS = {
     "tie": "An effect is missing; several explain it as well.",
     "unexplained": "Model and fish differ, and no known effect explains it.",
     "no-effect": "No effect is missing that this recording could show.",
-    "untestable": "The recording is too short to tell.",
+    "untestable": "The recording is too short to show an effect.",
 }
 
 

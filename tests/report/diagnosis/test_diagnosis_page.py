@@ -124,7 +124,8 @@ def test_a_tie_names_all_that_it_may_be(make_sheet):
     effect = replace(sheet.findings.effects[0], ties=("group-cohesion",))
     findings = replace(sheet.findings, verdict=Verdict.TIE, effects=(effect,))
     assert verdict_sentence(findings) == (
-        "The model lacks alignment or group-cohesion: this recording cannot tell them apart"
+        "The model lacks alignment or group-cohesion: "
+        "they cannot be distinguished in this recording"
     )
     assert "cannot be distinguished from group-cohesion" in statements(findings)[0].answer
 
@@ -135,12 +136,13 @@ def test_a_tie_names_all_that_it_may_be(make_sheet):
         (
             [("b",), (), ("e", "f")],
             (
-                "either a or b, which this recording cannot tell apart, c and either d or e or f, "
-                "which this recording cannot tell apart"
+                "either a or b, which cannot be distinguished in this recording, "
+                "c and either d or e or f, "
+                "which cannot be distinguished in this recording"
             ),
         ),
-        ([("b",), ()], "either a or b, which this recording cannot tell apart, and c"),
-        ([(), ("d",)], "a and either c or d, which this recording cannot tell apart"),
+        ([("b",), ()], "either a or b, which cannot be distinguished in this recording, and c"),
+        ([(), ("d",)], "a and either c or d, which cannot be distinguished in this recording"),
     ],
 )
 def test_a_tie_does_not_hide_the_other_effects(make_sheet, ties, says):
@@ -178,8 +180,8 @@ SHARP, NOISY = {"noise_m": 1e-5}, {"noise_m": 5e-4}
         (1e-3, {"replicates": 0.0}, SHARP, "nothing is left"),
         (9e-4, {"replicates": 0.0}, SHARP, "its fitted size is then that of our form"),
         (0.2, QUICK, NOISY, "without --quick"),
-        (1e-5, QUICK, {}, "A quick look cannot tell"),
-        (1e-5, {}, NOISY, "A quick look cannot tell"),
+        (1e-5, QUICK, {}, "A quick look cannot show"),
+        (1e-5, {}, NOISY, "A quick look cannot show"),
     ],
 )
 def test_whether_the_model_with_the_effect_still_fails(make_sheet, p, null, noise, says):

@@ -77,9 +77,9 @@ def _with_ties(effect: EffectFound) -> str:
 
 def _lacking(effects: Sequence[EffectFound]) -> str:
     if len(effects) == 1 and effects[0].ties:
-        return f"{_with_ties(effects[0])}: this recording cannot tell them apart"
+        return f"{_with_ties(effects[0])}: they cannot be distinguished in this recording"
     parts = [
-        f"either {_with_ties(effect)}, which this recording cannot tell apart,"
+        f"either {_with_ties(effect)}, which cannot be distinguished in this recording,"
         if effect.ties
         else effect.name
         for effect in effects
@@ -102,8 +102,8 @@ def _of_controls(findings: Findings) -> Iterator[Statement]:
     if says:
         yield Statement(
             question="Warning",
-            answer=f"{says} A control asks for something that no tank has. Where the answer is "
-            "yes, the tracks, the noise that is assumed or the model are not what they seem.",
+            answer=f"{says} A control tests for something that no tank has. If it is found, the "
+            "tracks, the assumed noise or the model are wrong.",
             figure=("Do not trust this page", "a negative control fires"),
             warns=True,
         )
@@ -146,7 +146,7 @@ def _rest(findings: Findings, p: float, *, several: bool) -> str:
     it = "them" if several else "it"
     if not _has_null(findings):
         return (
-            f"A quick look cannot tell whether the model with {it} is right, unless positions "
+            f"A quick look cannot show whether the model with {it} is right, unless positions "
             "are known to be sharp. Run zfcal diagnose without --quick."
         )
     if p >= UNLIKE:

@@ -71,7 +71,7 @@ def tracks_picture(seen: Seen) -> Picture | None:
             Entry(label=f"{KINDS[kind]}, path", colour=colours[kind], mark="line")
             for kind in seen.visits
         ),
-        note="Paths break where an animal was not seen. The maps tell how many times as long an "
+        note="Paths break where an animal was not seen. The maps show how many times as long an "
         "animal was in a place as if it were everywhere alike.",
     )
 

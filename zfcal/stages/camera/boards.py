@@ -94,7 +94,7 @@ def _from_boards(place: Place, given: BoardImages, tell: Tell) -> Recipe:
     lies = given.lies
     if place.root is not None and lies is None:
         raise InputError(
-            "Board images tell the lens, not where the camera stands.",
+            "Board images show the lens, not where the camera stands.",
             hint="Write the lens with -o LENS.toml, then: zfcal camera points MARKS.csv --lens "
             "LENS.toml --trial TRIAL --camera ... (or say how a board lies: --lies).",
         )

@@ -132,7 +132,7 @@ def notes_of(source: str, learnt: Mapping[str, JSON]) -> Iterator[Note]:
         )
     if learnt["polarity_from"] == _DEFAULT:
         yield Note(
-            text=f"{source}: the first images do not tell whether animals are darker or lighter "
+            text=f"{source}: the first images do not show whether animals are darker or lighter "
             "than the tank. Say it with --dark, --light or --either.",
             warning=True,
         )
