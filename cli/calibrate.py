@@ -31,7 +31,7 @@ from .streams import STDIN, each_trial, trials_together
 @makes_artifacts
 @speaks
 def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
-    r"""Find the model that comes nearest to each window of a trial.
+    r"""Find the model that fits each window of a trial best.
 
     Writes models/E.toml, models/E.parquet, scores/E-model.parquet and
     scores/E-rules.parquet for each window that `zfcal analyse` has measured.

@@ -53,7 +53,7 @@ _board_options = adds(
 @click.option(
     "--model",
     type=click.Choice(["pinhole", "fisheye"]),
-    help="Of the lens; default: what foretells images left out best.",
+    help="Of the lens; default: the one that predicts left-out images best.",
 )
 @click.option("--lies", type=EXISTING, metavar="IMAGE", help="The board lying in the tank.")
 @click.option(

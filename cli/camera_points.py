@@ -15,7 +15,7 @@ _fit_options = adds(
     click.option(
         "--model",
         type=click.Choice(["pinhole", "fisheye"]),
-        help="Of the lens; default: what foretells points left out best.",
+        help="Of the lens; default: the one that predicts left-out points best.",
     ),
     click.option("--robust", is_flag=True, help="Let points that are far off weigh less."),
 )

@@ -33,7 +33,7 @@ def _listed(name: str) -> str:
 @click.option(
     "--null-replicates",
     type=click.Choice(["39", "199"]),
-    help="Trials simulated without any effect, to learn what chance does.  [default: 39]",
+    help="Trials simulated without any effect, to measure what chance does.  [default: 39]",
 )
 @click.option("--quick", is_flag=True, help="Take that from theory instead: seconds, less sure.")
 @click.option("--noise-mm", type=FiniteRange(min=0), help="Position noise, sd per coordinate.")

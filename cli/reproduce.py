@@ -46,7 +46,7 @@ from .reproducing import check_together, reproduce_archives, reproduce_virtual
 @click.option("--force", is_flag=True, help="Make everything again.")
 @speaks
 def command(out: Output, archives: tuple[Path, ...], folder: Path | None, **options: Any) -> None:
-    r"""Hold scores of archived trials against published ones.
+    r"""Compare scores of archived trials with published ones.
 
     An archive is a trial, or tracks in a format of `zfcal import`; it is only
     read. Each gets a trial in DIR, which is analysed and calibrated by the

@@ -45,7 +45,7 @@ def open_page(trial: Path, options: Mapping[str, Any]) -> Iterator[Page | None]:
         It is no trial, or the port is in use.
     """
     if options["table"] and not sys.stderr.isatty():
-        raise click.UsageError("--table is drawn on a terminal, and standard error is none.")
+        raise click.UsageError("--table is drawn on a terminal, and standard error is not one.")
     if not options["view"]:
         yield None
         return

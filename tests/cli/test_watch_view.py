@@ -83,7 +83,7 @@ def test_a_port_in_use_is_one_error_and_nothing_begins(zfcal, trial):
         (["--stages", "none", "--view", "--until-idle", "1s"], "--until-idle is about stages"),
         (["--stages", "none", "--view", "--seed", "1"], "none of the stages that run here"),
         (["--stages", "none,track", "--view"], "'none' is none of track"),
-        (["--table"], "--table is drawn on a terminal, and standard error is none."),
+        (["--table"], "--table is drawn on a terminal, and standard error is not one."),
         (["--view", "--view-port", "70000"], "70000 is not in the range"),
     ],
 )

@@ -54,7 +54,7 @@ class Board:
             )
         if not _SMALLEST_SQUARE_M <= self.square_m <= _LARGEST_SQUARE_M:
             raise InputError(
-                f"Squares of {self.square_m * 1000:g} mm are none of a board to hold.",
+                f"Squares of {self.square_m * 1000:g} mm are too small or too large for a board.",
                 hint="Measure one side of a printed square, in millimetres.",
             )
 

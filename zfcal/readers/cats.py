@@ -137,7 +137,7 @@ def _polygon(path: Path) -> Floats:
         root = ET.parse(path).getroot()  # noqa: S314
     except ET.ParseError as error:
         raise InputError(
-            f"{path}: expected a whole XML file, got one that breaks off or is none ({error})."
+            f"{path}: expected a whole XML file, got one that is cut off or is not XML ({error})."
         ) from error
     node = root.find("polygon") if root.tag == "opencv_storage" else None
     if node is None:

@@ -60,7 +60,7 @@ class Guard:
 
     def _refused(self, scope: Scope) -> Response | None:
         if not _is_of_here(Headers(scope=scope).getlist("host")):
-            return PlainTextResponse("This name is none of this computer's.\n", 403)
+            return PlainTextResponse("This is not a name of this computer.\n", 403)
         if scope["method"] != "GET":
             return PlainTextResponse("Only GET is answered.\n", 405, {"Allow": "GET"})
         # A path need not begin with a slash, nor hold one.

@@ -118,7 +118,7 @@ def gap_picture(gap: Sequence[Gap]) -> Picture | None:
         ),
         note="0 % is the model without the effects, 100 % the model with them against itself. "
         "Fish that show an effect more clearly than our form of it does lie beyond that, and so "
-        "does luck. The placebo is a wrong effect in their place. "
+        "may chance. The placebo is a wrong effect in their place. "
         "Likelihood and the effect itself are of the three models as fitted; the other rows are "
         "of the same three after they were calibrated.",
     )
