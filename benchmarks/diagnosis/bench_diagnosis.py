@@ -241,9 +241,10 @@ def main() -> None:
     for name in _THREADS:
         os.environ.setdefault(name, "1")
     from hidden.effects import LISTED, UNLISTED
+    from hidden.further import FURTHER
 
     scale = Scale(**{each.name: getattr(options, each.name) for each in fields(Scale)})
-    jobs = plan(scale, LISTED, UNLISTED, quick=options.quick)
+    jobs = plan(scale, LISTED, UNLISTED, tuple(FURTHER), quick=options.quick)
     desk = Desk(
         folder=options.build,
         marks={**trial.marks(SECTIONS), VIDEO: film.mark()},
@@ -256,7 +257,8 @@ def main() -> None:
     for part, workers in ((alone, 1), (together, options.workers)):
         if part:
             work(part, desk, workers=workers, deadline_s=deadline_s)
-    full, place = plan(Scale(), LISTED, UNLISTED, quick=options.quick), places(options)
+    full = plan(Scale(), LISTED, UNLISTED, tuple(FURTHER), quick=options.quick)
+    place = places(options)
     publish(summary(desk, full), place)
     rows = told(desk)
     ledger.pack(place.results / PACKED, [*rows, *desk.rows(trial.ORACLE).values()])

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.diagnosis.plan import SECTIONS, VIDEO
-from benchmarks.diagnosis.summary import DESCRIBES, NAMELESS, NOTHING
+from benchmarks.diagnosis.answers import DESCRIBES, FATES, NAMELESS, NOTHING
+from benchmarks.diagnosis.plan import FURTHER_NOISE_MM, SECTIONS, VIDEO
 from benchmarks.shared.measuring import table
 
 MODES = {"full": "39 replicates", "quick": "`--quick`"}
@@ -17,6 +17,7 @@ MODES = {"full": "39 replicates", "quick": "`--quick`"}
 _DASH = "–"
 _SAYS = {
     "listed": "one listed effect, 30 min, clear",
+    "further": "a further form of a listed effect, 30 min, faint and clear",
     "strengths": "faint and strong",
     "lengths": "2 and 10 min, clear",
     "without-robot": "30 min, clear, no robot",
@@ -50,6 +51,7 @@ def markdown(found: Mapping[str, Any]) -> str:
     for mode, told in _modes(found):
         sections = {
             "One effect at a time": _effects(told),
+            "Further forms": _further(told),
             "Hidden and said": _confusion(mode, told),
             "Power": _power(mode, told),
             "Nothing hidden": _nulls(told),
@@ -160,6 +162,31 @@ def _effects(told: Mapping[str, Any]) -> list[str]:
     ]
     head = ("hidden", "oracle nats (median)", "named rightly", "tie with it", "a wrong name")
     about = "30 minutes, four fish and a robot, clear strength.\n"
+    return [about, table(head, rows)] if rows else []
+
+
+def _further(told: Mapping[str, Any]) -> list[str]:
+    rows = [
+        [
+            each["effect"],
+            each["form"] or "all",
+            each["strength"],
+            _number(each["median_nats"]),
+            *(share(each[fate]) for fate in FATES),
+        ]
+        for each in told.get("further", ())
+    ]
+    about = _prose(
+        f"""Each listed effect in forms that others might have written, with constants of the
+        seed's own; 30 minutes, four fish and a robot, in a third of the trials
+        {FURTHER_NOISE_MM:g} mm of noise. A tie holds a name that fits. Silence is a verdict that
+        claims nothing; all else that is said counts as wrong, that something is unexplained as
+        well."""
+    )
+    head = (
+        "hidden", "form", "strength", "oracle nats (median)", "named rightly", "tie with it",
+        "silent", "wrong",
+    )  # fmt: skip
     return [about, table(head, rows)] if rows else []
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 
+from benchmarks.diagnosis.answers import NAMELESS, NOTHING
 from benchmarks.diagnosis.document import MODES
-from benchmarks.diagnosis.summary import NAMELESS, NOTHING
 from zfcal.report.figures.theme import FISH, GROUND, INK, MODEL, MUTED, new_figure, save_png, style
 
 _SHADES = LinearSegmentedColormap.from_list("shades", (GROUND, FISH))

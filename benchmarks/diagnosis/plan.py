@@ -15,12 +15,18 @@ from typing import Any
 import numpy as np
 
 FIRST_SEED = 20_000
+FURTHER_SEED = 70_000
+"""Of trials that hide further forms."""
+
+FURTHER_NOISE_MM = 0.5
+"""Of every third trial of a further form; the others have none."""
 
 LISTED_SECTION, LENGTHS, STRENGTHS, ALONE = "listed", "lengths", "strengths", "without-robot"
+FURTHER = "further"
 NULLS, PAIRS, OUTSIDE = "nulls", "pairs", "outside"
 EXTEND, VIDEO, TIME = "extend", "video", "time"
 SECTIONS = (
-    LISTED_SECTION, NULLS, OUTSIDE, PAIRS, STRENGTHS, LENGTHS, ALONE, EXTEND, VIDEO, TIME,
+    LISTED_SECTION, FURTHER, NULLS, OUTSIDE, PAIRS, STRENGTHS, LENGTHS, ALONE, EXTEND, VIDEO, TIME,
 )  # fmt: skip
 
 DECOYS = ("plain", "shifted", "arena", "noise", "drops-and-swaps")
@@ -45,8 +51,8 @@ FILMED = ("wall-persistence", "burst-and-coast", "turning-bias", None, None)
 """What the trials hide that are rendered to video and tracked."""
 
 WEIGHTS = {
-    LISTED_SECTION: 1.0, NULLS: 1.0, STRENGTHS: 0.5, LENGTHS: 0.5, OUTSIDE: 0.3, PAIRS: 0.25,
-    ALONE: 0.2, EXTEND: 0.04, VIDEO: 0.02,
+    LISTED_SECTION: 1.0, FURTHER: 1.0, NULLS: 1.0, STRENGTHS: 0.5, LENGTHS: 0.5, OUTSIDE: 0.3,
+    PAIRS: 0.25, ALONE: 0.2, EXTEND: 0.04, VIDEO: 0.02,
 }  # fmt: skip
 """How often a section's turn comes. An extension takes as long as a dozen others."""
 
@@ -70,6 +76,8 @@ class Scale:
         Of each pair, and of each effect outside the list.
     extended
         Of each listed effect, to be extended.
+    further
+        Of each further form of a listed effect, faint and clear.
     """
 
     seeds: int = 20
@@ -78,9 +86,12 @@ class Scale:
     pairs: int = 5
     outside: int = 10
     extended: int = 3
+    further: int = 3
 
     def __post_init__(self) -> None:
-        most = max(self.seeds, self.few, self.pairs, self.outside, self.extended)
+        most = max(
+            self.seeds, self.few, self.pairs, self.outside, self.extended, self.further
+        )  # fmt: skip
         if most > _SEEDS_PER_KIND:
             raise ValueError(f"At most {_SEEDS_PER_KIND} seeds of a kind, got {most}.")
 
@@ -144,7 +155,14 @@ def scenario(seed: int, **changed: Any) -> dict[str, Any]:
     return {**made, **changed}
 
 
-def plan(scale: Scale, listed: Sequence[str], unlisted: Sequence[str], *, quick: bool) -> list[Job]:
+def plan(
+    scale: Scale,
+    listed: Sequence[str],
+    unlisted: Sequence[str],
+    further: Sequence[str] = (),
+    *,
+    quick: bool,
+) -> list[Job]:
     """Return all trials of a benchmark, in the order in which they are to be made.
 
     Parameters
@@ -153,11 +171,14 @@ def plan(scale: Scale, listed: Sequence[str], unlisted: Sequence[str], *, quick:
         How many.
     listed, unlisted
         Effects that the tool knows by name, and others that can be hidden.
+    further
+        Keys of further forms of listed effects, such as ``alignment/flow``.
     quick
         Whether nulls are those of theory.
     """
     made = [
         *_of_effects(scale, listed, quick=quick),
+        *_of_forms(scale, further, quick=quick),
         *_of_nothing(scale, quick=quick),
         *_of_others(scale, unlisted, quick=quick),
         *_in_full(scale, listed, quick=quick),
@@ -200,6 +221,19 @@ def _of_effects(scale: Scale, listed: Sequence[str], *, quick: bool) -> Iterator
                 asked = scenario(first + _SEEDS_PER_KIND * number + k, effect=name, **changed)
                 yield Job(
                     section=section, kind=f"{name}{suffix}", round=k, scenario=asked, quick=quick
+                )
+
+
+def _of_forms(scale: Scale, further: Sequence[str], *, quick: bool) -> Iterator[Job]:
+    """Yield the trials of further forms, each faint and clear."""
+    for number, key in enumerate(further):
+        for k in range(scale.further):
+            for level, strength in enumerate(("faint", "clear")):
+                seed = FURTHER_SEED + _SEEDS_PER_KIND * (2 * number + level) + k
+                noise_mm = FURTHER_NOISE_MM if k % 3 == 2 else 0.0
+                asked = scenario(seed, effect=key, strength=strength, chain={"noise_mm": noise_mm})
+                yield Job(
+                    section=FURTHER, kind=f"{key} {strength}", round=k, scenario=asked, quick=quick
                 )
 
 

@@ -1,6 +1,6 @@
 """What finished trials of the diagnosis come to: rates with their intervals, matrices, times.
 
-Pure functions of the rows of `trial.run`. A share is never without its n.
+Pure functions of the rows of `trial.run`, each by way of `answers`.
 """
 
 from __future__ import annotations
@@ -12,136 +12,41 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from scipy.stats import binomtest
-
+from benchmarks.diagnosis.answers import (
+    ERROR,
+    FATES,
+    SINGLE,
+    Rate,
+    Row,
+    answer,
+    fares,
+    has_wrong_listed_name,
+    has_wrong_name,
+    is_right,
+    is_standard,
+    is_tie_with_truth,
+    misdescribes,
+    names,
+    names_first_wrong,
+    names_something,
+    nats,
+    rate,
+    rate_of,
+    says_something,
+    truth,
+)
 from benchmarks.diagnosis.plan import (
-    ALONE,
     EXTEND,
-    LENGTHS,
+    FURTHER,
     LISTED_SECTION,
     NULLS,
     OUTSIDE,
     PAIRS,
-    STRENGTHS,
     TIME,
 )
 
-Row = Mapping[str, Any]
-Rate = dict[str, Any]
-
-NOTHING, TIE, BEYOND = "nothing", "tie", "beyond the list"
-ERROR = "error"
-SILENT = ("no-effect", "untestable", ERROR)
-"""Verdicts that claim nothing; failures are counted by themselves."""
-
-NAMELESS = (TIE, BEYOND, "unexplained", *SILENT)
-"""Answers that are no effect's name."""
-
-DESCRIBES = {
-    "waxing-walls": ("wall-persistence",),
-    "startle": ("burst-and-coast", "speed-matching"),
-    "sound": ("place-preference",),
-    "kept-distance": (),
-    "one-eye": (),
-    "lit-room": (),
-}
-"""Listed names that describe a part, at least, of an effect outside the list."""
-
 NATS = (0, 20, 50, 100, 200, 500, math.inf)
 """Edges of the bins of oracle nats."""
-
-SINGLE = (LISTED_SECTION, LENGTHS, STRENGTHS, ALONE)
-"""Sections that hide one listed effect in each trial."""
-
-
-def rate(n_hits: int, n: int) -> Rate:
-    """Return a share with Wilson's 95 % interval; all None where n is 0."""
-    if n == 0:
-        return {"hits": 0, "n": 0, "share": None, "low": None, "high": None}
-    interval = binomtest(n_hits, n).proportion_ci(0.95, method="wilson")
-    low, high = round(float(interval.low), 4), round(float(interval.high), 4)
-    return {"hits": n_hits, "n": n, "share": round(n_hits / n, 4), "low": low, "high": high}
-
-
-def rate_of(rows: Iterable[Row], holds: Callable[[Row], bool]) -> Rate:
-    """Return the share of rows of which something holds."""
-    told = [holds(row) for row in rows]
-    return rate(sum(told), len(told))
-
-
-def names(row: Row) -> list[str]:
-    """Return the effects that a trial's diagnosis names, without those that are tied."""
-    return [effect["name"] for effect in row["effects"] if not effect["ties"]]
-
-
-def answer(row: Row) -> str:
-    """Return what the diagnosis says first: a name, a tie, beyond the list, or its verdict."""
-    if row["verdict"] == "named":
-        name = row["effects"][0]["name"]
-        return BEYOND if name.startswith("generic:") else str(name)
-    return str(row["verdict"])
-
-
-def truth(row: Row) -> str:
-    """Return what a trial hides, in words."""
-    return " and ".join(row["truth"]) or NOTHING
-
-
-def is_right(row: Row) -> bool:
-    """Return whether the first effect is the hidden one, and tied with no other."""
-    return row["verdict"] == "named" and row["effects"][0]["name"] in row["truth"]
-
-
-def is_tie_with_truth(row: Row) -> bool:
-    """Return whether the first effect is tied, and the hidden one is among the tied."""
-    if row["verdict"] != TIE:
-        return False
-    first = row["effects"][0]
-    return bool({first["name"], *first["ties"]} & set(row["truth"]))
-
-
-def has_wrong_name(row: Row) -> bool:
-    """Return whether any effect is named, the second or third as well, that is not hidden."""
-    return bool(set(names(row)) - set(row["truth"]))
-
-
-def has_wrong_listed_name(row: Row) -> bool:
-    """Return whether any *listed* effect is named that is not hidden."""
-    wrong = set(names(row)) - set(row["truth"])
-    return any(not name.startswith("generic:") for name in wrong)
-
-
-def names_first_wrong(row: Row) -> bool:
-    """Return whether the first effect that is named is not hidden."""
-    return row["verdict"] == "named" and not is_right(row)
-
-
-def says_something(row: Row) -> bool:
-    """Return whether the diagnosis claims anything, be it that something is unexplained."""
-    return row["verdict"] not in SILENT
-
-
-def names_something(row: Row) -> bool:
-    """Return whether the diagnosis names an effect or a tie."""
-    return bool(row["effects"])
-
-
-def misdescribes(row: Row) -> bool:
-    """Return whether an effect outside the list gets a listed name that does not describe it."""
-    fitting = {name for hidden in row["truth"] for name in DESCRIBES[hidden]}
-    return any(not name.startswith("generic:") and name not in fitting for name in names(row))
-
-
-def nats(row: Row) -> float:
-    """Return the oracle's nats of what is hidden; NaN where nobody counted them."""
-    return float(row["nats"]["total"]) if row.get("nats") else math.nan
-
-
-def is_standard(row: Row) -> bool:
-    """Return whether a trial has 30 minutes of four fish and a robot, and one listed effect."""
-    asked = row["scenario"]
-    usual = asked["minutes"] == 30 and asked["n_fish"] == 4 and asked["robot"]
-    return row["section"] in SINGLE and bool(usual)
 
 
 def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -149,6 +54,7 @@ def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
     single = [row for row in rows if row["section"] in SINGLE]
     standard = [row for row in single if is_standard(row)]
     nulls, pairs, outside = (_of(rows, section) for section in (NULLS, PAIRS, OUTSIDE))
+    further = _of(rows, FURTHER)
     asked: list[tuple[str, str, Iterable[Row], Callable[[Row], bool]]] = [
         ("nulls and decoys: says anything at all", "at most 5 %", nulls, says_something),
         ("nulls and decoys: names or ties an effect", "", nulls, names_something),
@@ -167,6 +73,16 @@ def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
         (
             "both of a pair named", "at least 80 %",
             pairs, lambda row: set(row["truth"]) <= set(names(row)),
+        ),
+        (
+            "further forms, clear: named rightly", "",
+            (row for row in further if row["scenario"]["strength"] == "clear"),
+            lambda row: fares(row) == "right",
+        ),
+        (
+            "further forms, clear: something else is said", "",
+            (row for row in further if row["scenario"]["strength"] == "clear"),
+            lambda row: fares(row) == "wrong",
         ),
         ("pairs: a wrong name anywhere", "", pairs, has_wrong_name),
         ("outside the list: a listed name that does not describe it", "none", outside,
@@ -255,6 +171,28 @@ def effects_table(rows: Iterable[Row]) -> dict[str, dict[str, Any]]:
     }
 
 
+def further_table(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Return by effect, form and strength how trials of further forms fared.
+
+    Of each effect all its forms come first, with a form of None, then each.
+    """
+    parts: defaultdict[tuple[str, str, str], list[Row]] = defaultdict(list)
+    for row in _of(rows, FURTHER):
+        name, strength = row["truth"][0], row["scenario"]["strength"]
+        for form in ("", row["scenario"]["effect"].partition("/")[2]):
+            parts[name, form, strength].append(row)
+    return [
+        {
+            "effect": name, "form": form or None, "strength": strength,
+            "median_nats": _median(nats(row) for row in part),
+            **{fate: rate(sum(fares(row) == fate for row in part), len(part)) for fate in FATES},
+        }
+        for (name, form, strength), part in sorted(
+            parts.items(), key=lambda each: (each[0][0], each[0][1], each[0][2] != "faint")
+        )
+    ]  # fmt: skip
+
+
 def noise_table(rows: Iterable[Row]) -> list[dict[str, Any]]:
     """Return by the noise that was added what was estimated, and how often it was a false alarm."""
     levels: defaultdict[float, list[Row]] = defaultdict(list)
@@ -340,6 +278,7 @@ def of_mode(rows: Sequence[Row]) -> dict[str, Any]:
         "n": dict(sorted(Counter(row["section"] for row in rows).items())),
         "targets": targets(rows),
         "effects": effects_table(rows),
+        "further": further_table(rows),
         "confusion": matrix,
         "inversion": inversion(matrix),
         "power": power(rows),

@@ -131,6 +131,7 @@ def _described(error: Exception) -> str:
 
 def _answer(job: Job, nats: dict[str, float] | None, folder: Path, measure: Measure) -> Row:
     from hidden.chain import Chain
+    from hidden.further import FORMS, name_of
     from hidden.scenario import Scenario, make_trial
 
     asked = Scenario(**{**job.scenario, "chain": Chain(**job.scenario["chain"])})
@@ -138,7 +139,9 @@ def _answer(job: Job, nats: dict[str, float] | None, folder: Path, measure: Meas
     made = make_trial(asked, oracle=asks)
     root = measure(folder, made, job.scenario)
     row: Row = {
-        "truth": list(asked.hidden),
+        "truth": [name_of(key) for key in asked.hidden],
+        "forms": list(asked.hidden),
+        "also": [name for key in asked.hidden for name in FORMS[key].also],
         "strengths": made.truth["effects"],
         "nats": made.oracle_nats if asks else nats,
     }

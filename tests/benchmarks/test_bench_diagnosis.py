@@ -32,6 +32,12 @@ def summary(script):
 
 
 @pytest.fixture
+def answers(script):
+    """Return the module that judges one row."""
+    return script("diagnosis.answers")
+
+
+@pytest.fixture
 def row(planned):
     """Return what makes a row of a finished trial."""
 
@@ -95,9 +101,11 @@ def test_a_trial_through_video_is_tracked(script, planned):
 
 def test_no_seed_is_used_twice_and_none_that_was_tuned_on(planned):
     """Even with as many seeds as there may be."""
-    full = planned.Scale(seeds=100, few=100, nulls=10_000, pairs=100, outside=100, extended=100)
+    full = planned.Scale(seeds=100, few=100, nulls=10_000, pairs=100, outside=100, extended=100,
+                         further=100)  # fmt: skip
     names = [str(number) for number in range(21)]
-    jobs = planned.plan(full, names, UNLISTED, quick=False)
+    jobs = planned.plan(full, names, UNLISTED, [f"{name}/{k}" for name in names for k in "ab"],
+                        quick=False)  # fmt: skip
     seeds = [job.scenario["seed"] for job in jobs]
     assert len(seeds) == len(set(seeds))
     assert min(seeds) >= 20_000
@@ -184,46 +192,46 @@ def test_a_mode_that_the_present_code_was_not_asked_in_shows_what_another_said(
     assert [row["key"] for row in bench.told(desk)] == ["f", "e"]
 
 
-def test_a_tie_is_neither_right_nor_wrong(summary, row):
+def test_a_tie_is_neither_right_nor_wrong(row, answers):
     """Whether or not it holds the hidden effect, first or last, which is told apart."""
     leads = row(("alignment",), ("alignment",), ties=("crowding",))
     holds = row(("alignment",), ("crowding",), ties=("alignment",))
     misses = row(("alignment",), ("crowding",), ties=("fatigue",))
     for each in (leads, holds, misses):
-        assert not summary.is_right(each)
-        assert not summary.has_wrong_name(each)
-        assert summary.answer(each) == "tie"
-    assert summary.is_tie_with_truth(leads)
-    assert summary.is_tie_with_truth(holds)
-    assert not summary.is_tie_with_truth(misses)
+        assert not answers.is_right(each)
+        assert not answers.has_wrong_name(each)
+        assert answers.answer(each) == "tie"
+    assert answers.is_tie_with_truth(leads)
+    assert answers.is_tie_with_truth(holds)
+    assert not answers.is_tie_with_truth(misses)
 
 
-def test_a_second_name_that_is_not_hidden_is_wrong(summary, row):
+def test_a_second_name_that_is_not_hidden_is_wrong(row, answers):
     """Although the first is right; so is a generic name, which is beyond the list."""
     each = row(("alignment",), ("alignment", "crowding"))
-    assert summary.is_right(each)
-    assert summary.has_wrong_name(each)
-    assert not summary.names_first_wrong(each)
+    assert answers.is_right(each)
+    assert answers.has_wrong_name(each)
+    assert not answers.names_first_wrong(each)
     generic = row(("alignment",), ("generic:speed:time",))
-    assert summary.answer(generic) == "beyond the list"
-    assert summary.has_wrong_name(generic)
-    assert not summary.has_wrong_listed_name(generic)
+    assert answers.answer(generic) == "beyond the list"
+    assert answers.has_wrong_name(generic)
+    assert not answers.has_wrong_listed_name(generic)
 
 
-def test_unexplained_is_a_false_alarm_and_untestable_is_none(summary, row):
+def test_unexplained_is_a_false_alarm_and_untestable_is_none(row, answers):
     """Where nothing is hidden, nothing is to be said."""
-    assert summary.says_something(row(verdict="unexplained"))
-    assert not summary.says_something(row(verdict="untestable"))
-    assert not summary.says_something(row(verdict="error"))
+    assert answers.says_something(row(verdict="unexplained"))
+    assert not answers.says_something(row(verdict="untestable"))
+    assert not answers.says_something(row(verdict="error"))
 
 
-def test_every_effect_outside_the_list_says_what_describes_it(summary, bench):
+def test_every_effect_outside_the_list_says_what_describes_it(bench, answers):
     """A new one cannot be forgotten, nor can a name be misspelt."""
     from hidden.effects import LISTED as LISTED_NOW
     from hidden.effects import UNLISTED as UNLISTED_NOW
 
-    assert set(summary.DESCRIBES) == set(UNLISTED_NOW)
-    assert {name for fitting in summary.DESCRIBES.values() for name in fitting} <= set(LISTED_NOW)
+    assert set(answers.DESCRIBES) == set(UNLISTED_NOW)
+    assert {name for fitting in answers.DESCRIBES.values() for name in fitting} <= set(LISTED_NOW)
 
 
 def test_targets_take_only_the_trials_that_they_are_about(summary, row):
@@ -256,3 +264,51 @@ def test_a_run_says_whether_it_is_complete(script, summary, row):
     short = summary.summarise([{**rows[0], "quick": True}], planned={"listed": 1})
     assert "Complete with `--quick`**, 1 trial" in document._completeness(short)
     assert "0 of them" in document._completeness(short)
+
+
+def test_further_forms_are_planned_faint_and_clear_and_a_third_with_noise(planned):
+    """As often as listed ones, from a first seed of their own."""
+    jobs = planned.plan(planned.Scale(further=3), LISTED, UNLISTED, ["alignment/flow"], quick=True)
+    further = [job for job in jobs if job.section == "further"]
+    assert sorted(job.kind for job in further) == [
+        *["alignment/flow clear"] * 3, *["alignment/flow faint"] * 3,
+    ]  # fmt: skip
+    noise = [job.scenario["chain"]["noise_mm"] for job in further]
+    assert sorted(noise) == [0.0] * 4 + [0.5] * 2
+    assert min(job.scenario["seed"] for job in further) == planned.FURTHER_SEED
+    assert planned.WEIGHTS["further"] == planned.WEIGHTS["listed"]
+
+
+def test_a_further_form_is_called_by_its_effect_or_a_second_choice(row, answers):
+    """A tie of both is right; a tie with a third is a tie, as is the second choice alone."""
+
+    def fares(names, **changed):
+        also = ["turning-memory"]
+        return answers.fares(row(("wall-persistence",), names, also=also, **changed))
+
+    assert fares(("wall-persistence",)) == "right"
+    assert fares(("wall-persistence",), ties=("turning-memory",)) == "right"
+    assert fares(("wall-persistence",), ties=("alignment",)) == "tie"
+    assert fares(("turning-memory",)) == "tie"
+    assert fares(("alignment",), ties=("crowding",)) == "wrong"
+    assert fares(("generic:speed:time",)) == "wrong"
+    assert fares((), verdict="unexplained") == "wrong"
+    assert fares(()) == "silent"
+
+
+def test_the_table_of_further_forms_shows_a_hole(script, summary, row):
+    """By effect, then by form; what is said of one form does not hide what is of the other."""
+
+    def trial(form, names):
+        made = row(("alignment",), names, section="further", nats=80.0)
+        asked = {**made["scenario"], "effect": f"alignment/{form}", "strength": "clear"}
+        return {**made, "scenario": asked}
+
+    rows = [trial("flow", ("alignment",)), trial("nearest", ())]
+    found = summary.further_table(rows)
+    assert [(each["form"], each["right"]["hits"], each["right"]["n"]) for each in found] == [
+        (None, 1, 2), ("flow", 1, 1), ("nearest", 0, 1),
+    ]  # fmt: skip
+    assert found[2]["silent"]["hits"] == 1
+    text = "\n".join(script("diagnosis.document")._further({"further": found}))
+    assert "| alignment | nearest | clear | 80 | 0 % (0/1, 0 to 79)" in text

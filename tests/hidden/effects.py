@@ -32,6 +32,12 @@ class Effect:
         What it does, in one line.
     listed
         Whether it is one of the effects that the tool knows by name.
+    name
+        The effect of which this is a form; its key if that is its own.
+    also
+        Other listed names by which the form could rightly be called.
+    constants
+        Names and ranges of what is drawn uniformly by the seed.
     """
 
     column: int
@@ -41,6 +47,9 @@ class Effect:
     strong: float
     form: str
     listed: bool = True
+    name: str = ""
+    also: tuple[str, ...] = ()
+    constants: tuple[tuple[str, float, float], ...] = ()
 
 
 def _effect(column, on, strengths, form, *, listed=True):

@@ -9,7 +9,10 @@ import os
 from pathlib import Path
 
 _FOLDER = Path(__file__).parent
-_SOURCES = ("geometry.py", "states.py", "kernels.py", "oracle.py")
+_SOURCES = (
+    "geometry.py", "states.py", "surroundings.py", "further_heading.py", "heading.py",
+    "further_speed.py", "speeds.py", "kernels.py", "oracle.py",
+)  # fmt: skip
 
 
 def forget_stale_kernels(folder: Path = _FOLDER) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import i0e
 
-from hidden import geometry, kernels, states
+from hidden import geometry, heading, states
 from hidden.worlds import WALL_ZONE_M, Floats, Tank
 
 # Shares of speeds of AB zebrafish in bins of 0.02 m/s, as published.
@@ -109,7 +109,7 @@ def no_plan(n_agents: int) -> states.Plan:
     """Return a plan that hides nothing."""
     return states.Plan(
         np.zeros((n_agents, states.N_EFFECTS)), np.zeros(2), np.zeros(2), 0.0, 0.0,
-        np.zeros(n_agents), -1,
+        np.zeros(n_agents), -1, np.zeros((states.N_EFFECTS, states.N_CONSTANTS)), 0,
     )  # fmt: skip
 
 
@@ -145,5 +145,5 @@ def heading_density(base, tank, *, xy_m, heading_rad, speed_m_s, agent=0):
     past.zone[0] = [geometry.zone_of(x, y, world) for x, y in past.xy[0]]
     cells = np.empty(states.N_CELLS)
     plan = no_plan(len(xy_m))
-    kernels.heading_cells(agent, 0, speed_m_s, world, law_of(base), past, plan, cells)
+    heading.heading_cells(agent, 0, speed_m_s, world, law_of(base), past, plan, cells)
     return states.ANGLE, cells

@@ -13,8 +13,9 @@ import numpy as np
 from numba import njit
 from scipy.special import i0e, i1e
 
-from hidden import kernels, states
-from hidden.effects import BOTH, EFFECTS, HEADING, SPEED
+from hidden import kernels, speeds, states
+from hidden.effects import BOTH, HEADING, SPEED
+from hidden.further import FORMS
 from hidden.law import Base, law_of, no_plan
 
 N_ANGLES = 72
@@ -168,7 +169,7 @@ def cells_of(theta):
 
 def log_base_speed(speed, zone):
     """Return the log share of each speed's bin among the speeds in its zone."""
-    bins, value = np.array([kernels.speed_bin(v) for v in speed]), np.empty(len(speed))
+    bins, value = np.array([speeds.speed_bin(v) for v in speed]), np.empty(len(speed))
     for z in np.unique(zone):
         rows = zone == z
         value[rows] = np.log(np.bincount(bins[rows])[bins[rows]] / rows.sum())
@@ -214,5 +215,5 @@ def oracle_nats(base: Base, world, past, *, n_fish, on=BOTH):
 
 def acts_on(names):
     """Return what effects act on together."""
-    on = {EFFECTS[name].on for name in names}
+    on = {FORMS[name].on for name in names}
     return on.pop() if len(on) == 1 else BOTH

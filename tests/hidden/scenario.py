@@ -10,7 +10,8 @@ import pandas as pd
 
 from hidden import kernels, states
 from hidden.chain import Chain, measure, sampled
-from hidden.effects import BOTH, EFFECTS
+from hidden.effects import BOTH
+from hidden.further import FORMS, FURTHER, drawn, knob, name_of
 from hidden.law import Base, empty_past, law_of, natural, shifted, world_of
 from hidden.oracle import acts_on, oracle_nats
 from hidden.worlds import Floats, Tank, tank_of
@@ -29,7 +30,8 @@ class Scenario:
     Parameters
     ----------
     effect, second
-        Names in `hidden.effects.EFFECTS`; None for none.
+        Keys of `hidden.further.FORMS`, such as ``alignment`` or ``alignment/flow``; None
+        for none.
     strength
         ``faint``, ``clear`` or ``strong``, or the knob itself.
     minutes
@@ -62,7 +64,7 @@ class Scenario:
 
     @property
     def hidden(self) -> tuple[str, ...]:
-        """The names of the hidden effects."""
+        """The keys of the hidden effects."""
         return tuple(name for name in (self.effect, self.second) if name is not None)
 
 
@@ -96,28 +98,31 @@ class Trial:
     truth: dict
 
 
-def knob(name: str, strength: str | float) -> float:
-    """Return the strength of an effect as a number."""
-    return getattr(EFFECTS[name], strength) if isinstance(strength, str) else float(strength)
-
-
 def _plan(scenario: Scenario, tank: Tank, rng) -> states.Plan:
     n = scenario.n_fish + scenario.robot
     strength = np.zeros((n, states.N_EFFECTS))
+    constants = np.zeros((states.N_EFFECTS, states.N_CONSTANTS))
     for name in scenario.hidden:
-        strength[: scenario.n_fish, EFFECTS[name].column] = knob(name, scenario.strength)
+        column, values = FORMS[name].column, list(drawn(name, scenario.seed).values())
+        strength[: scenario.n_fish, column] = knob(name, scenario.strength)
+        constants[column, : len(values)] = values
     bold = np.zeros(n)
     scores = _NORMAL_SCORES.get(scenario.n_fish, np.linspace(-1.3, 1.3, scenario.n_fish))
     bold[: scenario.n_fish] = rng.permutation(scores)
     place = tank.liked[rng.integers(len(tank.liked))]
     compass, phase = rng.uniform(-math.pi, math.pi, 2)
     robot = scenario.n_fish if scenario.robot else -1
-    return states.Plan(strength, place, tank.speaker, compass, phase, bold, robot)
+    further = int(any(name in FURTHER for name in scenario.hidden))
+    return states.Plan(
+        strength, place, tank.speaker, compass, phase, bold, robot, constants, further
+    )
 
 
 def _truth(scenario: Scenario, base: Base, plan: states.Plan) -> dict:
     return {
         "effects": {name: knob(name, scenario.strength) for name in scenario.hidden},
+        "names": sorted({name_of(name) for name in scenario.hidden}),
+        "constants": {name: drawn(name, scenario.seed) for name in scenario.hidden},
         "arena": scenario.arena,
         "base": base.plain(),
         "place_m": plan.place.tolist(),
@@ -140,7 +145,8 @@ def _run(scenario: Scenario, tank: Tank, law, plan: states.Plan, seed):
         past = empty_past(n_steps, len(plan.bold), first=BURN_IN_STEPS)
         kernels.run(world, law, past, plan, np.random.default_rng(seed))
         away = np.linalg.norm(past.xy[BURN_IN_STEPS:, : scenario.n_fish] - place, axis=-1)
-        if "place-preference" not in scenario.hidden or (away < _NEAR_M).mean() >= _SELDOM:
+        liked = "place-preference" in map(name_of, scenario.hidden)
+        if not liked or (away < _NEAR_M).mean() >= _SELDOM:
             break
     return past, plan
 

@@ -20,20 +20,30 @@ COS, SIN = np.cos(ANGLE), np.sin(ANGLE)
 SHORT_M = 0.002
 """A displacement that is shorter has no heading on a recording."""
 
-# One column of a plan's strengths per effect.
+# One column of a plan's strengths per form of an effect.
 (
     ALIGNMENT, WALL_PERSISTENCE, GROUP_COHESION, INTERACTION_RANGE, REAR_BLIND_ZONE,
     LEADER_FOLLOWING, REACTION_DELAY, COLLECTIVE_DEPARTURE, PLACE_PREFERENCE, DIRECTIONAL_DRIFT,
     TURNING_BIAS, TURNING_MEMORY, SPEED_MATCHING, CROWDING, BURST_AND_COAST, SPEED_TURN_COUPLING,
     FREEZING, FATIGUE, HABITUATION, BOLDNESS, ROBOT_AVOIDANCE,
-    WAXING_WALLS, STARTLE, SOUND, KEPT_DISTANCE, ONE_EYE, LIT_ROOM, N_EFFECTS,
-) = range(28)  # fmt: skip
+    WAXING_WALLS, STARTLE, SOUND, KEPT_DISTANCE, ONE_EYE, LIT_ROOM,
+    FLOW, NEAREST_HEADING, RECENT_SENSE, NO_REVERSAL, CENTROID, REGAIN, RANGE_DECAY, RANGE_RANKS,
+    REAR_CARDIOID, REAR_CUT, FASTEST, ONE_LEADER, SNAPSHOT, SMOOTHED, DOOR, QUORUM, HOME, SHELTER,
+    TAXIS, BEND, SIDES, CIRCLING, LEAKY_TURN, ALTERNATION, COMPANYS_PACE, NEARESTS_PACE,
+    NEAR_ANOTHER, JOSTLE, GLIDE, RHYTHM, FAST_STRAIGHT, AFTER_TURN, SHY_FREEZE, CRAWL,
+    SUDDEN_FATIGUE, UNEVEN_FATIGUE, SUDDEN_HABITUATION, NOVEL_TANK, BOLD_KINDS, BOLD_CENTRE,
+    FLEE_ROBOT, ROBOT_SECTOR, N_EFFECTS,
+) = range(70)  # fmt: skip
+N_CONSTANTS = 2
+"""At most so many constants of a form are drawn by the seed."""
 
 FREEZE_S = 2.0
 FROZEN_M_S = 0.002
 BLIND_RAD = math.radians(95)
 FELT_M = 0.05
 LATE_STEPS = 3
+CRAWL_M_S = 0.015
+TRIAL_S = 1800.0
 STARTLE_STEPS = 3
 STARTLE_REST_STEPS = 15
 DEPARTURE_STEPS = 15
@@ -53,7 +63,11 @@ class Law(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What is hidden: strengths (agent, effect), and where and who it touches."""
+    """What is hidden: strengths (agent, form), and where and who it touches.
+
+    ``constants`` (form, `N_CONSTANTS`) are those that the seed has drawn; ``further`` is 1
+    where the plan holds a further form, so that other plans need not look for one.
+    """
 
     strength: Floats
     place: Floats
@@ -62,6 +76,8 @@ class Plan(NamedTuple):
     phase_rad: float
     bold: Floats
     robot: int
+    constants: Floats
+    further: int
 
 
 class Past(NamedTuple):
