@@ -18,7 +18,6 @@ from hidden.states import (
     BOLD_CENTRE,
     BOLD_KINDS,
     CENTROID,
-    CIRCLING,
     DOOR,
     DT_S,
     FAST_STRAIGHT,
@@ -28,20 +27,14 @@ from hidden.states import (
     HOME,
     LEAKY_TURN,
     NEAREST_HEADING,
-    NO_REVERSAL,
     NOVEL_TANK,
     ONE_LEADER,
     QUORUM,
     RANGE_DECAY,
-    RANGE_RANKS,
     REAR_CARDIOID,
-    REAR_CUT,
     RECENT_SENSE,
     REGAIN,
-    ROBOT_SECTOR,
-    SHELTER,
     SIDES,
-    SMOOTHED,
     SNAPSHOT,
     SUDDEN_HABITUATION,
     TAXIS,
@@ -55,12 +48,9 @@ from hidden.surroundings import (
     company,
     favour_left,
     gap_m,
-    mean_place,
     n_leavers,
-    n_nearer,
     nearest_of,
     room_of,
-    thin_out,
     tilt,
 )
 
@@ -83,12 +73,8 @@ def further_attention(i, j, t, bearing, distance, past, plan):
     off_axis = abs(wrap(bearing - past.heading[t, i]))
     if s[RANGE_DECAY] > 0:
         factor *= math.exp(-s[RANGE_DECAY] * distance)
-    if s[RANGE_RANKS] > 0 and n_nearer(i, j, t, past) >= int(c[RANGE_RANKS, 0]):
-        factor *= max(0.0, 1 - s[RANGE_RANKS])
     if s[REAR_CARDIOID] > 0:
         factor *= ((1 + math.cos(off_axis)) / 2) ** s[REAR_CARDIOID]
-    if s[REAR_CUT] > 0 and off_axis > c[REAR_CUT, 0]:
-        factor *= max(0.0, 1 - s[REAR_CUT])
     if s[ONE_LEADER] > 0 and j == leader_of(past, plan):
         factor *= 1 + s[ONE_LEADER]
     if s[SUDDEN_HABITUATION] > 0 and clock_s(t, past) > c[SUDDEN_HABITUATION, 0]:
@@ -103,9 +89,6 @@ def late_bearing(i, j, t, past, plan):
     lag = int(c[SNAPSHOT, 0])
     if s[SNAPSHOT] > 0 and t >= lag:
         return s[SNAPSHOT], bearing_rad(i, j, t - lag, past)
-    if s[SMOOTHED] > 0:
-        x, y = mean_place(j, t, past, int(c[SMOOTHED, 0]))
-        return s[SMOOTHED], math.atan2(y - past.xy[t, i, 1], x - past.xy[t, i, 0])
     return 0.0, 0.0
 
 
@@ -142,7 +125,7 @@ def further_lean(i, t, along, world, past, plan):
         lean += s[RECENT_SENSE] * total / max(weights, 1e-9)
     if s[BEND] > 0:
         lean += s[BEND] * math.cos(along - plan.compass_rad)
-    return lean + s[CIRCLING]
+    return lean
 
 
 @njit(cache=True)
@@ -155,12 +138,8 @@ def base_kappa(i, v, kappa, plan):
 
 @njit(cache=True)
 def add_social_modes(i, t, past, plan, out):
-    """Add what further forms draw a fish to, or from: a flow, a centroid, the fastest, a robot."""
+    """Add what further forms draw a fish to, or from: a centroid, the fastest, a robot."""
     s, c = plan.strength[i], plan.constants
-    if s[FLOW] > 0:
-        x, y, n = company(i, t, past, c[FLOW, 0])
-        if n > 0:
-            add_wide(out, s[FLOW] * math.hypot(x, y) / n, math.atan2(y, x), c[FLOW, 1])
     if s[CENTROID] > 0:
         away, bearing = centroid_of(i, t, past)
         add_wide(out, s[CENTROID] * away / (away + c[CENTROID, 0]), bearing, c[CENTROID, 1])
@@ -181,17 +160,13 @@ def add_social_modes(i, t, past, plan, out):
 
 @njit(cache=True)
 def add_places(i, t, world, past, plan, out):
-    """Add what further forms draw a fish to in the tank: a door, a shelter, a compass direction."""
+    """Add what further forms draw a fish to in the tank: a door, a compass direction."""
     s, c, zone = plan.strength[i], plan.constants, past.zone[t, i]
     x, y = past.xy[t, i, 0], past.xy[t, i, 1]
     if s[QUORUM] > 0 and zone != 1:
         share = n_leavers(i, t, past, c[QUORUM, 0]) / max(past.xy.shape[1] - 1, 1)
         door = world.mouths[room_of(x, y)]
         add_wide(out, s[QUORUM] * share, math.atan2(door[1] - y, door[0] - x), _WIDE)
-    if s[SHELTER] > 0:
-        dx, dy = plan.place[0] - x, plan.place[1] - y
-        weight = s[SHELTER] * math.exp(-math.hypot(dx, dy) / c[SHELTER, 0])
-        add_wide(out, weight, math.atan2(dy, dx), _WIDE)
     if s[TAXIS] > 0:
         add_wide(out, s[TAXIS], plan.compass_rad, c[TAXIS, 0])
 
@@ -202,6 +177,9 @@ def lean_further(i, t, past, plan, out):
     s, c, phi = plan.strength[i], plan.constants, past.heading[t, i]
     x, y, zone = past.xy[t, i, 0], past.xy[t, i, 1], past.zone[t, i]
     nearest, away = nearest_of(i, t, past)
+    if s[FLOW] > 0:
+        to_x, to_y, n = company(i, t, past, c[FLOW, 0])
+        tilt(out, s[FLOW] * math.hypot(to_x, to_y) / max(n, 1), math.atan2(to_y, to_x))
     if s[NEAREST_HEADING] > 0 and nearest >= 0:
         weight = s[NEAREST_HEADING] * math.exp(-away / c[NEAREST_HEADING, 0])
         tilt(out, weight, past.heading[t, nearest])
@@ -209,15 +187,10 @@ def lean_further(i, t, past, plan, out):
         tilt(out, s[REGAIN], bearing_rad(i, nearest, t, past))
     if s[HOME] > 0 and zone != 1 and room_of(x, y) == room_of(plan.place[0], plan.place[1]):
         tilt(out, s[HOME], math.atan2(plan.place[1] - y, plan.place[0] - x))
-    if s[NO_REVERSAL] > 0 and zone != 3:
-        thin_out(out, s[NO_REVERSAL], phi, c[NO_REVERSAL, 0], math.pi)
     if s[SIDES] > 0:
         favour_left(out, s[SIDES], phi)
     if s[ALTERNATION] > 0 and t > 0:
         favour_left(out, -s[ALTERNATION] * math.tanh(past.turn[t - 1, i] / _SLIGHT_RAD), phi)
-    if s[ROBOT_SECTOR] > 0 and plan.robot >= 0:
-        share = s[ROBOT_SECTOR] * math.exp(-gap_m(i, plan.robot, t, past) / c[ROBOT_SECTOR, 0])
-        thin_out(out, share, bearing_rad(i, plan.robot, t, past), 0.0, math.pi / 3)
 
 
 @njit(cache=True)

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from hidden import geometry
 from hidden.statistics_of_steps import (
-    WORLD,
     bold_leave,
     centred,
     drifts,
@@ -26,8 +24,6 @@ from hidden.statistics_of_steps import (
     turns_left,
     turns_on,
     turns_to_others,
-    where,
-    wrap,
 )
 
 
@@ -35,14 +31,6 @@ def constant(s, key):
     """Return a form's first constant that the seed drew; a usual one where it is not hidden."""
     usual = {"leader-following/one-leader": 0.3, "burst-and-coast/rhythm": 1.6}
     return next(iter(s.truth["constants"].get(key, {}).values()), usual.get(key))
-
-
-def heads_for_third(s):
-    """Heading for the third-nearest where it is within 25 cm and in view."""
-    third = np.argsort(s.away, axis=2)[..., 2:3]
-    away, bearing = (np.take_along_axis(v, third, axis=2)[..., 0] for v in (s.away, s.bearing))
-    seen = (away < 0.25) & (np.abs(wrap(bearing - s.phi)) < 2.3)
-    return where(seen, np.cos(s.theta - bearing))
 
 
 def heads_for_leader(s):
@@ -68,12 +56,6 @@ def leaves_after_others(s):
         for j in np.flatnonzero(s.enters[t]):
             left[s.room[t, j], j] = t + 1
     return value
-
-
-def circles(s):
-    """Swimming along a wall with the wall on the right."""
-    along = np.array([[geometry.wall_rad(*p, WORLD) for p in row[:4]] for row in s.xy])
-    return where(s.zone != 3, np.cos(s.theta - along))
 
 
 def swings(s):
@@ -108,25 +90,19 @@ FORM_STATISTICS = {
     "alignment/flow": (1, turns_to_others),
     "alignment/nearest": (1, turns_to_others),
     "wall-persistence/recent-sense": (1, goes_on_along_wall),
-    "wall-persistence/no-reversal": (1, goes_on_along_wall),
     "group-cohesion/centroid": (1, heads_for_centroid),
     "group-cohesion/regain": (1, heads_for_nearest(0.2, 0.6)),
     "interaction-range/decay": (-1, heads_for_nearest(0.15, 0.35)),
-    "interaction-range/ranks": (-1, heads_for_third),
     "rear-blind-zone/cardioid": (-1, heads_for_nearest_behind),
-    "rear-blind-zone/cut": (-1, heads_for_nearest_behind),
     "leader-following/fastest": (1, prefers_the_fast),
     "leader-following/one-leader": (1, heads_for_leader),
     "reaction-delay/snapshot": (1, heads_for_the_past),
-    "reaction-delay/smoothed": (1, heads_for_the_past),
     "collective-departure/door": (1, leaves_after_others),
     "collective-departure/quorum": (1, leaves_after_others),
     "place-preference/home": (1, heads_for_place),
-    "place-preference/shelter": (1, heads_for_place),
     "directional-drift/taxis": (1, drifts),
     "directional-drift/bend": (1, drifts),
     "turning-bias/sides": (1, turns_left),
-    "turning-bias/circling": (1, circles),
     "turning-memory/leaky": (1, turns_on),
     "turning-memory/alternation": (-1, turns_on),
     "speed-matching/company": (1, matches_speed),
@@ -146,5 +122,4 @@ FORM_STATISTICS = {
     "boldness/kinds": (1, bold_leave),
     "boldness/centre": (1, bold_are_out),
     "robot-avoidance/flee": (-1, heads_for_robot),
-    "robot-avoidance/sector": (-1, heads_for_robot),
 }

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from hidden.geometry import wrap
 from hidden.states import ANGLE, CELL_RAD, COS, DT_S, N_CELLS, SIN
 
 
@@ -36,16 +34,6 @@ def gap_m(i, j, t, past):
 def bearing_rad(i, j, t, past):
     """Return the direction from one agent to another."""
     return math.atan2(past.xy[t, j, 1] - past.xy[t, i, 1], past.xy[t, j, 0] - past.xy[t, i, 0])
-
-
-@njit(cache=True)
-def n_nearer(i, j, t, past):
-    """Return how many others are nearer to an agent than one of them."""
-    n, reach = 0, gap_m(i, j, t, past)
-    for k in range(past.xy.shape[1]):
-        if k not in (i, j) and gap_m(i, k, t, past) < reach:
-            n += 1
-    return n
 
 
 @njit(cache=True)
@@ -144,15 +132,6 @@ def favour_left(out, share, phi):
 
 
 @njit(cache=True)
-def thin_out(out, share, mode_rad, low_rad, high_rad):
-    """Take a share off the cells whose angle to a direction lies between two angles."""
-    for k in range(N_CELLS):
-        gap = abs(wrap(ANGLE[k] - mode_rad))
-        if low_rad <= gap <= high_rad:
-            out[k] *= max(0.0, 1 - share)
-
-
-@njit(cache=True)
 def mean_speed(i, t, past, reach_m):
     """Return the mean last speed of the others within reach, and how many they are."""
     total, n = 0.0, 0
@@ -166,10 +145,3 @@ def mean_speed(i, t, past, reach_m):
 def cell_of(theta):
     """Return the cell of a heading."""
     return min(N_CELLS - 1, max(0, int((theta + math.pi) / CELL_RAD)))
-
-
-@njit(cache=True)
-def mean_place(j, t, past, n_steps):
-    """Return the mean position of an agent over its last steps, the present one included."""
-    first = max(0, t - n_steps)
-    return np.mean(past.xy[first : t + 1, j, 0]), np.mean(past.xy[first : t + 1, j, 1])
