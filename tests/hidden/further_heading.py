@@ -16,18 +16,13 @@ from hidden.states import (
     ALTERNATION,
     BEND,
     BOLD_CENTRE,
-    BOLD_KINDS,
     CENTROID,
-    DOOR,
     DT_S,
-    FAST_STRAIGHT,
-    FASTEST,
     FLEE_ROBOT,
     FLOW,
     HOME,
     LEAKY_TURN,
     NEAREST_HEADING,
-    NOVEL_TANK,
     ONE_LEADER,
     QUORUM,
     RANGE_DECAY,
@@ -37,8 +32,6 @@ from hidden.states import (
     SIDES,
     SNAPSHOT,
     SUDDEN_HABITUATION,
-    TAXIS,
-    TRIAL_S,
 )
 from hidden.surroundings import (
     add_wide,
@@ -129,29 +122,12 @@ def further_lean(i, t, along, world, past, plan):
 
 
 @njit(cache=True)
-def base_kappa(i, v, kappa, plan):
-    """Return how concentrated the base heading is at a speed."""
-    if plan.strength[i, FAST_STRAIGHT] <= 0:
-        return kappa
-    return kappa * min(10.0, max(0.1, (v / 0.08) ** plan.strength[i, FAST_STRAIGHT]))
-
-
-@njit(cache=True)
 def add_social_modes(i, t, past, plan, out):
-    """Add what further forms draw a fish to, or from: a centroid, the fastest, a robot."""
+    """Add what further forms draw a fish to, or from: a centroid, a robot."""
     s, c = plan.strength[i], plan.constants
     if s[CENTROID] > 0:
         away, bearing = centroid_of(i, t, past)
         add_wide(out, s[CENTROID] * away / (away + c[CENTROID, 0]), bearing, c[CENTROID, 1])
-    if s[FASTEST] > 0 and t > 0:
-        fastest, pace = -1, 0.0
-        for j in range(past.xy.shape[1]):
-            near = j != i and gap_m(i, j, t, past) < c[FASTEST, 0]
-            if near and past.speed[t - 1, j] > pace:
-                fastest, pace = j, past.speed[t - 1, j]
-        if fastest >= 0:
-            bearing = bearing_rad(i, fastest, t, past)
-            add_wide(out, s[FASTEST] * pace / 0.1, bearing, c[FASTEST, 1])
     if s[FLEE_ROBOT] > 0 and plan.robot >= 0:
         near = 1 - gap_m(i, plan.robot, t, past) / c[FLEE_ROBOT, 0]
         away_rad = bearing_rad(i, plan.robot, t, past) + math.pi
@@ -160,15 +136,13 @@ def add_social_modes(i, t, past, plan, out):
 
 @njit(cache=True)
 def add_places(i, t, world, past, plan, out):
-    """Add what further forms draw a fish to in the tank: a door, a compass direction."""
+    """Add the door to which further forms draw a fish."""
     s, c, zone = plan.strength[i], plan.constants, past.zone[t, i]
     x, y = past.xy[t, i, 0], past.xy[t, i, 1]
     if s[QUORUM] > 0 and zone != 1:
         share = n_leavers(i, t, past, c[QUORUM, 0]) / max(past.xy.shape[1] - 1, 1)
         door = world.mouths[room_of(x, y)]
         add_wide(out, s[QUORUM] * share, math.atan2(door[1] - y, door[0] - x), _WIDE)
-    if s[TAXIS] > 0:
-        add_wide(out, s[TAXIS], plan.compass_rad, c[TAXIS, 0])
 
 
 @njit(cache=True)
@@ -194,17 +168,8 @@ def lean_further(i, t, past, plan, out):
 
 
 @njit(cache=True)
-def zone_factor(i, t, zone, to, past, plan):
+def zone_factor(i, to, plan):
     """Return the factor by which further forms change the attraction of a zone."""
-    s, factor = plan.strength[i], 1.0
-    if to == 1 and zone != 1:
-        if s[DOOR] > 0:
-            factor *= 1 + s[DOOR] * n_leavers(i, t, past, plan.constants[DOOR, 0])
-        if s[BOLD_KINDS] > 0:
-            factor *= (1 + s[BOLD_KINDS]) ** np.sign(plan.bold[i])
-    if to == 3:
-        if s[NOVEL_TANK] > 0:
-            factor *= 1 + s[NOVEL_TANK] * clock_s(t, past) / TRIAL_S
-        if s[BOLD_CENTRE] > 0:
-            factor *= math.exp(s[BOLD_CENTRE] * plan.bold[i])
-    return factor
+    if to == 3 and plan.strength[i, BOLD_CENTRE] > 0:
+        return math.exp(plan.strength[i, BOLD_CENTRE] * plan.bold[i])
+    return 1.0

@@ -13,7 +13,6 @@ from numba import njit
 from hidden.further_heading import (
     add_places,
     add_social_modes,
-    base_kappa,
     further_attention,
     further_lean,
     further_offset,
@@ -52,7 +51,7 @@ from hidden.states import (
     WALL_PERSISTENCE,
     WAXING_WALLS,
 )
-from hidden.surroundings import add_mode, company, lean_toward, room_of, scale_of
+from hidden.surroundings import add_mode, company, lean_toward, room_of
 
 
 @njit(cache=True)
@@ -124,16 +123,13 @@ def offset_of(i, t, past, plan):
 
 
 @njit(cache=True)
-def add_base(i, t, v, world, law, past, plan, out):
+def add_base(i, t, world, law, past, plan, out):
     """Add what an agent does by itself: straight on in the centre, along the wall elsewhere."""
     s, zone, phi = plan.strength[i], past.zone[t, i], past.heading[t, i]
     kappa, scale = law.kappa_0[zone], law.scale_0[zone]
     offset = offset_of(i, t, past, plan)
     if plan.further:
         offset += further_offset(i, t, past, plan)
-        kappa = base_kappa(i, v, kappa, plan)
-        if kappa != law.kappa_0[zone]:
-            scale = scale_of(kappa)
     mean_rad, n = 0.0, 0
     if s[ALIGNMENT] > 0:
         c, d, n = company(i, t, past, 0.12)
@@ -215,7 +211,7 @@ def weigh_landing(i, t, v, world, law, past, plan, pull, out):
     liking = np.ones(4)
     if plan.further:
         for to in range(1, 4):
-            liking[to] = zone_factor(i, t, zone, to, past, plan)
+            liking[to] = zone_factor(i, to, plan)
     for k in range(N_CELLS):
         to_x, to_y = x + reach * COS[k], y + reach * SIN[k]
         to = zone if clear else zone_of(to_x, to_y, world)
@@ -234,7 +230,7 @@ def heading_cells(i, t, v, world, law, past, plan, out):
     s = plan.strength[i]
     x, y = past.xy[t, i, 0], past.xy[t, i, 1]
     out[:] = 0.0
-    add_base(i, t, v, world, law, past, plan, out)
+    add_base(i, t, world, law, past, plan, out)
     for j in range(past.xy.shape[1]):
         if j != i:
             add_neighbour(i, j, t, law, past, plan, out)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from hidden.statistics_of_steps import (
-    bold_leave,
     centred,
     drifts,
     follows_late,
@@ -15,11 +14,9 @@ from hidden.statistics_of_steps import (
     heads_for_robot,
     heads_for_the_past,
     matches_speed,
-    prefers_the_fast,
     speeds_up_in_crowds,
     stands,
     swims_as_before,
-    swims_fast_in_turns,
     swims_fast_late,
     turns_left,
     turns_on,
@@ -75,12 +72,6 @@ def creeps(s):
     return (slow[2:] & slow[1:-1] & slow[:-2]).astype(float)
 
 
-def is_out_late(s):
-    """Being in the centre in the second half less that in the first."""
-    out, half = (s.zone == 3).astype(float), len(s.zone) // 2
-    return out[half : 2 * half] - out[:half]
-
-
 def bold_are_out(s):
     """Being in the centre, times the fish's own boldness."""
     return (s.zone == 3) * np.array(s.truth["bold"][:4])
@@ -94,13 +85,10 @@ FORM_STATISTICS = {
     "group-cohesion/regain": (1, heads_for_nearest(0.2, 0.6)),
     "interaction-range/decay": (-1, heads_for_nearest(0.15, 0.35)),
     "rear-blind-zone/cardioid": (-1, heads_for_nearest_behind),
-    "leader-following/fastest": (1, prefers_the_fast),
     "leader-following/one-leader": (1, heads_for_leader),
     "reaction-delay/snapshot": (1, heads_for_the_past),
-    "collective-departure/door": (1, leaves_after_others),
     "collective-departure/quorum": (1, leaves_after_others),
     "place-preference/home": (1, heads_for_place),
-    "directional-drift/taxis": (1, drifts),
     "directional-drift/bend": (1, drifts),
     "turning-bias/sides": (1, turns_left),
     "turning-memory/leaky": (1, turns_on),
@@ -111,15 +99,12 @@ FORM_STATISTICS = {
     "crowding/jostle": (1, speeds_up_in_crowds),
     "burst-and-coast/glide": (1, swims_as_before),
     "burst-and-coast/rhythm": (1, swings),
-    "speed-turn-coupling/fast-straight": (-1, swims_fast_in_turns),
     "speed-turn-coupling/after-turn": (-1, swims_fast_after_turns),
     "freezing/shy": (1, stands),
     "freezing/crawl": (1, creeps),
     "fatigue/sudden": (-1, swims_fast_late),
     "fatigue/uneven": (-1, swims_fast_late),
     "habituation/sudden": (-1, follows_late),
-    "habituation/novel-tank": (1, is_out_late),
-    "boldness/kinds": (1, bold_leave),
     "boldness/centre": (1, bold_are_out),
     "robot-avoidance/flee": (-1, heads_for_robot),
 }
