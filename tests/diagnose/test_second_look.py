@@ -15,10 +15,11 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told
 from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.looks import Found, bound
 from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.second_look import Found, _bound, _noise_nats, _stays, second_look
+from zfcal.diagnose.second_look import _noise_nats, _stays, second_look
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
@@ -316,9 +317,9 @@ def test_a_second_effect_is_named_beside_the_first(question):
     assert all(not each.choice.ties for each in now.steps)
 
 
-def test_noise_seldom_gains_more_than_its_bound():
+def test_noise_seldom_gains_more_than_itsbound():
     """Of three features of which six replicates are known one exceeds it in 2 % of cases."""
     rng = np.random.default_rng(5)
     gains = rng.normal(40.0, 6.0, (4000, 7, 3))
-    beyond = [(case[6] > _bound(case[:6])).any() for case in gains]
+    beyond = [(case[6] > bound(case[:6])).any() for case in gains]
     assert 0.014 < np.mean(beyond) < 0.026

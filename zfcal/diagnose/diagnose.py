@@ -34,6 +34,7 @@ from zfcal.diagnose.findings import (
 )
 from zfcal.diagnose.heats import Sampled, hopeful
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
+from zfcal.diagnose.looks import Found
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.notes import notes_of
 from zfcal.diagnose.null import (
@@ -46,7 +47,7 @@ from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.second_look import Found, second_look
+from zfcal.diagnose.second_look import second_look
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVALS,
@@ -57,6 +58,7 @@ from zfcal.diagnose.selection import (
     Step,
     best_of,
 )
+from zfcal.diagnose.speed_look import speed_look
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.together import together
 from zfcal.diagnose.tracing import trace
@@ -174,9 +176,11 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
 
 
 def _looked_again(case: Case, judged: _Judged) -> _Judged:
-    """Return what stands once features were asked what the law of headings lacks."""
+    """Return what stands once features were asked what the laws of speeds and headings lack."""
     n = len(judged.kept)
-    found = second_look(case, Found(steps=judged.kept, confirmed=judged.confirmed[:n]))
+    before = Found(steps=judged.kept, confirmed=judged.confirmed[:n])
+    paced = speed_look(case, before)
+    found = second_look(case, paced or before) or paced
     if found is None:
         return judged
     return dataclasses.replace(

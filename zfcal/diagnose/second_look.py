@@ -14,53 +14,38 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, further_forms, in_model
+from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
-from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
+from zfcal.diagnose.confirming import Confirmed, confirm
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told, tell
 from zfcal.diagnose.heldout import heading_gains
-from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
+from zfcal.diagnose.looks import (
+    BY_ITSELF,
+    Found,
+    bound,
+    gains_by_itself,
+    in_all_minutes,
+    in_all_phases,
+    in_the_model,
+    on_headings,
+    with_further,
+)
+from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample
 from zfcal.diagnose.null import run_null
-from zfcal.diagnose.pulses import pulses
-from zfcal.diagnose.scores import Score
-from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import (
     GENERIC_SHARE,
     LEAST_SHARE,
-    LEVEL,
     MOST_EFFECTS,
     Best,
     Step,
 )
 from zfcal.model.effects import Effect, find_effect
-
-_BY_ITSELF = 4.0
-"""Standard errors by which features of a name must lead those of all others where no form of ours
-bears it out and something is left."""
-
-_FORMS = 6
-"""Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
-    """Effects that are missing, in the order of adding, and what each gains on held-out steps.
-
-    ``nats`` is what the clearest of them gains by features, whatever its form. ``without_noise``
-    where one explains what noise of positions had seemed to.
-    """
-
-    steps: tuple[Step, ...]
-    confirmed: tuple[Confirmed, ...]
-    nats: float = 0.0
-    without_noise: bool = False
 
 
 def second_look(case: Case, before: Found) -> Found | None:
@@ -78,17 +63,17 @@ def second_look(case: Case, before: Found) -> Found | None:
     """
     given = [each.effect for each in in_model(case.screen.fitted.parameters)]
     known = [effect for effect in given if not effect.on_speed]
-    n = next((k for k, step in enumerate(before.steps) if _on_headings(step)), len(before.steps))
+    n = next((k for k, step in enumerate(before.steps) if on_headings(step)), len(before.steps))
     there = before.steps[n] if n < len(before.steps) else None
     screen = before.steps[n - 1].choice.best.screen if n else case.screen
-    has_later = any(_on_headings(step) for step in before.steps[n + 1 :])
+    has_later = any(on_headings(step) for step in before.steps[n + 1 :])
     looks = _Looks(case=case, screen=screen, beside=tuple(known), has_later=has_later)
     first = _named(looks, there=there)
-    found = before if first is None else _with(before, n, first)
+    found = before if first is None else with_further(before, n, first)
     if first is not None:
         found = _with_speeds(case, found, before, n)
     while True:
-        named = [step for step in found.steps if _on_headings(step)]
+        named = [step for step in found.steps if on_headings(step)]
         if not named or len(named) >= MOST_EFFECTS:
             break
         looks = _Looks(
@@ -104,38 +89,25 @@ def second_look(case: Case, before: Found) -> Found | None:
         further = _named(looks, least=share * most)
         if further is None:
             break
-        found = _with(found, len(found.steps), further)
+        found = with_further(found, len(found.steps), further)
     return None if found is before else found
-
-
-def _on_headings(step: Step) -> bool:
-    return not step.choice.best.candidate.effect.on_speed
 
 
 def _with_speeds(case: Case, found: Found, before: Found, n: int) -> Found:
     """Return what was found with the effects on speed that had been added after step ``n``."""
     for step, confirmed in zip(before.steps[n:], before.confirmed[n:], strict=False):
-        if _on_headings(step):
+        if on_headings(step):
             continue
         screen = found.steps[-1].choice.best.screen
-        made, score = _in_the_model(case, screen, step.choice.best.name)
+        made, score = in_the_model(case, screen, step.choice.best.name)
         again = dataclasses.replace(
             step,
             choice=dataclasses.replace(step.choice, best=made),
             best=dataclasses.replace(step.best, score=score),
             before=screen,
         )
-        found = _with(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
+        found = with_further(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
     return found
-
-
-def _with(found: Found, n: int, further: Found) -> Found:
-    return Found(
-        steps=(*found.steps[:n], *further.steps),
-        confirmed=(*found.confirmed[:n], *further.confirmed),
-        nats=max(found.nats, further.nats),
-        without_noise=found.without_noise or further.without_noise,
-    )
 
 
 def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:
@@ -155,11 +127,11 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
         return None
     if there is not None and _stays(there.choice.best, told, looks.laws[0]):
         return None
-    found, score = _in_the_model(case, screen, told.gain.name)
+    found, score = in_the_model(case, screen, told.gain.name)
     same = None if there is None or there.choice.best.name != found.name else there.choice.best
     if same is not None and (looks.has_later or not found.worth > same.worth):
         return None
-    ties = tuple(_in_the_model(case, screen, gain.name)[0] for gain in told.ties)
+    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
     step = Step(
         choice=Choice(best=found, ties=ties, considered=(found, *ties)),
         best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
@@ -169,8 +141,8 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     if found.values[found.candidate.effect.strength] == 0.0:
         # No form of ours goes that way: it is another effect, which the list does not have.
         return None
-    is_borne_out = _gains(found) and _is_steady(confirmed, found.screen, screen)
-    if not (is_borne_out or told.lead > _BY_ITSELF or looks.explains(told)):
+    is_borne_out = gains_by_itself(found) and _is_steady(confirmed, found.screen, screen)
+    if not (is_borne_out or told.lead > BY_ITSELF or looks.explains(told)):
         return None
     return Found(
         steps=(step,),
@@ -276,15 +248,6 @@ class _Looks:
         return tell(self.gains([effect], [*self.beside, beside]), None) is not None
 
 
-def _gains(form: Refit) -> bool:
-    """Return whether the form that goes into the model gains more than chance by itself.
-
-    What is no effect of the list answers to features of several names a little, and to none of
-    their forms. On held-out steps a form is not asked: that would halve the power.
-    """
-    return bool(chdtrc(form.n_free, 2 * max(float(form.gain.sum()), 0.0)) < LEVEL)
-
-
 def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:
     """Return whether an effect is there in all minutes, and not in pulses at regular times.
 
@@ -294,23 +257,9 @@ def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:
     """
     gains, scene = heading_gains(model, base), base.scene
     at, apart = gains.gain.at, gains.gain.values - gains.expected.values
-    minute = (scene.time_s(scene.turns) // MINUTES_S).astype(np.int64)
-    if not (confirmed.in_all_minutes or _alike(apart, minute - minute.min())):
+    if not (confirmed.in_all_minutes or in_all_minutes(apart, at, scene)):
         return False
-    series = np.bincount(at, apart, len(scene.k)).astype(np.float64)
-    found = pulses(series[None], scene.dt_s)
-    if not confirmed.pulsed or not found.tail <= WAVERS:
-        return True
-    phase = (at * scene.dt_s / found.period_s % 1 * PHASES).astype(np.int64)
-    return _alike(apart, phase)
-
-
-def _alike(apart: Floats, part: NDArray[np.int64]) -> bool:
-    """Return whether steps have mean zero in all parts of a recording, by a chi-square."""
-    sums, squares = np.bincount(part, apart), np.bincount(part, apart**2)
-    told = squares > 0
-    ratio = float((sums[told] ** 2 / squares[told]).sum())
-    return bool(chdtrc(int(told.sum()), ratio) > WAVERS)
+    return not confirmed.pulsed or in_all_phases(apart, at, scene)
 
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
@@ -349,30 +298,4 @@ def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()
 
     n_workers = case.question.n_workers
     rows = np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))
-    return list(_bound(rows))
-
-
-def _bound(rows: Floats) -> Floats:
-    """Return what one more row, shape (row, feature), exceeds anywhere in 2 % of cases."""
-    n, n_features = rows.shape
-    times = stdtrit(n - 1, 1 - LEVEL / n_features) * np.sqrt(1 + 1 / n)
-    return np.maximum(rows.mean(axis=0) + times * rows.std(axis=0, ddof=1), 0.0)
-
-
-def _in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
-    """Return an effect in the model in that form which gains most, and its score there."""
-    own = [each for each in (*case.listed, *case.generic) if each.name == name]
-    own += further_forms(find_effect(name), case.scene)
-    scores = ask_all(screen, own, case.question.n_workers)
-    forms: dict[tuple[float, ...], Score] = {}
-    for score in sorted(scores, key=lambda each: -abs(each.z)):
-        forms.setdefault(_form(score.candidate), score)
-    tried = list(forms.values())[:_FORMS]
-    made = [refit(screen, score, n_workers=case.question.n_workers) for score in tried]
-    k = int(np.argmax([each.worth for each in made]))
-    return made[k], tried[k]
-
-
-def _form(candidate: Candidate) -> tuple[float, ...]:
-    """Return the shapes of a candidate that a fit leaves as they are."""
-    return tuple(candidate.shape[key] for key in candidate.effect.fixed if key in candidate.shape)
+    return list(bound(rows))

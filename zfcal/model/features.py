@@ -181,7 +181,7 @@ class Turned:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Leaving:
-    """A factor on steps that end between the rooms.
+    """A factor on steps that end in another zone: between the rooms, or away from the walls.
 
     Parameters
     ----------
@@ -189,10 +189,14 @@ class Leaving:
         Tells it from other features of the effect.
     weights
         Shape (step, weight): the log of the factor at a strength of one.
+    into
+        ``between`` the rooms, which counts for steps that begin in a room; or into the ``open``,
+        the last zone that does not follow walls, which counts for all steps.
     """
 
     label: str
     weights: Weights
+    into: Literal["between", "open"] = "between"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -189,8 +189,9 @@ def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
     law = Law(scene=scene, fitted=fitted, noise_m=5e-4, n_draws=2)
     rng = np.random.default_rng(2)
     leaning, leaving = rng.normal(0, 0.1, (len(law.rows), 2)), rng.normal(0, 0.1, len(law.rows))
-    once = law.absorbing(leaning=leaning, leaving=leaving)
-    twice = law.absorbing(leaning=leaning / 2).absorbing(leaning=leaning / 2, leaving=leaving)
+    once = law.absorbing(leaning=leaning, leaving=(law.between, leaving))
+    half = law.absorbing(leaning=leaning / 2)
+    twice = half.absorbing(leaning=leaning / 2, leaving=(law.between, leaving))
     assert twice.draws is law.draws
     np.testing.assert_allclose(once.cells, twice.cells)
     np.testing.assert_allclose(once.log_here, twice.log_here)

@@ -216,3 +216,42 @@ def test_nobody_of_unknown_speed_is_the_fastest(ask):
     """One that has just come into sight has none yet."""
     asked = ask("leader-following", {"strength": 1.0, "fastest": 1.0}, SPEED=[0.1, math.nan, 0.06])
     assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
+
+
+def test_some_headings_can_be_drawn_to_the_fastest_within_reach(ask):
+    """The one at 0.2 m is faster still and too far: 0.1 about the bearing of that at 0.1 m."""
+    rows = {"X": [0.0, 0.1, 0.0, 0.2], "Y": [0.0, 0.0, 0.05, 0.0], "SPEED": [0.3, 0.1, 0.05, 0.2]}
+    given = {"strength": 1.0, "drawn": 1.0, "reach_m": 0.15, "kappa": 6.0}
+    asked = ask("leader-following", given, **rows)
+    weight, (x, y, kappa) = asked.component()
+    assert (weight, x, y, kappa) == pytest.approx((0.1, 1.0, 0.0, 6.0))
+    assert asked.sight_of(1) == 1.0
+    asked = ask("leader-following", {**given, "reach_m": 0.02}, **rows)
+    assert asked.component()[0] == 0.0
+
+
+def test_some_headings_can_be_drawn_to_one_fish(ask):
+    """Whatever its speed; nobody is drawn to oneself."""
+    rows = {"X": [0.0, 0.1, 0.0], "Y": [0.0, 0.0, 0.05], "SPEED": [0.3, 0.1, 0.05]}
+    asked = ask("leader-following", {"strength": 1.5, "drawn": 1.0, "who": 2.0}, **rows)
+    weight, (x, y, _) = asked.component()
+    assert (weight, x, y) == pytest.approx((0.15, 0.0, 1.0))
+    asked = ask("leader-following", {"strength": 1.5, "drawn": 1.0, "who": 0.0}, **rows)
+    assert asked.component()[0] == 0.0
+
+
+def test_all_headings_can_lean_toward_that_of_the_nearest(density):
+    """By 0.03 nats per weight: the density times exp(0.6 cos(heading - 1))."""
+    theta, alone = density({})
+    _, found = density({"alignment": {"weight": 20.0, "leaning": 1.0, "among": 1.0}})
+    expected = alone * np.exp(0.6 * np.cos(theta - 1.0))
+    np.testing.assert_allclose(found, expected / (expected.mean() / found.mean()), rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["burst-and-coast", "speed-matching"])
+def test_speeds_can_go_by_a_speed_evenly(ask, name):
+    """0.05 m/s above the usual speed: e^0.4; a power of it would be (12 / 7)^0.4."""
+    rows = {"X": [0.0, 0.1], "SPEED": [0.12, 0.12]}
+    even = ask(name, {"exponent": 0.4, "evenly": 1.0}, **rows)
+    assert even.speed() == pytest.approx(math.exp(0.4))
+    assert ask(name, {"exponent": 0.4}, **rows).speed() == pytest.approx((12 / 7) ** 0.4)

@@ -52,13 +52,12 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     fits = replace(fits_beside(law, beside), beyond=beyond)
     law = fits.law
     fits.prepare()
-    has_rooms = law.between > 0
     asked = [
         (effect.name, feature)
         for effect in effects
         for feature in effect.features(law.scene.arena)
         if (kinds is None or (effect.name, kind_of(feature)) in kinds)
-        and (has_rooms or not isinstance(feature, Leaving))
+        and (not isinstance(feature, Leaving) or law.zone_into(feature.into))
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
@@ -104,7 +103,7 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
             for each in chosen:
                 if isinstance(each, Component | Turned):
                     also.append(_either_way(each))
-                elif isinstance(each, Tilt) or law.between:
+                elif isinstance(each, Tilt) or law.zone_into(each.into):
                     law = _absorbed(law, each)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
@@ -133,7 +132,7 @@ def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
         return law
     if isinstance(feature, Tilt):
         return law.absorbing(leaning=there)
-    return law.absorbing(leaving=there)
+    return law.absorbing(leaving=(law.zone_into(feature.into), there))
 
 
 def kind_of(feature: Feature) -> str:

@@ -291,18 +291,18 @@ class Fits:
         return _log_mixed(at, x[-1])
 
     def leaving(self, feature: Leaving) -> tuple[Floats, Floats, int]:
-        """Return what a factor on landing between the rooms adds, beside one for each zone.
+        """Return what a factor on landing in a zone adds, beside one for each zone left.
 
         Returns
         -------
         gain, log_factor : ndarray, shape (step,)
         n_strengths : int
         """
-        law, between = self.law, self.law.between
-        inside = (law.cells * law.between_share).sum(axis=1) / law.cells.sum(axis=1)
-        landed = (law.turns.landing == between).astype(np.float64)
+        law, into = self.law, self.law.zone_into(feature.into)
+        inside = (law.cells * law.share_of(into)).sum(axis=1) / law.cells.sum(axis=1)
+        landed = (law.turns.landing == into).astype(np.float64)
         base = np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1)
-        may = (law.turns.zone != between) & (inside > 0)
+        may = (law.turns.zone != law.between) & (inside > 0)
         zones = np.unique(law.turns.zone[may])
         each = (law.turns.zone[:, None] == zones).astype(np.float64)
         weights = feature.weights(law.draws[0].seen)

@@ -62,8 +62,8 @@ class Law:
         One of so many steps counts.
     leaning : ndarray, shape (step, 2), optional
         A factor exp(leaning . heading) on the density, beside what the model has.
-    leaving : ndarray, shape (step,), optional
-        Log of a factor on landing between the rooms, likewise.
+    leaving
+        Zones, and the log of a factor on landing there, shape (step,), likewise.
     """
 
     scene: Scene
@@ -73,9 +73,11 @@ class Law:
     n_draws: int = DRAWS
     every: int = 1
     leaning: Floats | None = None
-    leaving: Floats | None = None
+    leaving: tuple[tuple[int, Floats], ...] = ()
 
-    def absorbing(self, leaning: Floats | None = None, leaving: Floats | None = None) -> Law:
+    def absorbing(
+        self, leaning: Floats | None = None, leaving: tuple[int, Floats] | None = None
+    ) -> Law:
         """Return the law with a further factor of either sort.
 
         What was seen is taken along: it is the same, and takes long to draw.
@@ -83,7 +85,7 @@ class Law:
         made = replace(
             self,
             leaning=_sum(self.leaning, leaning),
-            leaving=_sum(self.leaving, leaving),
+            leaving=self.leaving if leaving is None else (*self.leaving, leaving),
         )
         made.__dict__.update(turns=self.turns, draws=self.draws, _weights=self._weights)
         return made
@@ -139,8 +141,8 @@ class Law:
     def _gamma(self) -> Floats:
         """Attraction of each zone to who is where a step begins, shape (step, zone)."""
         made = np.exp(self._x[:, 3:-1])
-        if self.leaving is not None:
-            made[:, self.between - 1] *= np.exp(self.leaving)
+        for zone, log_factor in self.leaving:
+            made[:, zone - 1] *= np.exp(log_factor)
         return made
 
     @cached_property
@@ -148,11 +150,18 @@ class Law:
         """Id of the zone between the rooms; 0 without rooms."""
         return find_rooms(self.scene.arena)[0]
 
-    @cached_property
-    def between_share(self) -> Floats:
-        """Share of each cell's attraction that is of landing between the rooms."""
+    def zone_into(self, into: str) -> int:
+        """Return the id of a zone that fish may leave into, as `Leaving` has it; 0 without one."""
+        if into == "between":
+            return self.between
+        zones = self.scene.arena.zones
+        open_ = [k for k, zone in enumerate(zones, start=1) if not zone.follows_walls]
+        return open_[-1] if open_ and open_[-1] != self.between else 0
+
+    def share_of(self, zone: int) -> Floats:
+        """Share of each cell's attraction that is of landing in a zone, shape (step, cell)."""
         share = self.turns.share * self._gamma[:, None]
-        return np.asarray(share[:, :, self.between - 1] / np.maximum(share.sum(axis=2), 1e-300))
+        return np.asarray(share[:, :, zone - 1] / np.maximum(share.sum(axis=2), 1e-300))
 
     @cached_property
     def log_here(self) -> Floats:

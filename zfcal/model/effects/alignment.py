@@ -78,12 +78,20 @@ def near_heading(state: Hooked, n: int, i: int) -> tuple[float, float, float]:
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the mean heading of all that are near; the sense along a wall too."""
+    """Weigh headings by the mean heading of all that are near; the sense along a wall too.
+
+    Or by the heading of the nearest.
+    """
     leaning = _PER_WEIGHT * parameters[3]
     if parameters[4] > 0.0 and state[FOLLOWS * n + i] > 0.0:
         leaning = _WAY_PER_WEIGHT * parameters[4]
     if not leaning > 0.0:
         return 1.0
+    if parameters[5] > 0.0:
+        k = nearest_agent(state, n, i)
+        if k < 0:
+            return 1.0
+        return tilt(leaning * parameters[0], state[HX * n + k] * ux + state[HY * n + k] * uy, 1.0)
     x, y, near = near_heading(state, n, i)
     if not near > 0.0:
         return 1.0
@@ -210,7 +218,8 @@ EFFECT = Effect(
             high=2.0,
             default=0.0,
             says="0: the mean heading of those that are seen; 1: the heading of the nearest, seen "
-            "or not, as one of 0.01 sr; 2: a component about the heading of each that is seen.",
+            "or not, as one of 0.01 sr, or leaned toward; 2: a component about the heading of each "
+            "that is seen.",
         ),
     ),
     strength="weight",
@@ -228,10 +237,13 @@ EFFECT = Effect(
         {"turning": 1.0},
     ),
     each="among",
-    further_shapes=lambda _arena: tuple(
-        {"kappa": kappa, **form}
-        for kappa in (3.0, 8.0)
-        for form in ({"among": 1.0}, {"among": 2.0}, {"among": 2.0, "grading": 0.0})
+    further_shapes=lambda _arena: (
+        *(
+            {"kappa": kappa, **form}
+            for kappa in (3.0, 8.0)
+            for form in ({"among": 1.0}, {"among": 2.0}, {"among": 2.0, "grading": 0.0})
+        ),
+        {"leaning": 1.0, "among": 1.0},
     ),
     lacks=needs_neighbour,
     fixed=("grading", "leaning", "turning", "among"),

@@ -39,6 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
+from zfcal.model.paces import Kept, Pace
 
 MAX_PARAMETERS = 8
 
@@ -215,6 +216,8 @@ class Effect:
     features
         Of an arena: what its name means for headings, whatever its form; none for an effect on
         speed.
+    paces
+        What its name means for speeds, whatever its form.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     needs
@@ -252,6 +255,7 @@ class Effect:
     looks_like: Likeness | None = None
     control: Control | None = None
     features: Callable[[Arena], tuple[Feature, ...]] = _no_features
+    paces: tuple[Pace | Kept, ...] = ()
     fixed: tuple[str, ...] = ()
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 

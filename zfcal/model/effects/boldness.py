@@ -54,6 +54,7 @@ def _leaning(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Leaving(label="who", weights=_who),
+    Leaving(label="who, into the open", weights=_who, into="open"),
     Tilt(label="leaning to the way out", vectors=_leaning),
 )
 

@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import SPEED_M_S, log_speed, times_faster
+from zfcal.model.effects.forms import SPEED_M_S, log_speed, quickness, times_faster
+from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
+from zfcal.model.paces import Kept, Pace, Swum
 
 
 @hook(SPEED_HOOK)
 def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Return a power of the own last speed, over the usual speed."""
-    return times_faster(parameters[0] * log_speed(state[SPEED * n + i], parameters[1]))
+    last = state[SPEED * n + i]
+    if parameters[2] > 0.0:
+        return times_faster(parameters[0] * quickness(last + SPEED_M_S - parameters[1]))
+    return times_faster(parameters[0] * log_speed(last, parameters[1]))
+
+
+_KNOTS = (-1.5, -0.5, 0.5, 1.5)
+
+
+def _last(swum: Swum) -> Floats:
+    return hats(swum.last, _KNOTS)[:, 1:] * (swum.last != 0.0)[:, None]
+
+
+def _some_ago(swum: Swum) -> Floats:
+    return np.stack([swum.last, swum.before_last, swum.third], axis=1)
 
 
 EFFECT = Effect(
@@ -35,11 +54,24 @@ EFFECT = Effect(
             default=SPEED_M_S,
             says="Last speed at which the next is as the base model has it, in m/s.",
         ),
+        EffectParameter(
+            name="evenly",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: a power of that speed; 1: an exponential of it, per 0.05 m/s.",
+        ),
     ),
     strength="exponent",
     probe=0.01,
     speed=speed,
-    fixed=("usual_m_s",),
+    further_shapes=lambda _arena: ({"evenly": 1.0},),
+    fixed=("usual_m_s", "evenly"),
     shown_against="speed",
     other_forms=("generic:speed:own-speed",),
+    paces=(
+        Pace(label="by the last speed", weights=_last),
+        Pace(label="by the last three speeds", weights=_some_ago),
+        Kept(label="kept", ratios=(0.6, 0.7, 0.8, 0.9, 1.0, 1.1)),
+    ),
 )

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
+from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import ZONE
+from zfcal.model.paces import Pace, Swum
 
 
 @hook(SPEED_HOOK)
@@ -17,6 +22,19 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
         if j != i and state[ZONE * n + j] > 0.0:
             near += 1.0 - beyond(apart(state, n, i, j), parameters[1])
     return times_faster(parameters[0] * (near - parameters[2]))
+
+
+_KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
+
+
+def _number(swum: Swum) -> Floats:
+    """Return how many others there are, by distance."""
+    weights = hats(swum.distance_m, _KNOTS_M) * swum.here[..., None]
+    return np.asarray(weights.sum(axis=1)[:, :-1])
+
+
+def _nearest(swum: Swum) -> Floats:
+    return hats(swum.distance_m.min(axis=1, initial=_KNOTS_M[-1]), _KNOTS_M)[:, :-1]
 
 
 EFFECT = Effect(
@@ -54,4 +72,5 @@ EFFECT = Effect(
     shapes=lambda _arena: tuple({"radius_m": radius} for radius in (0.05, 0.08, 0.12, 0.2, 0.35)),
     lacks=needs_neighbour,
     fixed=("usual",),
+    paces=(Pace(label="number", weights=_number), Pace(label="the nearest", weights=_nearest)),
 )

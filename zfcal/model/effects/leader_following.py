@@ -8,16 +8,57 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import needs_neighbour, quickness
-from zfcal.model.features import Feature, Seen, factor_on_attention, hats
-from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.state import SPEED
+from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
+from zfcal.model.features import (
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Weights,
+    factor_on_attention,
+    hats,
+)
+from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hooks import COMPONENT, SIGHT
+from zfcal.model.kernels.state import SPEED, ZONE, X, Y
+
+_PER_STRENGTH = 0.1
+
+
+@inlined
+def fastest_within(state: Hooked, n: int, i: int, reach_m: float) -> int:
+    """Return the fastest other agent within reach, seen or not; -1 without one of known speed."""
+    found, most = -1, -1.0
+    for j in range(n):
+        is_near = j != i and state[ZONE * n + j] > 0.0 and apart(state, n, i, j) < reach_m
+        if is_near and state[SPEED * n + j] > most:
+            found, most = j, state[SPEED * n + j]
+    return found
+
+
+@hook(COMPONENT)
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Add a component about the bearing of the fastest within reach, or of a certain agent."""
+    if not parameters[3] > 0.0:
+        return 0.0
+    k = int(parameters[2])
+    if k < 0:
+        k = fastest_within(state, n, i, parameters[4])
+    if k < 0 or k >= n or k == i or not state[ZONE * n + k] > 0.0:
+        return 0.0
+    far_m = max(apart(state, n, i, k), 1e-9)
+    out[0] = (state[X * n + k] - state[X * n + i]) / far_m
+    out[1] = (state[Y * n + k] - state[Y * n + i]) / far_m
+    out[2] = parameters[5]
+    return _PER_STRENGTH * max(parameters[0], 0.0)
 
 
 @hook(SIGHT)
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
     """Weigh a neighbour by how much faster than 0.07 m/s it swims, or one of them alone."""
+    if parameters[3] > 0.0:
+        return 1.0
     if parameters[2] >= 0.0:
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
@@ -59,11 +100,55 @@ def _who(seen: Seen) -> Floats:
     return np.asarray((seen.other[..., None] == fish[1:]) & ~seen.is_robot[..., None], float)
 
 
+def _each(seen: Seen) -> Floats:
+    """Return one for each fish, shape (step, other, fish)."""
+    fish = np.unique(np.where(seen.is_robot, -1, seen.other))
+    fish = fish[fish >= 0]
+    if len(fish) > _MOST_FISH:
+        return np.zeros((*seen.other.shape, 0))
+    return np.asarray((seen.other[..., None] == fish) & ~seen.is_robot[..., None], float)
+
+
+def _within(reach_m: float) -> Weights:
+    """Return one for the fastest other one within reach, seen or not."""
+
+    def weights(seen: Seen) -> Floats:
+        near = seen.here & (seen.distance_m < reach_m) & (seen.speed_m_s >= 0)
+        quick = np.where(near, seen.speed_m_s, -1.0)
+        chosen = quick.argmax(axis=1)[:, None] == np.arange(near.shape[1])
+        return np.asarray((chosen & near)[..., None], float)
+
+    return weights
+
+
+def _leaning_within(reach_m: float) -> Weights:
+    return lambda seen: np.einsum("sjb,sjd->sbd", _within(reach_m)(seen), seen.bearing)
+
+
+_DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
+_REACH_M = (0.1, 0.2, 9.0)
+
 _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention),
     factor_on_attention(_fastest, label="the fastest in view"),
     factor_on_attention(_who, label="who"),
-)
+    OneOf(
+        kind=_DRAWN,
+        features=tuple(
+            Component(label=f"{_DRAWN}, {reach_m:g} m", toward="bearing", weights=_within(reach_m),
+                      kappa=5.0)
+            for reach_m in _REACH_M
+        ),
+    ),
+    OneOf(
+        kind=_LEANING,
+        features=tuple(
+            Tilt(label=f"{_LEANING}, {reach_m:g} m", vectors=_leaning_within(reach_m), low=0.0)
+            for reach_m in _REACH_M
+        ),
+    ),
+    Component(label="drawn to one", toward="bearing", weights=_each, kappa=5.0),
+)  # fmt: skip
 
 
 EFFECT = Effect(
@@ -95,14 +180,40 @@ EFFECT = Effect(
             says="Number of the agent that gets all of it, whatever its speed, the first one 0; "
             "-1: nobody in particular.",
         ),
+        EffectParameter(
+            name="drawn",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: nobody gets more attention, and some headings are drawn about the bearing of "
+            "the fastest, or of the agent `who`, as a component of the weight 0.1 per strength.",
+        ),
+        EffectParameter(
+            name="reach_m",
+            low=0.02,
+            high=2.0,
+            default=0.2,
+            says="Distance within which that one is the fastest, in metres.",
+        ),
+        EffectParameter(
+            name="kappa",
+            low=0.0,
+            high=30.0,
+            default=5.0,
+            says="Von Mises concentration about that bearing.",
+        ),
     ),
     probe=0.01,
+    component=component,
     sight=sight,
     further_shapes=lambda _arena: (
         {"fastest": 1.0},
         *({"who": float(who)} for who in range(_MOST_LED)),
+        *({"drawn": 1.0, "reach_m": reach_m} for reach_m in (0.1, 0.15, 0.2, 2.0)),
+        *({"drawn": 1.0, "who": float(who)} for who in range(_MOST_LED)),
     ),
-    fixed=("fastest", "who"),
+    fixed=("fastest", "who", "drawn", "reach_m"),
+    needs={"component": ("drawn",)},
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,
 )

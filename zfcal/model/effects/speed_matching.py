@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import SPEED_M_S, apart, log_speed, needs_neighbour, times_faster
+from zfcal.model.effects.forms import (
+    SPEED_M_S,
+    apart,
+    log_speed,
+    needs_neighbour,
+    quickness,
+    times_faster,
+)
+from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
+from zfcal.model.paces import Pace, Swum
 
 _LEAST_M = 0.01
 
@@ -22,7 +34,25 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
             whole += weight
     if not whole > 0.0:
         return 1.0
+    if parameters[3] > 0.0:
+        return times_faster(parameters[0] * quickness(total / whole + SPEED_M_S - parameters[2]))
     return times_faster(parameters[0] * log_speed(total / whole, parameters[2]))
+
+
+_KNOTS_M = (0.0, 0.1, 0.2, 0.4)
+
+
+def _near(swum: Swum) -> Floats:
+    """Return the sums of the others' last speeds, by distance."""
+    weights = hats(swum.distance_m, _KNOTS_M) * swum.here[..., None]
+    return np.asarray(np.einsum("sj,sjb->sb", swum.others, weights))
+
+
+def _nearest(swum: Swum) -> Floats:
+    """Return the last speed of the nearest, by its distance."""
+    rows, nearest = np.arange(len(swum.here)), swum.distance_m.argmin(axis=1)
+    pace = swum.others[rows, nearest] * swum.here[rows, nearest]
+    return np.asarray(pace[:, None] * hats(swum.distance_m[rows, nearest], _KNOTS_M))
 
 
 EFFECT = Effect(
@@ -52,12 +82,24 @@ EFFECT = Effect(
             default=SPEED_M_S,
             says="Neighbours' speed at which a fish swims as it would alone, in m/s.",
         ),
+        EffectParameter(
+            name="evenly",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: a power of that speed; 1: an exponential of it, per 0.05 m/s.",
+        ),
     ),
     strength="exponent",
     probe=0.01,
     speed=speed,
     shapes=lambda _arena: ({"focus": 0.0}, {"focus": 4.0}),
     lacks=needs_neighbour,
-    fixed=("focus", "usual_m_s"),
+    further_shapes=lambda _arena: tuple({"focus": focus, "evenly": 1.0} for focus in (0.0, 4.0)),
+    fixed=("focus", "usual_m_s", "evenly"),
     other_forms=("generic:speed:neighbour-speed",),
+    paces=(
+        Pace(label="of those near", weights=_near),
+        Pace(label="of the nearest", weights=_nearest),
+    ),
 )

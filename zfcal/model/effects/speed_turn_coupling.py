@@ -15,6 +15,7 @@ from zfcal.model.features import Feature, Seen, Tilt, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY
+from zfcal.model.paces import Pace, Swum
 
 
 @hook(FACTOR)
@@ -33,6 +34,17 @@ def _by_speed(seen: Seen) -> Floats:
     weights = hats(seen.own_speed_m_s, _KNOTS_M_S)
     weights = (weights - weights.mean(axis=0))[:, 1:]
     return np.asarray(weights[..., None] * seen.own_heading[:, None])
+
+
+_KNOTS_RAD = (0.0, 0.5, 1.0, 2.0, 3.2)
+
+
+def _by_turn(swum: Swum) -> Floats:
+    return hats(swum.turn_rad, _KNOTS_RAD)[:, 1:]
+
+
+def _by_last_turn(swum: Swum) -> Floats:
+    return hats(swum.last_turn_rad, _KNOTS_RAD)[:, 1:]
 
 
 _FEATURES: tuple[Feature, ...] = (Tilt(label="by speed", vectors=_by_speed),)
@@ -67,4 +79,8 @@ EFFECT = Effect(
     shown_against="speed",
     other_forms=("generic:speed:own-turn",),
     features=lambda _arena: _FEATURES,
+    paces=(
+        Pace(label="by the turn", weights=_by_turn),
+        Pace(label="by the last turn", weights=_by_last_turn),
+    ),
 )

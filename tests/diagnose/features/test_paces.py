@@ -1,0 +1,179 @@
+"""What features of speeds gain: nothing where nothing is missing, most of what is in any form."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.features.naming import best_by_name, tell
+from zfcal.diagnose.features.paces import Paces, pace_gains
+from zfcal.diagnose.looks import in_all_minutes
+from zfcal.diagnose.screening import Screen
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.kernels.state import SPEED
+
+ALL = tuple(all_effects())
+
+
+@pytest.fixture(scope="module")
+def nothing(base):
+    """Return fits to ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Paces(screen=Screen(scene=scene, fitted=fitted))
+
+
+@pytest.fixture(scope="module")
+def changed(nothing):
+    """Return what makes fits to the same fish with other speeds; all else stays as it was."""
+
+    def make(factor):
+        scene = nothing.scene
+        moves = dataclasses.replace(scene.moves, speed_m_s=scene.moves.speed_m_s * factor)
+        other = dataclasses.replace(scene, moves=moves)
+        return Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted))
+
+    return make
+
+
+def test_nothing_is_gained_where_nothing_is_missing(nothing):
+    """No name is told; all names that act on speeds in company are asked."""
+    found = pace_gains(nothing, ALL)
+    assert tell(found) is None
+    assert {each.name for each in found} == {each.name for each in ALL if each.paces}
+    assert -15 < best_by_name(found)[0].nats < 5
+
+
+def test_scores_are_standard_normal_in_each_field(nothing):
+    """Their mean is zero in each field and for each fish, their variance one."""
+    assert nothing.scores.std() == pytest.approx(1.0)
+    for group in (nothing.screen.fields[nothing.rows], nothing.turns.track):
+        sums = np.bincount(group, nothing.scores)
+        assert np.abs(sums).max() < 1e-6
+    assert np.abs(np.quantile(nothing.scores, [0.16, 0.5, 0.84]) - [-1, 0, 1]).max() < 0.1
+
+
+def by_last_turn(paces):
+    """Slower by a tenth after wide turns."""
+    return np.where(paces.swum.last_turn_rad > 0.8, 0.85, 1.0)
+
+
+def by_the_nearest(paces):
+    """Faster after a fast nearest one."""
+    swum = paces.swum
+    nearest = np.take_along_axis(swum.others, swum.distance_m.argmin(axis=1)[:, None], 1)[:, 0]
+    return np.exp(0.08 * nearest)
+
+
+def by_company(paces):
+    """Faster with two others within 9 cm."""
+    return np.where((paces.swum.distance_m < 0.09).sum(axis=1) >= 2, 1.25, 1.0)
+
+
+def of_one_fish(paces):
+    """One fish gets slower for the rest of the recording."""
+    swum = paces.swum
+    return np.where((swum.track == swum.track.min()) & (swum.time > 0.55), 0.75, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        ("speed-turn-coupling", by_last_turn),
+        ("speed-matching", by_the_nearest),
+        ("crowding", by_company),
+        ("fatigue", of_one_fish),
+    ],
+)
+def test_a_form_that_nobody_knows_is_told(nothing, changed, name, factor):
+    """Speeds are multiplied by something known before the step: its name leads."""
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = factor(nothing)
+    told = tell(pace_gains(changed(times), ALL))
+    assert told.gain.name == name
+    assert told.ties == ()
+    assert told.gain.nats > 15
+
+
+def scores_by_last(nothing, rule):
+    """Return fits to speeds that are the same ones, put in another order by a rule."""
+    scene = nothing.scene
+    moves, states = scene.moves, scene.states.copy()
+    speed, rng = moves.speed_m_s.copy(), np.random.default_rng(3)
+    for track in np.unique(moves.track):
+        mine = np.flatnonzero(moves.track == track)
+        speed[mine] = rule(speed[mine], rng)
+        states[moves.at[mine] + 1, SPEED, moves.who[mine]] = speed[mine]
+    other = dataclasses.replace(
+        scene, states=states, moves=dataclasses.replace(moves, speed_m_s=speed)
+    )
+    return Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted))
+
+
+def rhythm(speed, _rng):
+    """Fast, slow, slow: each third step is faster by a third."""
+    return speed * np.where(np.arange(len(speed)) % 3 == 0, 1.3, 0.95)
+
+
+def coasting(speed, rng):
+    """One step in twelve keeps 0.83 of the last speed."""
+    made = speed.copy()
+    for k in range(1, len(made)):
+        if rng.random() < 0.08:
+            made[k] = 0.83 * made[k - 1]
+    return made
+
+
+@pytest.mark.parametrize(
+    ("rule", "label"), [(rhythm, "by the last three speeds"), (coasting, "kept")]
+)
+def test_bursts_are_told_by_the_own_last_speeds(nothing, rule, label):
+    """Whether a speed is kept for a step or swings."""
+    told = tell(pace_gains(scores_by_last(nothing, rule), ALL))
+    assert (told.gain.name, told.gain.label) == ("burst-and-coast", label)
+    assert told.gain.nats > 15
+
+
+def test_what_one_room_does_to_speeds_is_no_effect(nothing, changed):
+    """A lamp over one room makes fish fast there: fields have means of their own."""
+    scene = nothing.scene
+    xy = scene.states[scene.moves.at, :2, scene.moves.who]
+    assert tell(pace_gains(changed(np.where(xy[:, 0] > xy[:, 1], 1.2, 1.0)), ALL)) is None
+
+
+def test_nor_what_one_fish_does_all_the_time(nothing, changed):
+    """Some fish are faster than others: each has a mean of its own."""
+    fast = nothing.scene.moves.track == nothing.scene.moves.track.min()
+    assert tell(pace_gains(changed(np.where(fast, 1.2, 1.0)), ALL)) is None
+
+
+def test_beside_an_effect_its_own_features_gain_nothing(nothing, changed):
+    """What another name gains by them is gone as well."""
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = by_last_turn(nothing)
+    there = changed(times).and_beside(find_effect("speed-turn-coupling"))
+    assert tell(pace_gains(there, ALL)) is None
+
+
+def test_what_comes_and_goes_is_not_there_in_all_minutes(nothing, changed):
+    """Two of ten minutes have it: gains are told, and differ between minutes."""
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = by_the_nearest(nothing) ** 2
+    always = changed(times)
+    seldom = np.where(nothing.scene.time_s(nothing.scene.moves) % 600 < 120, times**2, 1.0)
+    sometimes = changed(seldom)
+    for paces, steady in ((always, True), (sometimes, False)):
+        told = tell(pace_gains(paces, ALL))
+        assert told.gain.name == "speed-matching"
+        apart = paces.apart(told.gain)
+        assert abs(apart.sum()) < 0.01 * np.abs(apart).sum()
+        assert in_all_minutes(apart, paces.turns.at, paces.scene) is steady
+
+
+def test_who_is_known_for_a_short_time_has_no_past(nothing):
+    """In the first steps of a track there is no last speed, and none two or three steps ago."""
+    swum, turns = nothing.swum, nothing.turns
+    first = turns.at == 0
+    assert (swum.last[first] == 0).all()
+    for ago, values in enumerate((swum.last, swum.before_last, swum.third), start=1):
+        assert (values[turns.at < ago] == 0).all()
+        assert (values[turns.at > 50] != 0).mean() > 0.7

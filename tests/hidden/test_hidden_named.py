@@ -1,0 +1,78 @@
+"""A look at speeds by features: names forms that are not ours, and nothing where nothing is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hidden.scenario import Scenario, make_trial
+from zfcal.artifacts.arenas import load_arena
+from zfcal.diagnose.diagnose import diagnose
+from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.question import Question
+from zfcal.model.effects import find_effect
+from zfcal.parameters import natural
+from zfcal.tracks import Samples
+
+pytestmark = pytest.mark.slow
+
+
+def said(*_words):
+    """Take no notice."""
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Return what is said of a quarter of an hour of fish of the second simulator."""
+    tank = load_arena("two-rooms", Path())
+    fish = natural(tuple((zone.name, zone.follows_walls) for zone in tank.zones), dt_s=0.2)
+
+    def of(effect, strength, seed):
+        asked = Scenario(effect=effect, strength=strength, seed=seed, minutes=15.0)
+        trial = make_trial(asked, oracle=False)
+        xy = trial.samples_m
+        samples = Samples(
+            dt_s=0.2,
+            k=np.arange(len(xy), dtype=np.int64),
+            agent=trial.track_ids.astype(np.int32),
+            kind=trial.robot_tracks.astype(np.int8),
+            xy_m=xy,
+            confidence=np.ones(xy.shape[:2], dtype=np.float32),
+        )
+        question = Question(
+            samples=samples, arena=tank, model=fish, seed=1, n_workers=2, noise_m=0.0,
+            noise_source="known", n_null=5, quick=True,
+        )  # fmt: skip
+        return diagnose(question, said)
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("form", "strength"),
+    [
+        ("speed-turn-coupling/after-turn", 0.12),
+        ("burst-and-coast/rhythm", 0.13),
+        ("speed-matching/nearest", 0.13),
+        ("fatigue/uneven", 0.2),
+    ],
+)
+def test_a_form_that_is_not_ours_is_named_once(found, form, strength):
+    """Slower after wide turns, swinging speeds, the pace of the nearest, two fish that tire."""
+    told = found(form, strength, 3)
+    assert told.verdict is Verdict.NAMED
+    assert [each.name for each in told.effects] == [form.split("/")[0]]
+    assert find_effect(form.split("/")[0]).paces
+
+
+@pytest.mark.parametrize("form", ["startle", "lit-room"])
+def test_darts_and_lamps_are_no_effect_on_speeds_in_company(found, form):
+    """What comes at times, and what one room does, is called by none of the names."""
+    told = found(form, "clear", 3)
+    names = {each.name for each in told.effects}
+    assert not names & {"burst-and-coast", "speed-matching", "crowding", "fatigue"}
+
+
+def test_nothing_is_named_where_nothing_is_missing(found):
+    """Fish of the base law alone."""
+    assert found(None, "clear", 4).verdict is Verdict.NO_EFFECT

@@ -1,0 +1,277 @@
+"""What each name's features gain in the likelihood of speeds.
+
+Speeds have no law but a measured one for each zone, so they are taken as normal scores: ranks
+within a zone, put on the scale of a standard normal law (van der Waerden 1952, Indagationes
+Mathematicae 14: 453-458). Fields of the tank and individuals have a mean of their own, which is
+taken off. What is left is regressed on weights of what was there before the step: the gain is that
+of the normal law, and all strengths and the spread are fitted. A fish may also keep so much of its
+last speed with some chance, and draw a new one otherwise: then the law is a mixture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logit, ndtri
+from scipy.stats import rankdata
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.features.climbing import climb
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.speeds import log_density
+from zfcal.model.effects import Effect, find_effect
+from zfcal.model.features import AWAY_M
+from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
+from zfcal.model.paces import Kept, Pace, Swum
+from zfcal.model.scene import Moves, Scene
+
+_MOST_TRACKS = 12
+"""Of so many fish each has a mean of its own; with more, tracks are short."""
+
+_KEPT_SD = 0.06
+"""Of the logarithm of a ratio of speeds about that which is kept."""
+
+_FIRST = 1e-3
+"""Share of the steps that keep their speed, where the search begins."""
+
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Paces:
+    """Fits of features to the speeds of a recording.
+
+    Parameters
+    ----------
+    screen
+        The model; what its effects do to speeds is divided out.
+    beside
+        Effects that are there, whatever form they have.
+    """
+
+    screen: Screen
+    beside: tuple[Effect, ...] = ()
+
+    @property
+    def scene(self) -> Scene:
+        """The recording."""
+        return self.screen.scene
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Moves of fish that swim, and swam before."""
+        still, was_still = self.screen.still
+        return np.flatnonzero(~(still | was_still))
+
+    @cached_property
+    def turns(self) -> Moves:
+        """The moves that count."""
+        moves = self.scene.moves
+        return Moves(
+            at=moves.at[self.rows],
+            who=moves.who[self.rows],
+            track=moves.track[self.rows],
+            zone=moves.zone[self.rows],
+            speed_m_s=moves.speed_m_s[self.rows],
+        )
+
+    @cached_property
+    def _means(self) -> Floats:
+        """Orthonormal columns for the means of fields and individuals, shape (move, column)."""
+        columns = [_dummies(self.screen.fields[self.rows])]
+        tracks = self.turns.track
+        if len(np.unique(tracks)) <= _MOST_TRACKS:
+            columns.append(_dummies(tracks)[:, 1:])
+        q, r = np.linalg.qr(np.concatenate(columns, axis=1))
+        size = np.abs(np.diag(r))
+        return np.asarray(q[:, size > _LEAST * max(size.max(initial=0.0), 1.0)])
+
+    def _less_means(self, values: Floats) -> Floats:
+        return values - self._means @ (self._means.T @ values)
+
+    @cached_property
+    def scores(self) -> Floats:
+        """Normal scores less the means, of variance one, shape (move,)."""
+        own = self.screen.own_speeds[self.rows]
+        left = self._less_means(_normal_scores(own, self.turns.zone))
+        return np.asarray(left / max(float(left.std()), _LEAST))
+
+    @cached_property
+    def swum(self) -> Swum:
+        """What was there before each move."""
+        scene, moves = self.scene, self.turns
+        at, who = moves.at, moves.who
+        scores = _table(scene, moves, self.scores)
+        states = scene.states
+        columns = states.shape[2]
+        each = [[j for j in range(columns) if j != i] for i in range(columns)]
+        others = np.array(each, dtype=np.int64).reshape(columns, columns - 1)[who]
+        own, theirs = states[at, :, who], np.moveaxis(states[at], 1, 2)
+        theirs = np.take_along_axis(theirs, others[..., None], axis=1)
+        here = theirs[..., ZONE] > 0
+        away = np.hypot(
+            theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
+        )  # fmt: skip
+        paces = _paces_of_all(states)[at[:, None], others]
+        turn, last_turn = (_turn(states, at + k, who) for k in (1, 0))
+        return Swum(
+            last=_known(scores, scene, at, who, 1),
+            before_last=_known(scores, scene, at, who, 2),
+            third=_known(scores, scene, at, who, 3),
+            turn_rad=turn,
+            last_turn_rad=last_turn,
+            others=np.where(here, np.nan_to_num(paces), 0.0),
+            distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
+            here=here,
+            time=at / max(1, len(scene.k) - 1),
+            track=moves.track,
+        )
+
+    @cached_property
+    def _also(self) -> Floats:
+        """Orthonormal columns of what is there beside the means."""
+        made = [
+            self._less_means(feature.weights(self.swum))
+            for effect in self.beside
+            for feature in effect.paces
+            if isinstance(feature, Pace)
+        ]
+        if not made:
+            return np.zeros((len(self.rows), 0))
+        q, r = np.linalg.qr(np.concatenate(made, axis=1))
+        size = np.abs(np.diag(r))
+        return np.asarray(q[:, size > _LEAST * max(size.max(initial=0.0), 1.0)])
+
+    @cached_property
+    def _left(self) -> Floats:
+        """Scores less all that is there."""
+        return self.scores - self._also @ (self._also.T @ self.scores)
+
+    def gain(self, name: str, feature: Pace | Kept) -> Gain:
+        """Return what a feature of an effect adds."""
+        if isinstance(feature, Kept):
+            (made, _), n = self._kept(feature), len(feature.ratios)
+        else:
+            change, n = self._changed(feature)
+            made = _normal_gain(self._left, self._left - change)
+        return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
+
+    def apart(self, gain: Gain) -> Floats:
+        """Return what a feature asks for at each step, less what it would if it were all there.
+
+        Of mean zero where it is there all the time, shape (move,).
+        """
+        feature = next(
+            each for each in find_effect(gain.name).paces if each.label == gain.label
+        )  # fmt: skip
+        if isinstance(feature, Kept):
+            return self._kept(feature)[1]
+        change, _ = self._changed(feature)
+        return change * (self._left - change)
+
+    def and_beside(self, effect: Effect) -> Paces:
+        """Return fits in which one more effect is there."""
+        made = replace(self, beside=(*self.beside, effect))
+        kept = ("rows", "turns", "_means", "scores", "swum")
+        made.__dict__.update({key: getattr(self, key) for key in kept})
+        return made
+
+    def _changed(self, feature: Pace) -> tuple[Floats, int]:
+        """Return by how much a feature changes each score, and the number of its strengths."""
+        columns = self._less_means(feature.weights(self.swum))
+        columns = columns - self._also @ (self._also.T @ columns)
+        columns = columns[:, (columns**2).mean(axis=0) > _LEAST]
+        found, *_ = np.linalg.lstsq(columns, self._left, rcond=None)
+        return np.asarray(columns @ found), columns.shape[1]
+
+    def _kept(self, feature: Kept) -> tuple[Floats, Floats]:
+        """Return what keeping the last speed adds to each step, and what it asks for."""
+        now, then = self.turns.speed_m_s, self.scene.states[self.turns.at, SPEED, self.turns.who]
+        log_p = log_density(now, np.ones_like(now), self.turns.zone.astype(np.int64))
+        known = np.isfinite(then) & (then > 0)
+        ratio = np.log(now / np.where(known, then, now))[:, None] - np.log(feature.ratios)
+        bump = np.exp(-0.5 * (ratio / _KEPT_SD) ** 2) / (math.sqrt(2 * math.pi) * _KEPT_SD)
+        density = bump / now[:, None] / np.exp(log_p)[:, None]
+        over = np.where(known[:, None], density - 1.0, 0.0)
+
+        def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
+            whole = np.maximum(1.0 + over @ x[:-1], _LEAST)
+            return float(np.log(whole).sum()), lambda: np.column_stack(
+                [over / whole[:, None], np.zeros(len(whole))]
+            )
+
+        n = len(feature.ratios)
+        x = climb(objective, np.append(np.full(n, _FIRST), logit(0.01)), [(0.0, 0.9 / n)] * n)
+        whole = np.maximum(1.0 + over @ x[:-1], _LEAST)
+        return np.log(whole), np.asarray(over @ x[:-1] / whole)
+
+
+def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
+    """Return what features of effects add to the law of speeds; those without are left out."""
+    found = [
+        paces.gain(effect.name, feature) for effect in effects for feature in effect.paces
+    ]  # fmt: skip
+    return [gain for gain in found if gain.n_strengths]
+
+
+def _dummies(group: NDArray[np.integer]) -> Floats:
+    found, which = np.unique(group, return_inverse=True)
+    return np.eye(len(found))[which]
+
+
+def _normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
+    """Return the normal scores of values within each group."""
+    made = np.zeros_like(values)
+    for number in np.unique(group):
+        rows = group == number
+        made[rows] = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
+    return made
+
+
+def _table(scene: Scene, moves: Moves, values: Floats) -> Floats:
+    """Return values of moves by the sample in which each ends, shape (sample, column)."""
+    made = np.full((len(scene.k) + 1, scene.states.shape[2]), np.nan)
+    made[moves.at + 1, moves.who] = values
+    return made
+
+
+def _known(
+    scores: Floats, scene: Scene, at: NDArray[np.int64], who: NDArray[np.int64], ago: int
+) -> Floats:
+    """Return the scores of so many moves ago of the same track; 0 where there is none."""
+    then = at + 1 - ago
+    same = (then > 0) & (scene.tracks[np.maximum(then - 1, 0), who] == scene.tracks[at, who])
+    return np.where(same, np.nan_to_num(scores[np.maximum(then, 0), who]), 0.0)
+
+
+def _paces_of_all(states: Floats) -> Floats:
+    """Return the normal score of everybody's last speed, robots' too, within the zone it began in.
+
+    Shape (sample, column); NaN where it is not known.
+    """
+    speed, zone = states[:, SPEED], np.roll(states[:, ZONE], 1, axis=0)
+    made = np.full(speed.shape, np.nan)
+    known = np.isfinite(speed) & (speed >= 0) & (zone > 0)
+    made[known] = _normal_scores(speed[known], zone[known].astype(np.int64))
+    return made
+
+
+def _turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
+    """Return by how much the heading at a sample differs from that before it; 0 if unknown."""
+    then = np.minimum(at, len(states) - 1)
+    hx, hy = states[then, HX, who], states[then, HY, who]
+    px, py = states[then - 1, HX, who], states[then - 1, HY, who]
+    angle = np.arctan2(px * hy - py * hx, px * hx + py * hy)
+    return np.where((then > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)
+
+
+def _normal_gain(before: Floats, after: Floats) -> Floats:
+    """Return what a normal law gains at each step, its spread fitted before and after."""
+    wide, narrow = (max(float((x**2).mean()), _LEAST) for x in (before, after))
+    return 0.5 * (math.log(wide / narrow) + before**2 / wide - after**2 / narrow)

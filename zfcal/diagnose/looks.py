@@ -1,0 +1,135 @@
+"""What looks by features have in common: what they found, and how it goes into the model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, stdtrit
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.candidates import Candidate, further_forms
+from zfcal.diagnose.case import Case
+from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed
+from zfcal.diagnose.naming import Refit, refit
+from zfcal.diagnose.pulses import pulses
+from zfcal.diagnose.scores import Score
+from zfcal.diagnose.screening import Screen, ask_all
+from zfcal.diagnose.selection import LEVEL, Step
+from zfcal.model.effects import find_effect
+from zfcal.model.scene import Scene
+
+BY_ITSELF = 4.0
+"""Standard errors by which features of a name must lead those of all others where no form of ours
+bears it out and something is left."""
+
+_FORMS = 6
+"""Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """Effects that are missing, in the order of adding, and what each gains on held-out steps.
+
+    ``nats`` is what the clearest of them gains by features, whatever its form. ``without_noise``
+    where one explains what noise of positions had seemed to.
+    """
+
+    steps: tuple[Step, ...]
+    confirmed: tuple[Confirmed, ...]
+    nats: float = 0.0
+    without_noise: bool = False
+
+
+def on_headings(step: Step) -> bool:
+    """Return whether an effect that was named acts on headings."""
+    return not step.choice.best.candidate.effect.on_speed
+
+
+def with_further(found: Found, n: int, further: Found) -> Found:
+    """Return the first ``n`` effects that were found, and further ones."""
+    return Found(
+        steps=(*found.steps[:n], *further.steps),
+        confirmed=(*found.confirmed[:n], *further.confirmed),
+        nats=max(found.nats, further.nats),
+        without_noise=found.without_noise or further.without_noise,
+    )
+
+
+def gains_by_itself(form: Refit) -> bool:
+    """Return whether the form that goes into the model gains more than chance by itself.
+
+    What is no effect of the list answers to features of several names a little, and to none of
+    their forms. On held-out steps a form is not asked: that would halve the power.
+    """
+    return bool(chdtrc(form.n_free, 2 * max(float(form.gain.sum()), 0.0)) < LEVEL)
+
+
+def in_all_minutes(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:
+    """Return whether something of mean zero in all has mean zero in each minute.
+
+    Parameters
+    ----------
+    apart : ndarray, shape (step,)
+        What an effect gains at each step, less what it would gain if it were there all the time.
+    at : ndarray of int64, shape (step,)
+        Sample in which each step begins.
+    scene
+        Of the recording.
+    """
+    minute = (at * scene.dt_s // MINUTES_S).astype(np.int64)
+    return _alike(apart, minute)
+
+
+def in_all_phases(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:
+    """Return whether it has mean zero over the phases of its period, if it has one.
+
+    Parameters
+    ----------
+    apart, at, scene
+        As of `in_all_minutes`.
+    """
+    series = np.bincount(at, apart, len(scene.k)).astype(np.float64)
+    found = pulses(series[None], scene.dt_s)
+    if not found.tail <= WAVERS:
+        return True
+    phase = (at * scene.dt_s / found.period_s % 1 * PHASES).astype(np.int64)
+    return _alike(apart, phase)
+
+
+def _alike(apart: Floats, part: NDArray[np.int64]) -> bool:
+    """Return whether steps have mean zero in all parts of a recording, by a chi-square."""
+    sums, squares = np.bincount(part, apart), np.bincount(part, apart**2)
+    told = squares > 0
+    ratio = float((sums[told] ** 2 / squares[told]).sum())
+    return bool(chdtrc(int(told.sum()), ratio) > WAVERS)
+
+
+def bound(rows: Floats) -> Floats:
+    """Return what one more row, shape (row, feature), exceeds anywhere in 2 % of cases.
+
+    By Student's t for each feature, and Bonferroni's inequality for all of them.
+    """
+    n, n_features = rows.shape
+    times = stdtrit(n - 1, 1 - LEVEL / n_features) * np.sqrt(1 + 1 / n)
+    return np.maximum(rows.mean(axis=0) + times * rows.std(axis=0, ddof=1), 0.0)
+
+
+def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
+    """Return an effect in the model in that form which gains most, and its score there."""
+    own = [each for each in (*case.listed, *case.generic) if each.name == name]
+    own += further_forms(find_effect(name), case.scene)
+    scores = ask_all(screen, own, case.question.n_workers)
+    forms: dict[tuple[float, ...], Score] = {}
+    for score in sorted(scores, key=lambda each: -abs(each.z)):
+        forms.setdefault(_form(score.candidate), score)
+    tried = list(forms.values())[:_FORMS]
+    made = [refit(screen, score, n_workers=case.question.n_workers) for score in tried]
+    k = int(np.argmax([each.worth for each in made]))
+    return made[k], tried[k]
+
+
+def _form(candidate: Candidate) -> tuple[float, ...]:
+    """Return the shapes of a candidate that a fit leaves as they are."""
+    return tuple(candidate.shape[key] for key in candidate.effect.fixed if key in candidate.shape)

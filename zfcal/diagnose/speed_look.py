@@ -1,0 +1,205 @@
+"""A look at speeds, by features: names what no form of the listed effects shows.
+
+As the second look at headings: each name's features are asked what the law of speeds lacks. What
+was named before stays, unless it is beyond the list and features of a listed name gain as much. An
+effect on speed that features name is there in all minutes, and not in pulses.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from zfcal.diagnose.candidates import in_model
+from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise
+from zfcal.diagnose.confirming import confirm
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.naming import Told, tell
+from zfcal.diagnose.features.paces import Paces, pace_gains
+from zfcal.diagnose.looks import (
+    BY_ITSELF,
+    Found,
+    bound,
+    gains_by_itself,
+    in_all_minutes,
+    in_all_phases,
+    in_the_model,
+    on_headings,
+    with_further,
+)
+from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample
+from zfcal.diagnose.null import run_null
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import LEAST_SHARE, MOST_EFFECTS, Best, Step
+from zfcal.model.effects import Effect, find_effect
+
+
+def speed_look(case: Case, before: Found) -> Found | None:
+    """Return what is missing once features of speeds were asked; None where nothing changes.
+
+    Parameters
+    ----------
+    case
+        The question, its scene and what is asked for.
+    before
+        What was named without features.
+    """
+    found = before
+    n = next((k for k, each in enumerate(before.steps) if not on_headings(each)), None)
+    if n is not None:
+        base = before.steps[n - 1].choice.best.screen if n else case.screen
+        earlier = [each.choice.best.candidate.effect for each in before.steps[:n]]
+        looks = _Looks(case=case, screen=base, beside=(*_given(case), *earlier))
+        is_last = n == len(before.steps) - 1
+        first = _named(looks, there=before.steps[n], may_reshape=is_last)
+        found = before if first is None else with_further(before, n, first)
+    while len(found.steps) < MOST_EFFECTS:
+        named = [
+            each.choice.best for each in found.steps if each.choice.best.candidate.effect.paces
+        ]
+        there = [each.choice.best.candidate.effect for each in found.steps]
+        beside = (*_given(case), *there)
+        screen = found.steps[-1].choice.best.screen if found.steps else case.screen
+        least = LEAST_SHARE * max((best.nats for best in named), default=0.0)
+        further = _named(_Looks(case=case, screen=screen, beside=beside), least=least)
+        if further is None:
+            break
+        found = with_further(found, len(found.steps), further)
+    return None if found is before else found
+
+
+def _given(case: Case) -> tuple[Effect, ...]:
+    """Return the effects that the model came with."""
+    return tuple(each.effect for each in in_model(case.screen.fitted.parameters))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Looks:
+    """What features say of a model's speeds.
+
+    Parameters
+    ----------
+    case
+        The question.
+    screen
+        The model.
+    beside
+        Effects that are there: whatever form they have, what they explain is not named.
+    """
+
+    case: Case
+    screen: Screen
+    beside: tuple[Effect, ...]
+
+    @cached_property
+    def paces(self) -> Paces:
+        """Fits of features."""
+        return Paces(screen=self.screen, beside=self.beside)
+
+    @cached_property
+    def asked(self) -> list[Effect]:
+        """Effects that are looked for."""
+        known = {effect.name for effect in self.beside}
+        names = {each.name for each in self.case.listed} - known
+        return [find_effect(name) for name in sorted(names)]
+
+    def tell(self) -> Told | None:
+        """Return which name it is; None where chance may have made all gains."""
+        noise = self._noise_nats if has_noise(self.case.question) else None
+        told = tell(pace_gains(self.paces, self.asked), noise)
+        if told is None:
+            return None
+        own = find_effect(told.gain.name)
+        ties = [find_effect(tie.name) for tie in told.ties]
+        kept = {
+            other.name
+            for other in ties
+            if self._stands(other, own) or not self._stands(own, other)
+        }  # fmt: skip
+        return dataclasses.replace(told, ties=tuple(t for t in told.ties if t.name in kept))
+
+    def explains(self, told: Told) -> bool:
+        """Return whether, with a name's features there, no other name gains more than chance."""
+        others = [effect for effect in self.asked if effect.name != told.gain.name]
+        beside = self.paces.and_beside(find_effect(told.gain.name))
+        return tell(pace_gains(beside, others)) is None
+
+    def _stands(self, effect: Effect, beside: Effect) -> bool:
+        return tell(pace_gains(self.paces.and_beside(beside), [effect])) is not None
+
+    def _noise_nats(self, clear: Sequence[Gain]) -> list[float]:
+        """Return what features may gain on one more replicate of the model, at most."""
+        keys = [gain.key for gain in clear]
+        effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
+
+        def ask(_number: int, other: Screen) -> list[float]:
+            paces = Paces(screen=other, beside=self.beside)
+            found = {each.key: float(each.log_p.sum()) for each in pace_gains(paces, effects)}
+            return [found.get(key, 0.0) for key in keys]
+
+        workers = self.case.question.n_workers
+        rows = np.array(run_null(self.case.chain, ask, QUICK_REPLICATES, n_workers=workers))
+        return list(bound(rows))
+
+
+def _named(
+    looks: _Looks, *, there: Step | None = None, may_reshape: bool = False, least: float = 0.0
+) -> Found | None:
+    """Return what features name in a model, and what it gains on held-out steps.
+
+    Parameters
+    ----------
+    looks
+        At the model.
+    there
+        What was named there: it stays unless features of another name gain more, by the error of
+        the difference; beyond the list, unless they gain as much.
+    may_reshape
+        Whether that may have another form of ours.
+    least
+        Nats that it has to gain.
+    """
+    case, screen, told = looks.case, looks.screen, looks.tell()
+    if told is None or told.gain.nats < least:
+        return None
+    paces = looks.paces
+    before = None if there is None else there.choice.best
+    if before is not None and _stays(before, told, paces):
+        return None
+    apart, at = paces.apart(told.gain), paces.turns.at
+    if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
+        return None
+    found, score = in_the_model(case, screen, told.gain.name)
+    is_same = before is not None and before.name == found.name
+    if before is not None and is_same and not (may_reshape and found.worth > before.worth):
+        return None
+    if not (gains_by_itself(found) or told.lead > BY_ITSELF or looks.explains(told)):
+        return None
+    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
+    step = Step(
+        choice=Choice(best=found, ties=ties, considered=(found, *ties)),
+        best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
+        before=screen,
+    )
+    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
+    return Found(
+        steps=(step,),
+        confirmed=(dataclasses.replace(confirmed, holds=True, steady=True),),
+        nats=told.gain.nats,
+    )
+
+
+def _stays(there: Refit, told: Told, paces: Paces) -> bool:
+    """Return whether what was named is kept beside what features say."""
+    if there.name in {gain.name for gain in told.ties}:
+        return True
+    by = by_sample(paces.scene, paces.turns.at, told.gain.log_p) - there.gain
+    error = float(by.std()) * float(np.sqrt(len(by)))
+    ahead = float(told.gain.nats - there.nats)
+    if there.name == told.gain.name:
+        return False
+    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
