@@ -15,11 +15,11 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told
 from zfcal.diagnose.findings import Verdict
-from zfcal.diagnose.looks import Found, bound
+from zfcal.diagnose.looks import Found, bound, stays
 from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.second_look import _noise_nats, _stays, second_look
+from zfcal.diagnose.second_look import _noise_nats, second_look
 from zfcal.diagnose.selection import Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
@@ -99,7 +99,7 @@ def law(base):
 
 
 @pytest.mark.parametrize(
-    ("generic", "share", "stays"),
+    ("generic", "share", "kept"),
     [
         (False, 1.0, True),
         (False, 0.5, False),
@@ -108,7 +108,7 @@ def law(base):
         (True, 3.0, True),
     ],
 )
-def test_what_was_named_stays_by_what_it_gains(law, generic, share, stays):
+def test_what_was_named_stays_by_what_it_gains(law, generic, share, kept):
     """A listed one where it gains as much as features do; one beyond the list has to gain more."""
     n = len(law.rows)
     values = np.random.default_rng(4).normal(0.02, 0.1, n)
@@ -118,7 +118,7 @@ def test_what_was_named_stays_by_what_it_gains(law, generic, share, stays):
     by += apart - apart.mean()
     there = SimpleNamespace(name="other", gain=by, nats=by.sum() - 1, is_generic=generic)
     told = Told(gain=gain("place-preference", values), p=1e-6, ties=())
-    assert _stays(there, told, law) is stays
+    assert stays(there, told, law.scene, law.turns.at) is kept
 
 
 def test_the_same_name_stays_in_its_own_form_unless_features_gain_more(law):
@@ -128,15 +128,28 @@ def test_the_same_name_stays_in_its_own_form_unless_features_gain_more(law):
     apart = np.random.default_rng(6).normal(0, 0.1, len(by))
     same = by + apart - apart.mean()
     told = Told(gain=gain("alignment", values), p=0.0, ties=())
-    for share, stays in ((1.0, True), (0.5, False)):
+    for share, kept in ((1.0, True), (0.5, False)):
         there = SimpleNamespace(
             name="alignment", gain=share * same, nats=share * same.sum(), is_generic=False
         )
-        assert _stays(there, told, law) is stays
+        assert stays(there, told, law.scene, law.turns.at) is kept
     nothing = np.zeros(len(law.scene.k))
     there = SimpleNamespace(name="alignment", gain=nothing, nats=0.0, is_generic=False)
     tied = Told(gain=gain("x", values), p=0.0, ties=(gain("alignment", values),))
-    assert _stays(there, tied, law)
+    assert stays(there, tied, law.scene, law.turns.at)
+
+
+def test_what_says_the_same_in_another_form_gets_the_listed_name(law):
+    """A neighbour's heading, beyond the list, is alignment, whatever it gains by itself."""
+    values = np.full(len(law.rows), 0.1)
+    by = 5 * np.bincount(law.turns.at, values, minlength=len(law.scene.k))
+    told = Told(gain=gain("alignment", values), p=0.0, ties=())
+    for name, kept in (
+        ("generic:heading:neighbour-heading", False),
+        ("generic:heading:wall", True),
+    ):
+        there = SimpleNamespace(name=name, gain=by, nats=by.sum() - 1, is_generic=True)
+        assert stays(there, told, law.scene, law.turns.at) is kept
 
 
 @pytest.mark.slow
@@ -256,7 +269,7 @@ def test_the_first_effect_on_headings_is_held_against_features(question, looked,
         assert screen == "with reaction-delay"
         return step(name, f"{screen} and {name}").choice.best, "its score there"
 
-    monkeypatch.setattr(looking, "_in_the_model", anew)
+    monkeypatch.setattr(looking, "in_the_model", anew)
     before = found("crowding", "alignment", "turning-bias", "fatigue")
     answers.append(found("reaction-delay", without_noise=True))
     now = second_look(case, before)

@@ -12,7 +12,8 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms
 from zfcal.diagnose.case import Case
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed
-from zfcal.diagnose.naming import Refit, refit
+from zfcal.diagnose.features.naming import Told
+from zfcal.diagnose.naming import SURE, Refit, by_sample, refit
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
@@ -55,6 +56,33 @@ def with_further(found: Found, n: int, further: Found) -> Found:
         nats=max(found.nats, further.nats),
         without_noise=found.without_noise or further.without_noise,
     )
+
+
+def stays(there: Refit, told: Told, scene: Scene, at: NDArray[np.int64]) -> bool:
+    """Return whether what was named is kept beside what features say.
+
+    A listed effect is kept where it gains as much as features of another name do, within the error
+    of the difference; one beyond the list where it gains more, and does not say what that name
+    says in another form. Where both are the same name it may get another form.
+
+    Parameters
+    ----------
+    there
+        What was named.
+    told
+        What features name.
+    scene, at
+        The recording, and the sample in which each step of the features begins.
+    """
+    name = told.gain.name
+    if there.name in {gain.name for gain in told.ties}:
+        return True
+    if there.is_generic and there.name in find_effect(name).other_forms:
+        return False
+    by = by_sample(scene, at, told.gain.log_p) - there.gain
+    error = float(by.std()) * float(np.sqrt(len(by)))
+    ahead = float(told.gain.nats - there.nats)
+    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
 
 
 def gains_by_itself(form: Refit) -> bool:

@@ -33,9 +33,10 @@ from zfcal.diagnose.looks import (
     in_all_phases,
     in_the_model,
     on_headings,
+    stays,
     with_further,
 )
-from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample
+from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import (
@@ -125,7 +126,8 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     case, screen, told = looks.case, looks.screen, looks.tell()
     if told is None or told.gain.nats < least:
         return None
-    if there is not None and _stays(there.choice.best, told, looks.laws[0]):
+    law = looks.laws[0]
+    if there is not None and stays(there.choice.best, told, law.scene, law.turns.at):
         return None
     found, score = in_the_model(case, screen, told.gain.name)
     same = None if there is None or there.choice.best.name != found.name else there.choice.best
@@ -264,19 +266,6 @@ def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
     return Law(scene=screen.scene, fitted=screen.fitted, noise_m=noise_m, seed=case.question.seed)
-
-
-def _stays(there: Refit, told: Told, law: Law) -> bool:
-    """Return whether what was named is kept beside what features say.
-
-    Where they say the same and gain more, it is put into the model in another form.
-    """
-    if there.name in {gain.name for gain in told.ties}:
-        return True
-    by = by_sample(law.scene, law.turns.at, told.gain.log_p) - there.gain
-    error = float(by.std()) * float(np.sqrt(len(by)))
-    ahead = float(told.gain.nats - there.nats)
-    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
 
 
 def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()) -> list[float]:

@@ -29,9 +29,10 @@ from zfcal.diagnose.looks import (
     in_all_phases,
     in_the_model,
     on_headings,
+    stays,
     with_further,
 )
-from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample
+from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEAST_SHARE, MOST_EFFECTS, Best, Step
@@ -168,13 +169,13 @@ def _named(
         return None
     paces = looks.paces
     before = None if there is None else there.choice.best
-    if before is not None and _stays(before, told, paces):
+    is_same = before is not None and before.name == told.gain.name
+    if before is not None and not is_same and stays(before, told, paces.scene, paces.turns.at):
         return None
     apart, at = paces.apart(told.gain), paces.turns.at
     if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
         return None
     found, score = in_the_model(case, screen, told.gain.name)
-    is_same = before is not None and before.name == found.name
     if before is not None and is_same and not (may_reshape and found.worth > before.worth):
         return None
     if not (gains_by_itself(found) or told.lead > BY_ITSELF or looks.explains(told)):
@@ -191,15 +192,3 @@ def _named(
         confirmed=(dataclasses.replace(confirmed, holds=True, steady=True),),
         nats=told.gain.nats,
     )
-
-
-def _stays(there: Refit, told: Told, paces: Paces) -> bool:
-    """Return whether what was named is kept beside what features say."""
-    if there.name in {gain.name for gain in told.ties}:
-        return True
-    by = by_sample(paces.scene, paces.turns.at, told.gain.log_p) - there.gain
-    error = float(by.std()) * float(np.sqrt(len(by)))
-    ahead = float(told.gain.nats - there.nats)
-    if there.name == told.gain.name:
-        return False
-    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
