@@ -202,3 +202,15 @@ def test_the_fastest_in_view_is_one_fish(arena, seen):
                             attention=np.tile([1.0, 2.0, 0.0], (N, 1)))
     )  # fmt: skip
     np.testing.assert_array_equal(weights[..., 0], np.tile([0.0, 2.0, 0.0], (N, 1)))
+
+
+def test_a_pull_to_one_fish_is_asked_of_each(arena, seen):
+    """Of two fish and a robot: the robot is nobody's leader, and there is no third fish."""
+    found = find_effect("leader-following").features(arena)
+    (drawn,) = [each for each in found if getattr(each, "kind", "") == "drawn to one"]
+    other = np.tile(np.array([4, 7, 9], dtype=np.int32), (N, 1))
+    robot = np.tile([False, False, True], (N, 1))
+    some = dataclasses.replace(seen, other=other, is_robot=robot)
+    sums = [each.weights(some).sum(axis=(0, 2)).tolist() for each in drawn.features]
+    assert sums[:2] == [[N, 0, 0], [0, N, 0]]
+    assert not np.any(sums[2:])

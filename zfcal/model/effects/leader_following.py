@@ -100,13 +100,16 @@ def _who(seen: Seen) -> Floats:
     return np.asarray((seen.other[..., None] == fish[1:]) & ~seen.is_robot[..., None], float)
 
 
-def _each(seen: Seen) -> Floats:
-    """Return one for each fish, shape (step, other, fish)."""
-    fish = np.unique(np.where(seen.is_robot, -1, seen.other))
-    fish = fish[fish >= 0]
-    if len(fish) > _MOST_FISH:
-        return np.zeros((*seen.other.shape, 0))
-    return np.asarray((seen.other[..., None] == fish) & ~seen.is_robot[..., None], float)
+def _one(k: int) -> Weights:
+    """Return one for a certain fish, the k-th of all, and nothing where there are fewer."""
+
+    def weights(seen: Seen) -> Floats:
+        fish = np.unique(np.where(seen.is_robot, -1, seen.other))
+        fish = fish[fish >= 0]
+        chosen = fish[k] if k < len(fish) <= _MOST_FISH else -2
+        return np.asarray(((seen.other == chosen) & ~seen.is_robot)[..., None], float)
+
+    return weights
 
 
 def _within(reach_m: float) -> Weights:
@@ -147,7 +150,16 @@ _FEATURES: tuple[Feature, ...] = (
             for reach_m in _REACH_M
         ),
     ),
-    Component(label="drawn to one", toward="bearing", weights=_each, kappa=5.0),
+    # One of them: a pull to each alike would be cohesion.
+    OneOf(
+        kind="drawn to one",
+        features=tuple(
+            Component(
+                label=f"drawn to fish {k}", toward="bearing", weights=_one(k), kappa=5.0
+            )
+            for k in range(_MOST_LED)
+        ),
+    ),
 )  # fmt: skip
 
 
