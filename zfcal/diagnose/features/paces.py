@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import orth
 from scipy.special import logit, ndtri
 from scipy.stats import rankdata
 
@@ -88,9 +89,7 @@ class Paces:
         tracks = self.turns.track
         if len(np.unique(tracks)) <= _MOST_TRACKS:
             columns.append(_dummies(tracks)[:, 1:])
-        q, r = np.linalg.qr(np.concatenate(columns, axis=1))
-        size = np.abs(np.diag(r))
-        return np.asarray(q[:, size > _LEAST * max(size.max(initial=0.0), 1.0)])
+        return _span(columns)
 
     def _less_means(self, values: Floats) -> Floats:
         return values - self._means @ (self._means.T @ values)
@@ -142,11 +141,7 @@ class Paces:
             for feature in effect.paces
             if isinstance(feature, Pace)
         ]
-        if not made:
-            return np.zeros((len(self.rows), 0))
-        q, r = np.linalg.qr(np.concatenate(made, axis=1))
-        size = np.abs(np.diag(r))
-        return np.asarray(q[:, size > _LEAST * max(size.max(initial=0.0), 1.0)])
+        return _span([np.zeros((len(self.rows), 0)), *made])
 
     @cached_property
     def _left(self) -> Floats:
@@ -218,6 +213,12 @@ def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
         paces.gain(effect.name, feature) for effect in effects for feature in effect.paces
     ]  # fmt: skip
     return [gain for gain in found if gain.n_strengths]
+
+
+def _span(columns: Sequence[Floats]) -> Floats:
+    """Return orthonormal columns with the span of all, of which some may be sums of others."""
+    whole = np.concatenate(columns, axis=1)
+    return np.asarray(orth(whole, rcond=_LEAST)) if whole.size else whole
 
 
 def _dummies(group: NDArray[np.integer]) -> Floats:
