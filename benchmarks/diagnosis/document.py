@@ -79,7 +79,9 @@ def _head(found: Mapping[str, Any]) -> list[str]:
     rows: list[list[object]] = []
     for section in SECTIONS:
         done = [str(modes[mode]["n"].get(section, 0)) if mode in modes else "0" for mode in MODES]
-        rows.append([section, _SAYS[section], found["planned"][section], *done])
+        # Numbers of an earlier plan have no row for what came later.
+        if section in found["planned"]:
+            rows.append([section, _SAYS[section], found["planned"][section], *done])
     return [
         "# Does the diagnosis find what was hidden?\n",
         _prose(

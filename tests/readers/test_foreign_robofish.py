@@ -91,7 +91,7 @@ def test_the_direction_of_y_is_a_persons_to_say_and_is_told(make, read):
     turned = read(make(), "robofish", flip_y=True, origin=(-50.0, 40.0))
 
     (note,) = [note for note in up.notes if "which way y counts" in note]
-    assert "upwards is taken" in note
+    assert "upwards is assumed" in note
     assert "--flip-y and --origin 0,0 (centre) or -50,40 (corner)" in note
     assert "--origin -50,-40 puts the lower left corner" in note
     assert any("it was turned, as --flip-y says" in note for note in turned.notes)

@@ -116,7 +116,7 @@ def test_an_empty_tank_has_no_exact_frame(new, drawn_tank, tmp_path):
     notes, result = tracked(root, folder)
     assert result["exact"] == 0
     assert np.all(read_tracks(root / "tracks" / "000000.parquet").confidence < 0.5)
-    assert any("do not tell whether" in note.text for note in notes if note.warning)
+    assert any("do not show whether" in note.text for note in notes if note.warning)
 
 
 def test_segments_that_arrive_one_by_one_give_what_the_video_gives(new, film, images, tmp_path):
