@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose import diagnose as whole
+from zfcal.diagnose import looks as common
 from zfcal.diagnose import second_look as looking
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import diagnose
@@ -269,7 +270,7 @@ def test_the_first_effect_on_headings_is_held_against_features(question, looked,
         assert screen == "with reaction-delay"
         return step(name, f"{screen} and {name}").choice.best, "its score there"
 
-    monkeypatch.setattr(looking, "in_the_model", anew)
+    monkeypatch.setattr(common, "in_the_model", anew)
     before = found("crowding", "alignment", "turning-bias", "fatigue")
     answers.append(found("reaction-delay", without_noise=True))
     now = second_look(case, before)
@@ -283,6 +284,23 @@ def test_the_first_effect_on_headings_is_held_against_features(question, looked,
         "with reaction-delay",
         "its score there",
     )
+
+
+def test_what_was_named_after_an_effect_that_gives_way_is_put_back(question, monkeypatch):
+    """In the model that there is now; what is there already is not there twice."""
+    case = open_case(question())
+
+    def anew(_case, screen, name):
+        return step(name, f"{screen} and {name}").choice.best, "its score there"
+
+    monkeypatch.setattr(common, "in_the_model", anew)
+    before = found("generic:speed:own-speed", "turning-bias", "burst-and-coast", "freezing")
+    later = zip(before.steps[1:], before.confirmed[1:], strict=True)
+    now = common.with_again(case, found("burst-and-coast"), later)
+    names = ["burst-and-coast", "turning-bias", "freezing"]
+    assert [each.choice.best.name for each in now.steps] == names
+    assert list(now.confirmed) == names
+    assert now.steps[2].before == "with burst-and-coast and turning-bias"
 
 
 def test_further_effects_are_looked_for_beside_what_is_there(question, looked):

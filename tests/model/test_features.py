@@ -214,3 +214,20 @@ def test_a_pull_to_one_fish_is_asked_of_each(arena, seen):
     sums = [each.weights(some).sum(axis=(0, 2)).tolist() for each in drawn.features]
     assert sums[:2] == [[N, 0, 0], [0, N, 0]]
     assert not np.any(sums[2:])
+
+
+def test_who_is_alone_has_no_features_of_others(arena, seen):
+    """No others at all: weights of no source, and no failure."""
+    shapes = {name: getattr(seen, name) for name in ("here", "speed_m_s", "distance_m", "is_robot")}
+    none = dataclasses.replace(
+        seen,
+        **{name: values[:, :0] for name, values in shapes.items()},
+        attention=seen.attention[:, :0],
+        bearing=seen.bearing[:, :0],
+        other=seen.other[:, :0],
+    )
+    assert none.nearest.shape == (N, 0, 1)
+    for each in find_effect("leader-following").features(arena):
+        for some in each.features if isinstance(each, OneOf) else (each,):
+            made = some.vectors(none) if isinstance(some, Tilt) else some.weights(none)
+            assert not made.any()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +58,34 @@ def with_further(found: Found, n: int, further: Found) -> Found:
         nats=max(found.nats, further.nats),
         without_noise=found.without_noise or further.without_noise,
     )
+
+
+def with_again(case: Case, found: Found, later: Iterable[tuple[Step, Confirmed]]) -> Found:
+    """Return what was found with effects that had been named after what has changed.
+
+    Parameters
+    ----------
+    case
+        The question.
+    found
+        What is there now.
+    later
+        Effects and what held-out steps said of them; each is put into the model anew.
+    """
+    for step, confirmed in later:
+        name, there = step.choice.best.name, {each.choice.best.name for each in found.steps}
+        if name in there:
+            continue
+        screen = found.steps[-1].choice.best.screen
+        made, score = in_the_model(case, screen, name)
+        again = dataclasses.replace(
+            step,
+            choice=dataclasses.replace(step.choice, best=made),
+            best=dataclasses.replace(step.best, score=score),
+            before=screen,
+        )
+        found = with_further(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
+    return found
 
 
 def stays(there: Refit, told: Told, scene: Scene, at: NDArray[np.int64]) -> bool:

@@ -34,6 +34,7 @@ from zfcal.diagnose.looks import (
     in_the_model,
     on_headings,
     stays,
+    with_again,
     with_further,
 )
 from zfcal.diagnose.naming import Choice
@@ -72,7 +73,9 @@ def second_look(case: Case, before: Found) -> Found | None:
     first = _named(looks, there=there)
     found = before if first is None else with_further(before, n, first)
     if first is not None:
-        found = _with_speeds(case, found, before, n)
+        later = zip(before.steps[n:], before.confirmed[n:], strict=False)
+        on_speeds = [pair for pair in later if not on_headings(pair[0])]
+        found = with_again(case, found, on_speeds)
     while True:
         named = [step for step in found.steps if on_headings(step)]
         if not named or len(named) >= MOST_EFFECTS:
@@ -92,23 +95,6 @@ def second_look(case: Case, before: Found) -> Found | None:
             break
         found = with_further(found, len(found.steps), further)
     return None if found is before else found
-
-
-def _with_speeds(case: Case, found: Found, before: Found, n: int) -> Found:
-    """Return what was found with the effects on speed that had been added after step ``n``."""
-    for step, confirmed in zip(before.steps[n:], before.confirmed[n:], strict=False):
-        if on_headings(step):
-            continue
-        screen = found.steps[-1].choice.best.screen
-        made, score = in_the_model(case, screen, step.choice.best.name)
-        again = dataclasses.replace(
-            step,
-            choice=dataclasses.replace(step.choice, best=made),
-            best=dataclasses.replace(step.best, score=score),
-            before=screen,
-        )
-        found = with_further(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
-    return found
 
 
 def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:

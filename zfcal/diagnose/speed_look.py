@@ -30,6 +30,7 @@ from zfcal.diagnose.looks import (
     in_the_model,
     on_headings,
     stays,
+    with_again,
     with_further,
 )
 from zfcal.diagnose.naming import Choice
@@ -50,27 +51,34 @@ def speed_look(case: Case, before: Found) -> Found | None:
         What was named without features.
     """
     found = before
-    n = next((k for k, each in enumerate(before.steps) if not on_headings(each)), None)
+    n = next((k for k, each in enumerate(before.steps) if _is_doubted(each)), None)
     if n is not None:
         base = before.steps[n - 1].choice.best.screen if n else case.screen
         earlier = [each.choice.best.candidate.effect for each in before.steps[:n]]
         looks = _Looks(case=case, screen=base, beside=(*_given(case), *earlier))
-        is_last = n == len(before.steps) - 1
-        first = _named(looks, there=before.steps[n], may_reshape=is_last)
-        found = before if first is None else with_further(before, n, first)
-    while len(found.steps) < MOST_EFFECTS:
-        named = [
-            each.choice.best for each in found.steps if each.choice.best.candidate.effect.paces
-        ]
+        first = _named(looks, there=before.steps[n])
+        if first is not None:
+            found = with_further(before, n, first)
+            later = zip(before.steps[n + 1 :], before.confirmed[n + 1 :], strict=True)
+            found = with_again(case, found, later)
+    while True:
+        named = [each.choice.best for each in found.steps if not on_headings(each)]
+        if len(named) >= MOST_EFFECTS:
+            break
         there = [each.choice.best.candidate.effect for each in found.steps]
-        beside = (*_given(case), *there)
         screen = found.steps[-1].choice.best.screen if found.steps else case.screen
         least = LEAST_SHARE * max((best.nats for best in named), default=0.0)
-        further = _named(_Looks(case=case, screen=screen, beside=beside), least=least)
+        looks = _Looks(case=case, screen=screen, beside=(*_given(case), *there))
+        further = _named(looks, least=least)
         if further is None:
             break
         found = with_further(found, len(found.steps), further)
     return None if found is before else found
+
+
+def _is_doubted(step: Step) -> bool:
+    """Return whether it is an effect on speed beyond the list: a listed one stays."""
+    return not on_headings(step) and step.choice.best.is_generic
 
 
 def _given(case: Case) -> tuple[Effect, ...]:
@@ -147,9 +155,7 @@ class _Looks:
         return list(bound(rows))
 
 
-def _named(
-    looks: _Looks, *, there: Step | None = None, may_reshape: bool = False, least: float = 0.0
-) -> Found | None:
+def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:
     """Return what features name in a model, and what it gains on held-out steps.
 
     Parameters
@@ -157,10 +163,7 @@ def _named(
     looks
         At the model.
     there
-        What was named there: it stays unless features of another name gain more, by the error of
-        the difference; beyond the list, unless they gain as much.
-    may_reshape
-        Whether that may have another form of ours.
+        What was named there, beyond the list: see `stays`.
     least
         Nats that it has to gain.
     """
@@ -168,16 +171,12 @@ def _named(
     if told is None or told.gain.nats < least:
         return None
     paces = looks.paces
-    before = None if there is None else there.choice.best
-    is_same = before is not None and before.name == told.gain.name
-    if before is not None and not is_same and stays(before, told, paces.scene, paces.turns.at):
+    if there is not None and stays(there.choice.best, told, paces.scene, paces.turns.at):
         return None
     apart, at = paces.apart(told.gain), paces.turns.at
     if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
         return None
     found, score = in_the_model(case, screen, told.gain.name)
-    if before is not None and is_same and not (may_reshape and found.worth > before.worth):
-        return None
     if not (gains_by_itself(found) or told.lead > BY_ITSELF or looks.explains(told)):
         return None
     ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)

@@ -98,6 +98,8 @@ class Seen:
     @property
     def nearest(self) -> Floats:
         """One for the nearest other one, else 0, shape (step, other, 1)."""
+        if not self.here.size:
+            return np.zeros((*self.here.shape, 1))
         chosen = np.zeros(self.here.shape)
         chosen[np.arange(len(chosen)), self.distance_m.argmin(axis=1)] = 1.0
         return (chosen * self.here)[..., None]
@@ -190,8 +192,9 @@ class Leaving:
     weights
         Shape (step, weight): the log of the factor at a strength of one.
     into
-        ``between`` the rooms, which counts for steps that begin in a room; or into the ``open``,
-        the last zone that does not follow walls, which counts for all steps.
+        ``between`` the rooms; or into the ``open``,
+        the last other zone that does not follow walls. Steps that begin between the rooms do not
+        count.
     """
 
     label: str

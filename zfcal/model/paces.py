@@ -25,8 +25,8 @@ class Swum:
     ----------
     last, before_last, third : ndarray, shape (step,)
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
-    turn_rad, last_turn_rad : ndarray, shape (step,)
-        Of the step itself and of the one before, to either side; 0 where it is not known.
+    last_turn_rad : ndarray, shape (step,)
+        At the beginning of the step before, to either side; 0 where it is not known.
     others : ndarray, shape (step, other)
         Normal scores of the others' last speeds; 0 where they are not known.
     distance_m : ndarray, shape (step, other)
@@ -40,7 +40,6 @@ class Swum:
     last: Floats
     before_last: Floats
     third: Floats
-    turn_rad: Floats
     last_turn_rad: Floats
     others: Floats
     distance_m: Floats
@@ -63,19 +62,3 @@ class Pace:
 
     label: str
     weights: Callable[[Swum], Floats]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Kept:
-    """Some steps keep so much of the last speed, and others draw a new one.
-
-    Parameters
-    ----------
-    label
-        Tells it from other features of the effect.
-    ratios
-        Of a speed that is kept to the last one; a share of the steps is fitted for each.
-    """
-
-    label: str
-    ratios: tuple[float, ...]

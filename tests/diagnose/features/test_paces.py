@@ -69,10 +69,9 @@ def by_company(paces):
     return np.where((paces.swum.distance_m < 0.09).sum(axis=1) >= 2, 1.25, 1.0)
 
 
-def of_one_fish(paces):
-    """One fish gets slower for the rest of the recording."""
-    swum = paces.swum
-    return np.where((swum.track == swum.track.min()) & (swum.time > 0.55), 0.75, 1.0)
+def late(paces):
+    """Slower for the last third of the recording."""
+    return np.where(paces.swum.time > 0.65, 0.85, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +80,7 @@ def of_one_fish(paces):
         ("speed-turn-coupling", by_last_turn),
         ("speed-matching", by_the_nearest),
         ("crowding", by_company),
-        ("fatigue", of_one_fish),
+        ("fatigue", late),
     ],
 )
 def test_a_form_that_nobody_knows_is_told(nothing, changed, name, factor):
@@ -114,22 +113,10 @@ def rhythm(speed, _rng):
     return speed * np.where(np.arange(len(speed)) % 3 == 0, 1.3, 0.95)
 
 
-def coasting(speed, rng):
-    """One step in twelve keeps 0.83 of the last speed."""
-    made = speed.copy()
-    for k in range(1, len(made)):
-        if rng.random() < 0.08:
-            made[k] = 0.83 * made[k - 1]
-    return made
-
-
-@pytest.mark.parametrize(
-    ("rule", "label"), [(rhythm, "by the last three speeds"), (coasting, "kept")]
-)
-def test_bursts_are_told_by_the_own_last_speeds(nothing, rule, label):
+def test_bursts_are_told_by_the_own_last_speeds(nothing):
     """Whether a speed is kept for a step or swings."""
-    told = tell(pace_gains(scores_by_last(nothing, rule), ALL))
-    assert (told.gain.name, told.gain.label) == ("burst-and-coast", label)
+    told = tell(pace_gains(scores_by_last(nothing, rhythm), ALL))
+    assert (told.gain.name, told.gain.label) == ("burst-and-coast", "by the last three speeds")
     assert told.gain.nats > 15
 
 
@@ -137,13 +124,48 @@ def test_what_one_room_does_to_speeds_is_no_effect(nothing, changed):
     """A lamp over one room makes fish fast there: fields have means of their own."""
     scene = nothing.scene
     xy = scene.states[scene.moves.at, :2, scene.moves.who]
-    assert tell(pace_gains(changed(np.where(xy[:, 0] > xy[:, 1], 1.2, 1.0)), ALL)) is None
+    for times in (1.2, 1.8):
+        lit = changed(np.where(xy[:, 0] > xy[:, 1], times, 1.0))
+        assert tell(pace_gains(lit, ALL)) is None
 
 
 def test_nor_what_one_fish_does_all_the_time(nothing, changed):
     """Some fish are faster than others: each has a mean of its own."""
-    fast = nothing.scene.moves.track == nothing.scene.moves.track.min()
-    assert tell(pace_gains(changed(np.where(fast, 1.2, 1.0)), ALL)) is None
+    track = nothing.scene.moves.track
+    own = np.linspace(0.6, 1.6, len(np.unique(track)))
+    times = own[np.unique(track, return_inverse=True)[1]]
+    assert tell(pace_gains(changed(times), ALL)) is None
+
+
+def test_tracks_in_pieces_have_means_of_their_own(nothing):
+    """More than a dozen of them, of individuals that differ."""
+    scene = nothing.scene
+    track = scene.moves.track * 10 + (4 * scene.moves.at // len(scene.k)).astype(np.int32)
+    pieces = scene.tracks * 10 + (4 * np.arange(len(scene.k)) // len(scene.k))[:, None]
+    times = np.linspace(0.8, 1.2, 5)[np.unique(scene.moves.track, return_inverse=True)[1]]
+    moves = dataclasses.replace(scene.moves, track=track, speed_m_s=scene.moves.speed_m_s * times)
+    other = dataclasses.replace(scene, moves=moves, tracks=pieces.astype(np.int32))
+    paces = Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted))
+    assert len(np.unique(paces.turns.track)) == 20
+    assert tell(pace_gains(paces, ALL)) is None
+
+
+def test_short_tracks_are_not_asked(nothing):
+    """Of 40 moves nobody can say that they swing beside their own mean."""
+    scene = nothing.scene
+    moves = dataclasses.replace(
+        scene.moves, track=scene.moves.track * 1000 + (scene.moves.at // 40).astype(np.int32)
+    )
+    other = dataclasses.replace(scene, moves=moves)
+    assert pace_gains(Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted)), ALL) == []
+
+
+def test_one_fish_has_nobody_to_match(screen):
+    """Features of others have no strength then."""
+    paces = Paces(screen=screen(5, n_fish=1), beside=(find_effect("speed-matching"),))
+    assert {each.name for each in pace_gains(paces, ALL)} <= {
+        "burst-and-coast", "fatigue", "speed-turn-coupling",
+    }  # fmt: skip
 
 
 def test_beside_an_effect_its_own_features_gain_nothing(nothing, changed):

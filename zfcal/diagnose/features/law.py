@@ -154,9 +154,9 @@ class Law:
         """Return the id of a zone that fish may leave into, as `Leaving` has it; 0 without one."""
         if into == "between":
             return self.between
-        zones = self.scene.arena.zones
-        open_ = [k for k, zone in enumerate(zones, start=1) if not zone.follows_walls]
-        return open_[-1] if open_ and open_[-1] != self.between else 0
+        zones = enumerate(self.scene.arena.zones, start=1)
+        open_ = [k for k, zone in zones if not zone.follows_walls and k != self.between]
+        return open_[-1] if open_ else 0
 
     def share_of(self, zone: int) -> Floats:
         """Share of each cell's attraction that is of landing in a zone, shape (step, cell)."""

@@ -4,42 +4,39 @@ Speeds have no law but a measured one for each zone, so they are taken as normal
 within a zone, put on the scale of a standard normal law (van der Waerden 1952, Indagationes
 Mathematicae 14: 453-458). Fields of the tank and individuals have a mean of their own, which is
 taken off. What is left is regressed on weights of what was there before the step: the gain is that
-of the normal law, and all strengths and the spread are fitted. A fish may also keep so much of its
-last speed with some chance, and draw a new one otherwise: then the law is a mixture.
+of the normal law, and all strengths and the spread are fitted.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import orth
-from scipy.special import logit, ndtri
+from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.speeds import log_density
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.features import AWAY_M
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
-from zfcal.model.paces import Kept, Pace, Swum
+from zfcal.model.paces import Pace, Swum
 from zfcal.model.scene import Moves, Scene
 
-_MOST_TRACKS = 12
-"""Of so many fish each has a mean of its own; with more, tracks are short."""
+_LEAST_MOVES = 50
+"""Of a track that has a mean of its own; shorter ones have one together."""
 
-_KEPT_SD = 0.06
-"""Of the logarithm of a ratio of speeds about that which is kept."""
+_LEAST_OF_TRACK = 100
+"""Moves per track, in the mean, from which features are asked."""
 
-_FIRST = 1e-3
-"""Share of the steps that keep their speed, where the search begins."""
+_MOST_ROUNDS = 200
+"""In which means are taken off."""
 
 _LEAST = 1e-9
 
@@ -83,16 +80,28 @@ class Paces:
         )
 
     @cached_property
-    def _means(self) -> Floats:
-        """Orthonormal columns for the means of fields and individuals, shape (move, column)."""
-        columns = [_dummies(self.screen.fields[self.rows])]
-        tracks = self.turns.track
-        if len(np.unique(tracks)) <= _MOST_TRACKS:
-            columns.append(_dummies(tracks)[:, 1:])
-        return _span(columns)
+    def _groups(self) -> tuple[NDArray[np.intp], ...]:
+        """Fields of the tank and individuals, each with a mean of its own; short tracks are one."""
+        fields, tracks = (
+            np.unique(group, return_inverse=True)[1]
+            for group in (self.screen.fields[self.rows], self.turns.track)
+        )
+        is_long = np.bincount(tracks, minlength=1) >= _LEAST_MOVES
+        return fields, np.where(is_long[tracks], tracks + 1, 0) if len(tracks) else tracks
 
     def _less_means(self, values: Floats) -> Floats:
-        return values - self._means @ (self._means.T @ values)
+        """Return values less the means of both groupings, by turns until nothing changes.
+
+        So they become what is orthogonal to both (von Neumann 1950, Functional Operators II).
+        """
+        left = np.array(values, dtype=np.float64)
+        for _ in range(_MOST_ROUNDS):
+            before = left.copy()
+            for group in self._groups:
+                left -= _means(left, group)[group]
+            if np.abs(left - before).max(initial=0.0) < _LEAST:
+                break
+        return left
 
     @cached_property
     def scores(self) -> Floats:
@@ -118,13 +127,11 @@ class Paces:
             theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
         )  # fmt: skip
         paces = _paces_of_all(states)[at[:, None], others]
-        turn, last_turn = (_turn(states, at + k, who) for k in (1, 0))
         return Swum(
             last=_known(scores, scene, at, who, 1),
             before_last=_known(scores, scene, at, who, 2),
             third=_known(scores, scene, at, who, 3),
-            turn_rad=turn,
-            last_turn_rad=last_turn,
+            last_turn_rad=_last_turn(states, at, who),
             others=np.where(here, np.nan_to_num(paces), 0.0),
             distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
             here=here,
@@ -139,7 +146,6 @@ class Paces:
             self._less_means(feature.weights(self.swum))
             for effect in self.beside
             for feature in effect.paces
-            if isinstance(feature, Pace)
         ]
         return _span([np.zeros((len(self.rows), 0)), *made])
 
@@ -148,13 +154,10 @@ class Paces:
         """Scores less all that is there."""
         return self.scores - self._also @ (self._also.T @ self.scores)
 
-    def gain(self, name: str, feature: Pace | Kept) -> Gain:
+    def gain(self, name: str, feature: Pace) -> Gain:
         """Return what a feature of an effect adds."""
-        if isinstance(feature, Kept):
-            (made, _), n = self._kept(feature), len(feature.ratios)
-        else:
-            change, n = self._changed(feature)
-            made = _normal_gain(self._left, self._left - change)
+        change, n = self._changed(feature)
+        made = _normal_gain(self._left, self._left - change)
         return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
 
     def apart(self, gain: Gain) -> Floats:
@@ -162,18 +165,15 @@ class Paces:
 
         Of mean zero where it is there all the time, shape (move,).
         """
-        feature = next(
-            each for each in find_effect(gain.name).paces if each.label == gain.label
-        )  # fmt: skip
-        if isinstance(feature, Kept):
-            return self._kept(feature)[1]
+        effect = find_effect(gain.name)
+        feature = next(each for each in effect.paces if each.label == gain.label)
         change, _ = self._changed(feature)
         return change * (self._left - change)
 
     def and_beside(self, effect: Effect) -> Paces:
         """Return fits in which one more effect is there."""
         made = replace(self, beside=(*self.beside, effect))
-        kept = ("rows", "turns", "_means", "scores", "swum")
+        kept = ("rows", "turns", "_groups", "scores", "swum")
         made.__dict__.update({key: getattr(self, key) for key in kept})
         return made
 
@@ -182,33 +182,19 @@ class Paces:
         columns = self._less_means(feature.weights(self.swum))
         columns = columns - self._also @ (self._also.T @ columns)
         columns = columns[:, (columns**2).mean(axis=0) > _LEAST]
-        found, *_ = np.linalg.lstsq(columns, self._left, rcond=None)
-        return np.asarray(columns @ found), columns.shape[1]
-
-    def _kept(self, feature: Kept) -> tuple[Floats, Floats]:
-        """Return what keeping the last speed adds to each step, and what it asks for."""
-        now, then = self.turns.speed_m_s, self.scene.states[self.turns.at, SPEED, self.turns.who]
-        log_p = log_density(now, np.ones_like(now), self.turns.zone.astype(np.int64))
-        known = np.isfinite(then) & (then > 0)
-        ratio = np.log(now / np.where(known, then, now))[:, None] - np.log(feature.ratios)
-        bump = np.exp(-0.5 * (ratio / _KEPT_SD) ** 2) / (math.sqrt(2 * math.pi) * _KEPT_SD)
-        density = bump / now[:, None] / np.exp(log_p)[:, None]
-        over = np.where(known[:, None], density - 1.0, 0.0)
-
-        def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-            whole = np.maximum(1.0 + over @ x[:-1], _LEAST)
-            return float(np.log(whole).sum()), lambda: np.column_stack(
-                [over / whole[:, None], np.zeros(len(whole))]
-            )
-
-        n = len(feature.ratios)
-        x = climb(objective, np.append(np.full(n, _FIRST), logit(0.01)), [(0.0, 0.9 / n)] * n)
-        whole = np.maximum(1.0 + over @ x[:-1], _LEAST)
-        return np.log(whole), np.asarray(over @ x[:-1] / whole)
+        found, _, rank, _ = np.linalg.lstsq(columns, self._left, rcond=None)
+        return np.asarray(columns @ found), int(rank)
 
 
 def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
-    """Return what features of effects add to the law of speeds; those without are left out."""
+    """Return what features of effects add to the law of speeds; those without are left out.
+
+    Tracks of a few moves have no past to speak of: regressed on what is left of it beside a mean
+    of their own, speeds would seem to swing (Nickell 1981, Econometrica 49: 1417-1426).
+    """
+    n_tracks = len(np.unique(paces.turns.track))
+    if len(paces.rows) < _LEAST_OF_TRACK * max(n_tracks, 1):
+        return []
     found = [
         paces.gain(effect.name, feature) for effect in effects for feature in effect.paces
     ]  # fmt: skip
@@ -221,9 +207,12 @@ def _span(columns: Sequence[Floats]) -> Floats:
     return np.asarray(orth(whole, rcond=_LEAST)) if whole.size else whole
 
 
-def _dummies(group: NDArray[np.integer]) -> Floats:
-    found, which = np.unique(group, return_inverse=True)
-    return np.eye(len(found))[which]
+def _means(values: Floats, group: NDArray[np.intp]) -> Floats:
+    """Return the mean of each group, shape (group,) or (group, column)."""
+    n = np.maximum(np.bincount(group), 1)
+    if values.ndim == 1:
+        return np.asarray(np.bincount(group, values) / n)
+    return np.stack([np.bincount(group, column) / n for column in values.T], axis=1)
 
 
 def _normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
@@ -259,17 +248,17 @@ def _paces_of_all(states: Floats) -> Floats:
     speed, zone = states[:, SPEED], np.roll(states[:, ZONE], 1, axis=0)
     made = np.full(speed.shape, np.nan)
     known = np.isfinite(speed) & (speed >= 0) & (zone > 0)
+    known[0] = False
     made[known] = _normal_scores(speed[known], zone[known].astype(np.int64))
     return made
 
 
-def _turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
+def _last_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
     """Return by how much the heading at a sample differs from that before it; 0 if unknown."""
-    then = np.minimum(at, len(states) - 1)
-    hx, hy = states[then, HX, who], states[then, HY, who]
-    px, py = states[then - 1, HX, who], states[then - 1, HY, who]
+    hx, hy = states[at, HX, who], states[at, HY, who]
+    px, py = states[at - 1, HX, who], states[at - 1, HY, who]
     angle = np.arctan2(px * hy - py * hx, px * hx + py * hy)
-    return np.where((then > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)
+    return np.where((at > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)
 
 
 def _normal_gain(before: Floats, after: Floats) -> Floats:

@@ -39,7 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
-from zfcal.model.paces import Kept, Pace
+from zfcal.model.paces import Pace
 
 MAX_PARAMETERS = 8
 
@@ -255,7 +255,7 @@ class Effect:
     looks_like: Likeness | None = None
     control: Control | None = None
     features: Callable[[Arena], tuple[Feature, ...]] = _no_features
-    paces: tuple[Pace | Kept, ...] = ()
+    paces: tuple[Pace, ...] = ()
     fixed: tuple[str, ...] = ()
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 

@@ -11,7 +11,7 @@ from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
-from zfcal.model.paces import Kept, Pace, Swum
+from zfcal.model.paces import Pace, Swum
 
 
 @hook(SPEED_HOOK)
@@ -72,6 +72,5 @@ EFFECT = Effect(
     paces=(
         Pace(label="by the last speed", weights=_last),
         Pace(label="by the last three speeds", weights=_some_ago),
-        Kept(label="kept", ratios=(0.6, 0.7, 0.8, 0.9, 1.0, 1.1)),
     ),
 )

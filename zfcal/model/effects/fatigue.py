@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import times_faster
@@ -21,21 +19,10 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _TIMES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-_OF_EACH = (0.0, 0.5, 1.0)
-_MOST_TRACKS = 12
-"""Of so many fish each is asked by itself; with more, tracks are short."""
 
 
 def _by_time(swum: Swum) -> Floats:
     return hats(swum.time, _TIMES)[:, 1:]
-
-
-def _each_by_time(swum: Swum) -> Floats:
-    tracks = np.unique(swum.track)
-    if len(tracks) > _MOST_TRACKS:
-        return np.zeros((len(swum.track), 0))
-    own = (swum.track[:, None] == tracks).astype(np.float64)
-    return np.einsum("sf,sb->sfb", own, hats(swum.time, _OF_EACH)[:, 1:]).reshape(len(own), -1)
 
 
 EFFECT = Effect(
@@ -65,8 +52,5 @@ EFFECT = Effect(
     fixed=("usual_at_s",),
     per_hour=True,
     shown_against="time",
-    paces=(
-        Pace(label="time", weights=_by_time),
-        Pace(label="time, each fish by itself", weights=_each_by_time),
-    ),
+    paces=(Pace(label="time", weights=_by_time),),
 )

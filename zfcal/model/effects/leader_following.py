@@ -85,6 +85,8 @@ def _attention(seen: Seen) -> Floats:
 
 
 def _fastest(seen: Seen) -> Floats:
+    if not seen.here.size:
+        return np.zeros((*seen.here.shape, 1))
     chosen = np.zeros(seen.here.shape)
     quick = np.where(seen.attention > 0, seen.speed_m_s, -1.0)
     chosen[np.arange(len(chosen)), quick.argmax(axis=1)] = 1.0
@@ -117,6 +119,8 @@ def _within(reach_m: float) -> Weights:
 
     def weights(seen: Seen) -> Floats:
         near = seen.here & (seen.distance_m < reach_m) & (seen.speed_m_s >= 0)
+        if not near.size:
+            return np.zeros((*near.shape, 1))
         quick = np.where(near, seen.speed_m_s, -1.0)
         chosen = quick.argmax(axis=1)[:, None] == np.arange(near.shape[1])
         return np.asarray((chosen & near)[..., None], float)

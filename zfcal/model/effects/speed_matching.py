@@ -50,6 +50,8 @@ def _near(swum: Swum) -> Floats:
 
 def _nearest(swum: Swum) -> Floats:
     """Return the last speed of the nearest, by its distance."""
+    if not swum.here.size:
+        return np.zeros((len(swum.here), len(_KNOTS_M)))
     rows, nearest = np.arange(len(swum.here)), swum.distance_m.argmin(axis=1)
     pace = swum.others[rows, nearest] * swum.here[rows, nearest]
     return np.asarray(pace[:, None] * hats(swum.distance_m[rows, nearest], _KNOTS_M))

@@ -39,10 +39,6 @@ def _by_speed(seen: Seen) -> Floats:
 _KNOTS_RAD = (0.0, 0.5, 1.0, 2.0, 3.2)
 
 
-def _by_turn(swum: Swum) -> Floats:
-    return hats(swum.turn_rad, _KNOTS_RAD)[:, 1:]
-
-
 def _by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, _KNOTS_RAD)[:, 1:]
 
@@ -79,8 +75,6 @@ EFFECT = Effect(
     shown_against="speed",
     other_forms=("generic:speed:own-turn",),
     features=lambda _arena: _FEATURES,
-    paces=(
-        Pace(label="by the turn", weights=_by_turn),
-        Pace(label="by the last turn", weights=_by_last_turn),
-    ),
+    # Not by the turn of the step itself: near a wall a long step has to turn.
+    paces=(Pace(label="by the last turn", weights=_by_last_turn),),
 )
