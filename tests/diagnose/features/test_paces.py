@@ -160,6 +160,17 @@ def test_short_tracks_are_not_asked(nothing):
     assert pace_gains(Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted)), ALL) == []
 
 
+def test_speeds_that_are_all_but_one_have_no_law(nothing):
+    """Of nine in ten moves at one speed, rounding aside, the others say nothing by their ranks."""
+    scene, rng = nothing.scene, np.random.default_rng(2)
+    even = 0.07 + rng.normal(0, 1e-7, len(scene.moves))
+    speed = np.where(rng.random(len(even)) < 0.1, scene.moves.speed_m_s, even)
+    other = dataclasses.replace(scene, moves=dataclasses.replace(scene.moves, speed_m_s=speed))
+    paces = Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted))
+    assert not paces.has_law
+    assert pace_gains(paces, ALL) == []
+
+
 def test_one_fish_has_nobody_to_match(screen):
     """Features of others have no strength then."""
     paces = Paces(screen=screen(5, n_fish=1), beside=(find_effect("speed-matching"),))

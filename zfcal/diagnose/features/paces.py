@@ -35,6 +35,12 @@ _LEAST_MOVES = 50
 _LEAST_OF_TRACK = 100
 """Moves per track, in the mean, from which features are asked."""
 
+_GRAIN_M_S = 1e-4
+"""Speeds that differ by less count as the same: ranks would make much of rounding."""
+
+_MOST_ALIKE = 0.1
+"""Share of moves that may have the same speed."""
+
 _MOST_ROUNDS = 200
 """In which means are taken off."""
 
@@ -104,10 +110,21 @@ class Paces:
         return left
 
     @cached_property
+    def _grains(self) -> Floats:
+        return np.round(self.screen.own_speeds[self.rows] / _GRAIN_M_S)
+
+    @property
+    def has_law(self) -> bool:
+        """Whether speeds differ enough for normal scores, and tracks are long enough for a past."""
+        n, n_tracks = len(self.rows), len(np.unique(self.turns.track))
+        if n < _LEAST_OF_TRACK * max(n_tracks, 1):
+            return False
+        return int(np.unique(self._grains, return_counts=True)[1].max()) <= _MOST_ALIKE * n
+
+    @cached_property
     def scores(self) -> Floats:
         """Normal scores less the means, of variance one, shape (move,)."""
-        own = self.screen.own_speeds[self.rows]
-        left = self._less_means(_normal_scores(own, self.turns.zone))
+        left = self._less_means(_normal_scores(self._grains, self.turns.zone))
         return np.asarray(left / max(float(left.std()), _LEAST))
 
     @cached_property
@@ -190,10 +207,10 @@ def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
     """Return what features of effects add to the law of speeds; those without are left out.
 
     Tracks of a few moves have no past to speak of: regressed on what is left of it beside a mean
-    of their own, speeds would seem to swing (Nickell 1981, Econometrica 49: 1417-1426).
+    of their own, speeds would seem to swing (Nickell 1981, Econometrica 49: 1417-1426). Where a
+    tenth of all moves have one speed there is no law of ranks.
     """
-    n_tracks = len(np.unique(paces.turns.track))
-    if len(paces.rows) < _LEAST_OF_TRACK * max(n_tracks, 1):
+    if not paces.has_law:
         return []
     found = [
         paces.gain(effect.name, feature) for effect in effects for feature in effect.paces

@@ -228,7 +228,7 @@ EFFECT = Effect(
         *({"drawn": 1.0, "reach_m": reach_m} for reach_m in (0.1, 0.15, 0.2, 2.0)),
         *({"drawn": 1.0, "who": float(who)} for who in range(_MOST_LED)),
     ),
-    fixed=("fastest", "who", "drawn", "reach_m"),
+    fixed=("fastest", "who", "drawn", "reach_m", "kappa"),
     needs={"component": ("drawn",)},
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,
