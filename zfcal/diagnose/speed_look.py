@@ -131,12 +131,6 @@ class _Looks:
         }  # fmt: skip
         return dataclasses.replace(told, ties=tuple(t for t in told.ties if t.name in kept))
 
-    def explains(self, told: Told) -> bool:
-        """Return whether, with a name's features there, no other name gains more than chance."""
-        others = [effect for effect in self.asked if effect.name != told.gain.name]
-        beside = self.paces.and_beside(find_effect(told.gain.name))
-        return tell(pace_gains(beside, others)) is None
-
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         return tell(pace_gains(self.paces.and_beside(beside), [effect])) is not None
 
@@ -177,7 +171,7 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
         return None
     found, score = in_the_model(case, screen, told.gain.name)
-    if not (gains_by_itself(found) or told.lead > BY_ITSELF or looks.explains(told)):
+    if not (gains_by_itself(found) or told.lead > BY_ITSELF):
         return None
     ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
     step = Step(
