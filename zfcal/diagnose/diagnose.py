@@ -47,7 +47,7 @@ from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.second_look import second_look
+from zfcal.diagnose.second_look import look_again
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVALS,
@@ -58,7 +58,6 @@ from zfcal.diagnose.selection import (
     Step,
     best_of,
 )
-from zfcal.diagnose.speed_look import speed_look
 from zfcal.diagnose.telling import says
 from zfcal.diagnose.together import together
 from zfcal.diagnose.tracing import trace
@@ -178,9 +177,7 @@ def _judged(case: Case, rows: Sequence[_Row], selection: Selection, omnibus: Omn
 def _looked_again(case: Case, judged: _Judged) -> _Judged:
     """Return what stands once features were asked what the laws of speeds and headings lack."""
     n = len(judged.kept)
-    before = Found(steps=judged.kept, confirmed=judged.confirmed[:n])
-    paced = speed_look(case, before)
-    found = second_look(case, paced or before) or paced
+    found = look_again(case, Found(steps=judged.kept, confirmed=judged.confirmed[:n]))
     if found is None:
         return judged
     return dataclasses.replace(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +12,17 @@ from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms
-from zfcal.diagnose.case import Case
-from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed
+from zfcal.diagnose.case import QUICK_REPLICATES, Case
+from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
+from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Told
-from zfcal.diagnose.naming import SURE, Refit, by_sample, refit
+from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
+from zfcal.diagnose.null import run_null
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import LEVEL, Step
-from zfcal.model.effects import find_effect
+from zfcal.diagnose.selection import LEVEL, Best, Step
+from zfcal.model.effects import Effect, find_effect
 from zfcal.model.scene import Scene
 
 BY_ITSELF = 4.0
@@ -115,6 +117,84 @@ def stays(there: Refit, told: Told, scene: Scene, at: NDArray[np.int64]) -> bool
     return ahead < -SURE * error if there.is_generic else ahead < SURE * error
 
 
+def not_yet_there(case: Case, beside: Sequence[Effect]) -> list[Effect]:
+    """Return the listed effects that are looked for beside some that are there, by name."""
+    known = {effect.name for effect in beside}
+    return [find_effect(name) for name in sorted({each.name for each in case.listed} - known)]
+
+
+def without_idle_ties(told: Told, stands: Callable[[Effect, Effect], bool]) -> Told:
+    """Return a name without those ties that have nothing to say beside it.
+
+    Parameters
+    ----------
+    told
+        A name and its ties.
+    stands
+        Whether features of one effect gain more than chance beside those of another.
+    """
+    kept, own = [], find_effect(told.gain.name)
+    for tie in told.ties:
+        other = find_effect(tie.name)
+        if stands(other, own) or not stands(own, other):
+            kept.append(tie)
+    return dataclasses.replace(told, ties=tuple(kept))
+
+
+def replicate_nats(
+    case: Case, clear: Sequence[Gain], gains: Callable[[Screen, list[Effect]], Iterable[Gain]]
+) -> list[float]:
+    """Return what features may gain on one more replicate of the model, at most: see `bound`.
+
+    Parameters
+    ----------
+    case
+        The question, whose model makes the replicates.
+    clear
+        Of the features.
+    gains
+        Of a replicate and the effects of these features: what features gain there.
+    """
+    keys = [gain.key for gain in clear]
+    effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
+
+    def ask(_number: int, other: Screen) -> list[float]:
+        most: dict[tuple[str, str], float] = {}
+        for gain in gains(other, effects):
+            most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))
+        return [most.get(key, 0.0) for key in keys]
+
+    n_workers = case.question.n_workers
+    return list(bound(np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))))
+
+
+def held_out(
+    case: Case, screen: Screen, told: Told, made: tuple[Refit, Score]
+) -> tuple[Step, Confirmed]:
+    """Return a name as an effect that was added to a model, and what it gains on held-out steps.
+
+    Parameters
+    ----------
+    case
+        The question.
+    screen
+        The model without it.
+    told
+        The name and its ties.
+    made
+        The effect in the model, and its score there.
+    """
+    best, score = made
+    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
+    step = Step(
+        choice=Choice(best=best, ties=ties, considered=(best, *ties)),
+        best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
+        before=screen,
+    )
+    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
+    return step, dataclasses.replace(confirmed, holds=True, steady=True)
+
+
 def gains_by_itself(form: Refit) -> bool:
     """Return whether the form that goes into the model gains more than chance by itself.
 
@@ -136,8 +216,8 @@ def in_all_minutes(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:
     scene
         Of the recording.
     """
-    minute = (at * scene.dt_s // MINUTES_S).astype(np.int64)
-    return _alike(apart, minute)
+    minute = (scene.k[at] * scene.dt_s // MINUTES_S).astype(np.int64)
+    return _alike(apart, minute - minute.min(initial=0))
 
 
 def in_all_phases(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:

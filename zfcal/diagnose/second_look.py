@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import in_model
-from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise, noise_of
-from zfcal.diagnose.confirming import Confirmed, confirm
+from zfcal.diagnose.case import Case, has_noise, noise_of
+from zfcal.diagnose.confirming import Confirmed
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
@@ -27,27 +25,40 @@ from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
-    bound,
     gains_by_itself,
+    held_out,
     in_all_minutes,
     in_all_phases,
     in_the_model,
+    not_yet_there,
     on_headings,
+    replicate_nats,
     stays,
     with_again,
     with_further,
+    without_idle_ties,
 )
-from zfcal.diagnose.naming import Choice
-from zfcal.diagnose.null import run_null
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import (
     GENERIC_SHARE,
     LEAST_SHARE,
     MOST_EFFECTS,
-    Best,
     Step,
 )
+from zfcal.diagnose.speed_look import speed_look
 from zfcal.model.effects import Effect, find_effect
+
+
+def look_again(case: Case, before: Found) -> Found | None:
+    """Return what is missing once features of speeds were asked, and then those of headings.
+
+    Parameters
+    ----------
+    case, before
+        As of `second_look`.
+    """
+    paced = speed_look(case, before)
+    return second_look(case, paced or before) or paced
 
 
 def second_look(case: Case, before: Found) -> Found | None:
@@ -119,13 +130,7 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     same = None if there is None or there.choice.best.name != found.name else there.choice.best
     if same is not None and (looks.has_later or not found.worth > same.worth):
         return None
-    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
-    step = Step(
-        choice=Choice(best=found, ties=ties, considered=(found, *ties)),
-        best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
-        before=screen,
-    )
-    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
+    step, confirmed = held_out(case, screen, told, (found, score))
     if found.values[found.candidate.effect.strength] == 0.0:
         # No form of ours goes that way: it is another effect, which the list does not have.
         return None
@@ -134,7 +139,7 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
         return None
     return Found(
         steps=(step,),
-        confirmed=(dataclasses.replace(confirmed, holds=True, steady=True),),
+        confirmed=(confirmed,),
         nats=told.gain.nats,
         without_noise=told.gain.without_noise,
     )
@@ -204,7 +209,7 @@ class _Looks:
         is_noisy = self.laws[0].noise_m > 0
         noise = (lambda clear: _noise_nats(case, clear, self.beside)) if is_noisy else None
         told = tell(gains, noise)
-        return None if told is None else self._settled(told)
+        return None if told is None else without_idle_ties(told, self._stands)
 
     def explains(self, told: Told) -> bool:
         """Return whether, with a name's features there, no other name gains more than chance.
@@ -218,18 +223,7 @@ class _Looks:
     @cached_property
     def _asked(self) -> list[Effect]:
         """Effects that are looked for."""
-        known = {effect.name for effect in self.beside}
-        names = {each.name for each in self.case.listed} - known
-        return [find_effect(name) for name in sorted(names)]
-
-    def _settled(self, told: Told) -> Told:
-        """Return a name without those ties that have nothing to say beside it."""
-        kept = []
-        for tie in told.ties:
-            own, other = find_effect(told.gain.name), find_effect(tie.name)
-            if self._stands(other, own) or not self._stands(own, other):
-                kept.append(tie)
-        return dataclasses.replace(told, ties=tuple(kept))
+        return not_yet_there(self.case, self.beside)
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         """Return whether features of an effect gain more than chance beside those of another."""
@@ -260,17 +254,10 @@ def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()
     Of all features that are asked one exceeds its bound by chance in 2 % of cases (Bonferroni).
     The model is that without the effects that were found; their features are fitted as well.
     """
-    keys = [gain.key for gain in clear]
-    effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
+    keys = {gain.key for gain in clear}
 
-    def ask(_number: int, other: Screen) -> list[float]:
+    def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
         law = _law(case, other, noise_of(case.question))
-        found = gains_of(law, effects, kinds=set(keys), beside=beside)
-        most: dict[tuple[str, str], float] = {}
-        for gain in found:
-            most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))
-        return [most.get(key, 0.0) for key in keys]
+        return gains_of(law, effects, kinds=keys, beside=beside)
 
-    n_workers = case.question.n_workers
-    rows = np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))
-    return list(bound(rows))
+    return replicate_nats(case, clear, gains)

@@ -7,37 +7,34 @@ effect on speed that features name is there in all minutes, and not in pulses.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from zfcal.diagnose.candidates import in_model
-from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise
-from zfcal.diagnose.confirming import confirm
+from zfcal.diagnose.case import Case, has_noise
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Told, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
-    bound,
     gains_by_itself,
+    held_out,
     in_all_minutes,
     in_all_phases,
     in_the_model,
+    not_yet_there,
     on_headings,
+    replicate_nats,
     stays,
     with_again,
     with_further,
+    without_idle_ties,
 )
-from zfcal.diagnose.naming import Choice
-from zfcal.diagnose.null import run_null
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import LEAST_SHARE, MOST_EFFECTS, Best, Step
-from zfcal.model.effects import Effect, find_effect
+from zfcal.diagnose.selection import LEAST_SHARE, MOST_EFFECTS, Step
+from zfcal.model.effects import Effect
 
 
 def speed_look(case: Case, before: Found) -> Found | None:
@@ -109,44 +106,22 @@ class _Looks:
         """Fits of features."""
         return Paces(screen=self.screen, beside=self.beside)
 
-    @cached_property
-    def asked(self) -> list[Effect]:
-        """Effects that are looked for."""
-        known = {effect.name for effect in self.beside}
-        names = {each.name for each in self.case.listed} - known
-        return [find_effect(name) for name in sorted(names)]
-
     def tell(self) -> Told | None:
         """Return which name it is; None where chance may have made all gains."""
         noise = self._noise_nats if has_noise(self.case.question) else None
-        told = tell(pace_gains(self.paces, self.asked), noise)
-        if told is None:
-            return None
-        own = find_effect(told.gain.name)
-        ties = [find_effect(tie.name) for tie in told.ties]
-        kept = {
-            other.name
-            for other in ties
-            if self._stands(other, own) or not self._stands(own, other)
-        }  # fmt: skip
-        return dataclasses.replace(told, ties=tuple(t for t in told.ties if t.name in kept))
+        told = tell(pace_gains(self.paces, not_yet_there(self.case, self.beside)), noise)
+        return None if told is None else without_idle_ties(told, self._stands)
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         return tell(pace_gains(self.paces.and_beside(beside), [effect])) is not None
 
     def _noise_nats(self, clear: Sequence[Gain]) -> list[float]:
         """Return what features may gain on one more replicate of the model, at most."""
-        keys = [gain.key for gain in clear]
-        effects = [find_effect(name) for name in sorted({name for name, _ in keys})]
 
-        def ask(_number: int, other: Screen) -> list[float]:
-            paces = Paces(screen=other, beside=self.beside)
-            found = {each.key: float(each.log_p.sum()) for each in pace_gains(paces, effects)}
-            return [found.get(key, 0.0) for key in keys]
+        def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
+            return pace_gains(Paces(screen=other, beside=self.beside), effects)
 
-        workers = self.case.question.n_workers
-        rows = np.array(run_null(self.case.chain, ask, QUICK_REPLICATES, n_workers=workers))
-        return list(bound(rows))
+        return replicate_nats(self.case, clear, gains)
 
 
 def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:
@@ -173,15 +148,5 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     found, score = in_the_model(case, screen, told.gain.name)
     if not (gains_by_itself(found) or told.lead > BY_ITSELF):
         return None
-    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
-    step = Step(
-        choice=Choice(best=found, ties=ties, considered=(found, *ties)),
-        best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
-        before=screen,
-    )
-    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
-    return Found(
-        steps=(step,),
-        confirmed=(dataclasses.replace(confirmed, holds=True, steady=True),),
-        nats=told.gain.nats,
-    )
+    step, confirmed = held_out(case, screen, told, (found, score))
+    return Found(steps=(step,), confirmed=(confirmed,), nats=told.gain.nats)

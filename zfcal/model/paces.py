@@ -26,7 +26,7 @@ class Swum:
     last, before_last, third : ndarray, shape (step,)
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
     last_turn_rad : ndarray, shape (step,)
-        At the beginning of the step before, to either side; 0 where it is not known.
+        Between the last two steps, to either side; 0 where it is not known.
     others : ndarray, shape (step, other)
         Normal scores of the others' last speeds; 0 where they are not known.
     distance_m : ndarray, shape (step, other)
