@@ -124,7 +124,7 @@ FURTHER = dict([
         fall_m=(0.03, 0.10),
     ),
     _form(
-        "crowding/jostle", K.JOSTLE, SPEED, (0.033, 0.062, 0.1),
+        "crowding/jostle", K.JOSTLE, SPEED, (0.028, 0.062, 0.1),
         "with two or more others within reach a fish swims faster by a share",
         reach_m=(0.08, 0.15),
     ),
