@@ -5,8 +5,8 @@ Here each listed effect has one or two more, by another mechanism or dependence;
 such as a reach or a lag are drawn by the seed. Lengths are metres, times seconds.
 
 Strengths are calibrated as those of `hidden.effects`, on half hours of four fish and a
-robot, the base refitted, and lower: a median of 20 to 50 nats is faint, 50 to 150 clear,
-more is strong. One to three strengths of a form were measured, the others follow from these
+robot, the base refitted, each law with its best lapse, and lower: a median of 20 to 50 nats is
+faint, 50 to 150 clear, more is strong. One to three strengths of a form were measured, the others follow from these
 by a power law; `hidden.strengths` prints what each is worth. Bouts (freezing) scatter by the
 number that happen; an oracle counts them as known, which takes some nats off. A component of
 the mixture changes few steps, each by much.
@@ -51,7 +51,7 @@ FURTHER = dict([
         fade_s=(0.5, 2.0),
     ),
     _form(
-        "group-cohesion/centroid", K.CENTROID, HEADING, (0.007, 0.016, 0.045),
+        "group-cohesion/centroid", K.CENTROID, HEADING, (0.014, 0.035, 0.075),
         "a component toward the centroid of all others, seen or not, growing with its distance",
         half_m=(0.1, 0.3),
         kappa=(2.0, 6.0),
@@ -75,13 +75,13 @@ FURTHER = dict([
         who=(0.0, 1.0),
     ),
     _form(
-        "reaction-delay/snapshot", K.SNAPSHOT, HEADING, (0.0051, 0.0089, 0.017),
+        "reaction-delay/snapshot", K.SNAPSHOT, HEADING, (0.0051, 0.0115, 0.026),
         "a share of the attraction goes in the direction in which a neighbour was 0.4 to 1 s "
         "ago, from where the fish was then",
         lag_steps=(2.0, 6.0),
     ),
     _form(
-        "collective-departure/quorum", K.QUORUM, HEADING, (0.054, 0.12, 0.33),
+        "collective-departure/quorum", K.QUORUM, HEADING, (0.18, 0.28, 0.65),
         "a component toward the door, by the share of the others that left in the last seconds",
         memory_s=(3.0, 8.0),
     ),
@@ -176,7 +176,7 @@ FURTHER = dict([
         "each fish's attraction to the centre zone is multiplied by exp(s z), z its own",
     ),
     _form(
-        "robot-avoidance/flee", K.FLEE_ROBOT, HEADING, (0.022, 0.034, 0.058),
+        "robot-avoidance/flee", K.FLEE_ROBOT, HEADING, (0.02, 0.038, 0.085),
         "a component away from the robot within reach, seen or not, the more the nearer",
         reach_m=(0.08, 0.25),
         kappa=(2.0, 6.0),

@@ -186,6 +186,19 @@ def usable_steps(past, n_fish):
     return np.nonzero(fine)
 
 
+def with_lapse(log_p):
+    """Return log densities with the best share of headings from anywhere, the same for all.
+
+    Without it a heading that a law all but excludes is worth as many nats as one likes, and a
+    diagnosis knows better than to believe a single heading.
+    """
+    p = np.exp(log_p)
+    shares = np.concatenate([[0.0], np.geomspace(1e-5, 0.1, 30)])
+    with np.errstate(divide="ignore"):
+        made = [np.log((1 - share) * p + share / (2 * math.pi)) for share in shares]
+    return max(made, key=np.nansum)
+
+
 def oracle_nats(base: Base, world, past, *, n_fish, on=BOTH):
     """Return the nats that an oracle has over the base law's best fit, and that fit.
 
@@ -197,13 +210,16 @@ def oracle_nats(base: Base, world, past, *, n_fish, on=BOTH):
     Returns
     -------
     tuple of dict and Base
-        ``heading`` and ``speed`` are sums over the usable steps; ``total`` counts what
+        ``heading`` and ``speed`` are sums over the usable steps, of headings each law with its
+        best lapse; ``total`` counts what
         the hidden effects act on; ``steps`` is the number of usable headings.
     """
     steps = usable_steps(past, n_fish)
     fitted = fit_base(base, world, past, steps)
     log_base = kernels.log_base(*steps, world, law_of(fitted), past, no_plan(past.xy.shape[1]))
-    heading = float(np.nansum(past.log_heading[steps] - log_base))
+    known = np.isfinite(log_base) & np.isfinite(past.log_heading[steps])
+    true, base_law = (with_lapse(each[known]) for each in (past.log_heading[steps], log_base))
+    heading = float((true - base_law).sum())
     told = np.isfinite(past.log_speed)
     told[: past.first], told[:, n_fish:] = False, False
     zone = past.zone[:-1][told]

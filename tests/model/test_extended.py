@@ -47,6 +47,10 @@ HOOKS = {
     "lag between steps": {"reaction-delay": {"delay_s": 0.3}},
     "some of it late": {"reaction-delay": {"delay_s": 0.4, "share": 0.3}},
     "late directions": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "whole": 0.0}},
+    "sight of then": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "then": 1.0}},
+    "directions of then": {
+        "reaction-delay": {"delay_s": 0.3, "share": 0.3, "whole": 0.0, "then": 1.0}
+    },
     "all": {
         "alignment": {"weight": 20.0, "kappa": 6.0},
         "turning-bias": {"strength": 0.5},
@@ -186,19 +190,21 @@ def test_the_log_density_near_walls_and_borders(two_rooms, model, name):
     assert found == pytest.approx(expected(own, two_rooms, *state, taken, speed), abs=0.02)
 
 
+@pytest.mark.parametrize("then", [0.0, 1.0])
 @pytest.mark.parametrize("whole", [1.0, 0.0])
-def test_a_share_that_is_late_lies_between(two_rooms, model, whole):
+def test_a_share_that_is_late_lies_between(two_rooms, model, whole, then):
     """With no share of it the density is that of a prompt fish, and it moves with the share."""
     scene = one_step(two_rooms, *MIDDLE, 0.7, 0.06)
 
     def at(share):
-        given = {"delay_s": 0.4, "share": share, "whole": whole}
+        given = {"delay_s": 0.4, "share": share, "whole": whole, "then": then}
         return log_density(scene, having(model, {"reaction-delay": given}), 3)
 
     assert at(0.0) == log_density(scene, model, 3)
     prompt, some, all_ = math.exp(at(0.0)), math.exp(at(0.5)), math.exp(at(1.0))
     assert prompt != all_
-    assert some == pytest.approx((prompt + all_) / 2, rel=2e-3)
+    # Not to the last digit: what is seen then has another size, and so another weight.
+    assert some == pytest.approx((prompt + all_) / 2, rel=6e-3)
 
 
 def test_a_late_response_is_that_to_former_places(two_rooms, model):
@@ -544,6 +550,21 @@ def test_a_delay_between_steps_is_likeliest_where_it_is(two_rooms, model):
     }
     assert nats[0.3] > nats[0.2] + 20
     assert nats[0.3] > nats[0.4] + 20
+
+
+@pytest.mark.parametrize("whole", [1.0, 0.0])
+def test_a_former_sight_is_likeliest_where_it_is(two_rooms, model, whole):
+    """Of fish that head where another was seen then, beside one that was seen from here."""
+    given = {"delay_s": 0.4, "whole": whole}
+    late = {t: having(model, {"reaction-delay": {**given, "then": t}}) for t in (0.0, 1.0)}
+    for true, other in ((0.0, 1.0), (1.0, 0.0)):
+        xy_m, _ = simulate_tracks(late[true], two_rooms, n_agents=5, n_steps=1000, seed=9)
+        scene = make_scene(samples_of(xy_m), two_rooms)
+        nats = {
+            w: sum(nats_of(x, t, view_of(scene, m)).sum() for x, t in pairs(scene, m))
+            for w, m in late.items()
+        }
+        assert nats[true] > nats[other] + 20
 
 
 def pairs(scene, model):

@@ -8,7 +8,7 @@ import pytest
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
+from zfcal.model.features import AWAY_M, LAGS, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
 
 N, OTHERS = 6, 3
 
@@ -29,6 +29,8 @@ def seen():
         toward=ways(N, OTHERS),
         soon_toward=ways(N, OTHERS),
         half_toward=ways(N, OTHERS),
+        ago_toward=ways(len(LAGS), N, OTHERS),
+        then_toward=ways(len(LAGS), N, OTHERS),
         late_toward=ways(N, OTHERS),
         older_toward=ways(N, OTHERS),
         late_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
@@ -137,8 +139,8 @@ def test_attention_that_can_but_be_lost_and_leanings_of_one_sign(arena):
         for each in features_of(name, arena):
             assert each.low == 0.0, (name, each.label)
     for name in ("interaction-range", "rear-blind-zone"):
-        (each,) = features_of(name, arena)
-        assert each.high == 0.0
+        for each in features_of(name, arena):
+            assert each.high == 0.0
 
 
 def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
@@ -168,13 +170,34 @@ def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
 
 
 def test_a_late_response_takes_from_the_present_one(arena, seen):
-    """At a strength of one all attention goes to where the others were."""
-    for each in features_of("reaction-delay", arena):
-        weights = each.weights(seen)
-        np.testing.assert_array_equal(weights[:, OTHERS:, 0], -seen.attention)
+    """At a strength of one all attention goes to where the others were, or the fish itself too."""
+    late = features_of("reaction-delay", arena)
+    for each in late:
+        assert each.instead
         assert each.low == 0.0
         # Three tenths of a step are three times one.
         assert each.high == (3.0 if each.label == "a tenth of a step" else 1.0)
+    for k, lag in enumerate(LAGS):
+        here, there = late[4 + k], late[4 + len(LAGS) + k]
+        assert (here.label, there.label) == (f"{lag} steps", f"{lag} steps, from there")
+        np.testing.assert_array_equal(here.toward(seen), seen.ago_toward[k])
+        np.testing.assert_array_equal(there.toward(seen), seen.then_toward[k])
+        np.testing.assert_array_equal(there.weights(seen)[..., 0], seen.attention)
+
+
+def test_the_nearest_alone_is_a_range_by_rank(arena, seen):
+    """Who is farther than the nearest, and than the two nearest, may lose attention."""
+    by_rank = features_of("interaction-range", arena)[1]
+    ranks = np.argsort(np.argsort(seen.distance_m, axis=1), axis=1)
+    expected = np.stack([ranks > 0, ranks > 1], axis=-1) * seen.attention[..., None]
+    np.testing.assert_array_equal(by_rank.weights(seen), expected)
+
+
+def test_habituation_to_robots_leaves_fish_as_they_are(arena, seen):
+    """Attention to fish does not change with the time."""
+    to_robots = features_of("habituation", arena)[1].weights(seen)
+    assert not to_robots[~seen.is_robot].any()
+    assert to_robots[seen.is_robot].any()
 
 
 def test_a_sense_of_travel_is_counted_along_walls_alone(arena, seen):

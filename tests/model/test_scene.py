@@ -186,7 +186,7 @@ def test_a_guess_is_seen_by_the_others(two_rooms):
     assert scene.turns.at[scene.turns.who == 1].tolist() == [1, 5, 6]
     first = scene.turns.take(scene.turns.who == 0)
     assert first.at.tolist() == [1, 2, 3, 4, 5, 6]
-    _, angle = perceive(scene.states, first.at, first.who, 0.0, cos_of(2.0))
+    _, angle = perceive(scene.states, first.at, first.who, 0.0, cos_of(2.0), False)
     assert (angle[:, 1] > 0).all()
     assert scene.n_fish == 2
 
@@ -237,7 +237,7 @@ def test_robots_are_seen_and_make_no_steps(two_rooms):
     assert set(scene.turns.track) == set(scene.moves.track) == {1}
     assert (scene.n_fish, scene.n_robots) == (1, 1)
     (column,) = np.flatnonzero(scene.states[0, KIND] == ROBOT)
-    toward, angle = perceive(scene.states, scene.turns.at, scene.turns.who, 0.0, cos_of(4.0))
+    toward, angle = perceive(scene.states, scene.turns.at, scene.turns.who, 0.0, cos_of(4.0), False)
     assert (angle[:, column] > 0).all()
     assert toward[:, column] == pytest.approx(np.array([[1.0, 0.0]] * 4))
 
@@ -273,11 +273,25 @@ def test_who_responds_late_sees_where_others_were(two_rooms, lag):
     still, moves = [(0.2, 0.75)] * 6, line((0.25, 0.80), 6)
     scene = make_scene(samples_of(still, moves), two_rooms)
     at, who = np.array([4]), np.array([0])
-    now, _ = perceive(scene.states, at, who, 0.0, -2.0)
-    late, _ = perceive(scene.states, at, who, lag, -2.0)
+    now, _ = perceive(scene.states, at, who, 0.0, -2.0, False)
+    late, _ = perceive(scene.states, at, who, lag, -2.0, False)
     # What is seen is the neighbour's head, as far ahead of its centre in both.
     ahead = [0.05 * toward[0, 1, 0] / toward[0, 1, 1] for toward in (now, late)]
     assert ahead[0] - ahead[1] == pytest.approx(0.01 * lag)
+
+
+@pytest.mark.parametrize("lag", [2.0, 0.5])
+def test_what_was_seen_then_is_seen_from_where_the_fish_was(two_rooms, lag):
+    """Two that swim side by side at 1 cm a step see each other straight aside, then as now."""
+    one, other = line((0.20, 0.75), 6), line((0.20, 0.80), 6)
+    scene = make_scene(samples_of(one, other), two_rooms)
+    at, who = np.array([4]), np.array([0])
+    now, now_sr = perceive(scene.states, at, who, 0.0, -2.0, False)
+    then, then_sr = perceive(scene.states, at, who, lag, -2.0, True)
+    from_here, _ = perceive(scene.states, at, who, lag, -2.0, False)
+    np.testing.assert_allclose(then, now, atol=1e-9)
+    np.testing.assert_allclose(then_sr, now_sr, atol=1e-9)
+    assert not np.allclose(from_here, now, atol=1e-3)
 
 
 def test_the_order_of_tracks_does_not_matter(two_rooms, walk):

@@ -24,6 +24,9 @@ from zfcal.arrays import Floats
 AWAY_M = 9.0
 """In place of the distance to one who is not there."""
 
+LAGS = (1, 2, 3, 5)
+"""Steps by which a response may be late."""
+
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
 
@@ -36,11 +39,17 @@ class Seen:
     ----------
     attention : ndarray, shape (step, other)
         alpha times the solid angle at which each other agent is seen; 0 for who is not seen.
-    toward, soon_toward, half_toward, late_toward, older_toward : ndarray, shape (step, other, 2)
+    toward, soon_toward, half_toward : ndarray, shape (step, other, 2)
         Where the base law draws to, away from who is too near: now, where the other was a tenth of
-        a step before, half a step, a step and two steps. Zeros for who is not there.
+        a step before, and half a step. Zeros for who is not there.
+    late_toward, older_toward : ndarray, shape (step, other, 2)
+        The same of whom the fish would have seen, had all others been where they were a step
+        before, and two.
     late_attention, older_attention : ndarray, shape (step, other)
-        As a step before, and two.
+        Likewise.
+    ago_toward, then_toward : ndarray, shape (lag, step, other, 2)
+        Where the other was `LAGS` steps before, seen or not: from where the fish is, and from where
+        it was itself.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s : ndarray, shape (step, other)
@@ -73,6 +82,8 @@ class Seen:
     older_toward: Floats
     late_attention: Floats
     older_attention: Floats
+    ago_toward: Floats
+    then_toward: Floats
     bearing: Floats
     distance_m: Floats
     off_axis_rad: Floats
@@ -128,6 +139,8 @@ class Component:
         Shape (step, source, weight): a strength is fitted for each weight.
     kappa
         Concentration about a source; ``own`` or ``neighbours``: as the base law has it there.
+    instead
+        Whether it takes the place of as large a share of what the others' present places draw.
     low, high
         Bounds of the strengths.
     """
@@ -136,6 +149,7 @@ class Component:
     toward: Weights | Literal["toward", "bearing", "heading"]
     weights: Weights
     kappa: float | Literal["own", "neighbours"] = "neighbours"
+    instead: bool = False
     low: float = 0.0
     high: float | None = None
 

@@ -23,6 +23,7 @@ from zfcal.model.kernels.state import (
     LATE_FELT_M,
     LATE_PART,
     LATE_SHARE,
+    LATE_THEN,
     LATE_WHOLE,
     LAW_BASE,
     LAW_F,
@@ -250,7 +251,7 @@ def _steps_late(delay_s: float, dt_s: float) -> float:
 def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: int) -> Floats:
     """Return what each model sees late: see `zfcal.model.kernels.state.LATE_SHARE`."""
     made = np.ones((n_models, LATE_COLUMNS))
-    made[:, LATE_FELT_M] = 0.0
+    made[:, LATE_FELT_M], made[:, LATE_THEN] = 0.0, 0.0
     for effect in effects:
         for model in range(n_models if effect.lag is not None else 0):
             given = models[model % len(models)]
@@ -259,6 +260,7 @@ def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: in
             made[model, LATE_SHARE] = values[effect.strength]
             made[model, LATE_FELT_M] = values["felt_m"]
             made[model, LATE_WHOLE] = values["whole"]
+            made[model, LATE_THEN] = values["then"]
             made[model, LATE_PART] = steps - math.ceil(steps) + 1.0
     return made
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,12 +32,16 @@ from zfcal.model.kernels.state import (
     LATE_FELT_M,
     LATE_PART,
     LATE_SHARE,
+    LATE_THEN,
     LATE_WHOLE,
     Packed,
 )
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
+
+Late: TypeAlias = dict[tuple[float, bool], tuple[Floats, Floats]]
+"""What was perceived so many steps late, and whether from where the fish itself was then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,8 +71,8 @@ class View:
     tilt_taken: Floats
     seen_sr: Floats
     spin: Floats
-    late: dict[float, tuple[Floats, Floats]] = dataclasses.field(default_factory=dict)
-    """What was perceived so many steps late, so that a fit looks but once."""
+    late: Late = dataclasses.field(default_factory=dict)
+    """What was perceived late, so that a fit looks but once."""
 
 
 def view_of(
@@ -126,14 +131,17 @@ def sees_late(packed: Packed) -> float:
     return lag_of(packed) if late[LATE_SHARE] >= 1.0 and late[LATE_WHOLE] > 0.0 else 0.0
 
 
+def _is_then(packed: Packed) -> bool:
+    """Return whether what is seen late is seen from where the fish itself was."""
+    return bool(packed.lates[0, LATE_THEN] > 0.0)
+
+
 def lag_of(packed: Packed) -> float:
     """Return by how many steps a model's agents respond late."""
     return float(packed.lags[0] - 1.0 + packed.lates[0, LATE_PART])
 
 
-def late_sight(
-    scene: Scene, packed: Packed, known: dict[float, tuple[Floats, Floats]]
-) -> tuple[Floats, Floats]:
+def late_sight(scene: Scene, packed: Packed, known: Late) -> tuple[Floats, Floats]:
     """Return unit vectors and solid angles of neighbours as a model sees them that is late."""
     lag, late = lag_of(packed), packed.lates[0]
     if late[LATE_WHOLE] > 0.0:
@@ -141,19 +149,19 @@ def late_sight(
     toward, angle = _perceived(scene, packed, known, 0.0)
     turns, made = scene.turns, np.empty_like(toward)
     near_m = max(float(late[LATE_FELT_M]), REPULSION_M)
-    head_late(scene.states, turns.at, turns.who, lag, near_m, toward, made)
+    is_then = _is_then(packed)
+    head_late(scene.states, turns.at, turns.who, lag, near_m, is_then, toward, made)
     return made, angle
 
 
-def _perceived(
-    scene: Scene, packed: Packed, known: dict[float, tuple[Floats, Floats]], late: float
-) -> tuple[Floats, Floats]:
+def _perceived(scene: Scene, packed: Packed, known: Late, late: float) -> tuple[Floats, Floats]:
     """Return what is seen so many steps late, with a model's effects on sight."""
-    if late not in known:
+    key = (late, late > 0 and _is_then(packed))
+    if key not in known:
         turns = scene.turns
         cos_fov = float(packed.cos_fov[0])
-        known[late] = perceive(scene.states, turns.at, turns.who, late, cos_fov)
-    toward, angle = known[late]
+        known[key] = perceive(scene.states, turns.at, turns.who, late, cos_fov, key[1])
+    toward, angle = known[key]
     return toward, attended(scene, packed, angle)
 
 
@@ -187,7 +195,9 @@ def angles_of_moves(scene: Scene, packed: Packed) -> Floats:
     ndarray, shape (move, agent)
     """
     moves, late = scene.moves, sees_late(packed)
-    _, angle = perceive(scene.states, moves.at, moves.who, late, float(packed.cos_fov[0]))
+    is_then = late > 0 and _is_then(packed)
+    cos_fov = float(packed.cos_fov[0])
+    _, angle = perceive(scene.states, moves.at, moves.who, late, cos_fov, is_then)
     if not len(packed.sights):
         return angle
     changed = np.empty_like(angle)

@@ -166,7 +166,16 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
         follows=law.follows, alpha=law.alpha,
     )  # fmt: skip
     found, plain = draw_of(steps, states, view), law.draws[0]
-    for name in ("toward", "late_toward", "soon_toward", "bearing", "heading", "own_heading"):
+    for name in (
+        "toward",
+        "late_toward",
+        "ago_toward",
+        "then_toward",
+        "soon_toward",
+        "bearing",
+        "heading",
+        "own_heading",
+    ):
         np.testing.assert_allclose(getattr(found.seen, name), getattr(plain.seen, name), atol=1e-9)
     for name in ("base", "toward", "angle_sr"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-9)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.extended import without_effects
-from zfcal.model.features import AWAY_M, Seen
+from zfcal.model.features import AWAY_M, LAGS, Seen
 from zfcal.model.kernels.perception import REPULSION_M
-from zfcal.model.kernels.scene import fill_states, perceive
+from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
     HX,
     HY,
@@ -199,9 +199,13 @@ def _seen(
 
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
-    toward, angle = perceive(states, at, turns.who, 0.0, cos_fov)
-    late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov)
-    older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov)
+    toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
+    late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov, False)
+    older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov, False)
+    ago, then = np.empty((2, len(LAGS), *toward.shape))
+    for k, lag in enumerate(LAGS):
+        for is_then, made in ((False, ago), (True, then)):
+            head_late(states, at, turns.who, lag, REPULSION_M, is_then, toward, made[k])
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
     dot = (heading[:, None] * bearing).sum(axis=-1)
     past = own[:, [PAST_HX, PAST_HY]]
@@ -220,6 +224,8 @@ def _seen(
         older_toward=older[rows, others],
         late_attention=steps.alpha[:, None] * late_angle[rows, others],
         older_attention=steps.alpha[:, None] * older_angle[rows, others],
+        ago_toward=ago[:, rows, others],
+        then_toward=then[:, rows, others],
         bearing=bearing * present,
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
@@ -254,6 +260,8 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
         half_toward=turn(seen.half_toward, b),
         late_toward=turn(seen.late_toward, b),
         older_toward=turn(seen.older_toward, b),
+        ago_toward=turn(seen.ago_toward, b),
+        then_toward=turn(seen.then_toward, b),
         bearing=turn(seen.bearing, b),
         heading=turn(seen.heading, b),
         own_heading=turn(seen.own_heading, back),

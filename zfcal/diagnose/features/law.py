@@ -220,12 +220,12 @@ class Law:
         """Return the columns of a component, shape (step, weight); of the first draw, if asked."""
 
         def of(draw: Draw) -> Columns:
-            at, over = self._bells_of(feature, draw)
             weights = feature.weights(draw.seen)
-            return (
-                np.asarray(np.einsum("sj,sjb->sb", at, weights)),
-                np.asarray(np.einsum("sj,sjb->sb", over, weights)),
-            )
+            made = _weighed(self._bells_of(feature, draw), weights)
+            if not feature.instead:
+                return made
+            present = self._kept_bells(draw, "toward", feature.kappa)
+            return _less(made, _weighed(present, draw.seen.attention[..., None]))
 
         if first:
             return of(self.draws[0])
@@ -234,10 +234,12 @@ class Law:
     def _bells_of(self, feature: Component, draw: Draw) -> Columns:
         if not isinstance(feature.toward, str):
             return self.bells(feature.toward(draw.seen), self._kappa(feature.kappa))
-        key = (id(draw), feature.toward, feature.kappa)
+        return self._kept_bells(draw, feature.toward, feature.kappa)
+
+    def _kept_bells(self, draw: Draw, toward: str, kappa: float | str) -> Columns:
+        key = (id(draw), toward, kappa)
         if key not in self._kept:
-            toward = getattr(draw.seen, feature.toward)
-            self._kept[key] = self.bells(toward, self._kappa(feature.kappa))
+            self._kept[key] = self.bells(getattr(draw.seen, toward), self._kappa(kappa))
         return self._kept[key]
 
     @cached_property
@@ -367,6 +369,12 @@ def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
     if one is None or other is None:
         return other if one is None else one
     return one + other
+
+
+def _weighed(columns: Columns, weights: Floats) -> Columns:
+    """Return columns of sources, weighed and added up, shape (step, weight)."""
+    at, over = (np.asarray(np.einsum("sj,sjb->sb", each, weights)) for each in columns)
+    return at, over
 
 
 def _less(one: Columns, other: Columns) -> Columns:

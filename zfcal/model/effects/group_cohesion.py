@@ -31,6 +31,23 @@ def centroid(state: Hooked, n: int, i: int) -> tuple[float, float, float]:
 
 
 @inlined
+def middle(state: Hooked, n: int, i: int, nearest: float) -> tuple[float, float, float]:
+    """Return unit vector toward the centroid, or the nearest, and metres to it; -1 without."""
+    if not nearest > 0.0:
+        return centroid(state, n, i)
+    x, y, least = 0.0, 0.0, -1.0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
+            away_m = apart(state, n, i, j)
+            if least < 0.0 or away_m < least:
+                x, y = state[X * n + j] - state[X * n + i], state[Y * n + j] - state[Y * n + i]
+                least = away_m
+    if not least > 0.0:
+        return 0.0, 0.0, -1.0
+    return x / least, y / least, least
+
+
+@inlined
 def grown(away_m: float, full_m: float) -> float:
     """Return the share of the full pull at a distance."""
     return min(1.0, away_m / full_m) if full_m > 0.0 else 1.0
@@ -55,17 +72,17 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
         out[1] = (state[Y * n + k] - state[Y * n + i]) / far_m
         out[2] = parameters[1]
         return parameters[0] * grown(far_m, parameters[2])
-    out[0], out[1], away_m = centroid(state, n, i)
+    out[0], out[1], away_m = middle(state, n, i, parameters[5])
     out[2] = parameters[1]
     return parameters[0] * grown(away_m, parameters[2]) if away_m > 0.0 else 0.0
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the bearing of the centroid of all others, seen or not."""
+    """Weigh headings by the bearing of the centroid of all others, seen or not, or the nearest."""
     if not parameters[3] > 0.0:
         return 1.0
-    x, y, away_m = centroid(state, n, i)
+    x, y, away_m = middle(state, n, i, parameters[5])
     if not away_m > 0.0:
         return 1.0
     return tilt(parameters[0] * parameters[3] * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
@@ -104,6 +121,14 @@ def _of_each_seen(seen: Seen) -> Floats:
     return _of_each(seen) * seen.in_sight[..., None]
 
 
+def _of_nearest(seen: Seen) -> Floats:
+    return _of_each(seen) * seen.nearest
+
+
+def _leaning_to_nearest(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sjd->sbd", _of_nearest(seen), seen.bearing))
+
+
 def _leaning_to_each(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _of_each(seen), seen.bearing))
 
@@ -113,8 +138,10 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
     Component(label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0),
     Component(label="drawn to each seen", toward="bearing", weights=_of_each_seen, kappa=5.0),
+    Component(label="drawn to the nearest", toward="bearing", weights=_of_nearest, kappa=5.0),
     Tilt(label="leaning", vectors=_leaning, low=0.0),
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0),
+    Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0),
 )
 
 
@@ -160,6 +187,13 @@ EFFECT = Effect(
             says="1: a component about the bearing of each that is seen, each of the whole weight, "
             "in place of one about the centroid.",
         ),
+        EffectParameter(
+            name="nearest",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the nearest, seen or not, in place of the centroid.",
+        ),
     ),
     strength="weight",
     probe=0.005,
@@ -175,13 +209,20 @@ EFFECT = Effect(
         {"leaning": 1.0, "full_m": 0.3},
     ),
     each="each",
-    further_shapes=lambda _arena: tuple(
-        {"kappa": kappa, "full_m": full_m, "each": 1.0}
-        for kappa in (2.0, 6.0)
-        for full_m in (0.0, 0.3)
+    further_shapes=lambda _arena: (
+        tuple(
+            {"kappa": kappa, "full_m": full_m, "each": 1.0}
+            for kappa in (2.0, 6.0)
+            for full_m in (0.0, 0.3)
+        )
+        + tuple(
+            {**form, "full_m": full_m, "nearest": 1.0}
+            for form in ({"kappa": 2.0}, {"kappa": 6.0}, {"leaning": 1.0})
+            for full_m in (0.0, 0.3)
+        )
     ),
     lacks=needs_neighbour,
-    fixed=("full_m", "leaning", "each"),
+    fixed=("full_m", "leaning", "each", "nearest"),
     needs={"factor": ("leaning",)},
     features=lambda _arena: _FEATURES,
 )

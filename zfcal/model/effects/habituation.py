@@ -12,14 +12,16 @@ from zfcal.model.effects.forms import cut, needs_neighbour
 from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
-from zfcal.model.kernels.state import TIME
+from zfcal.model.kernels.state import KIND, TIME
 
 _MOST = 3.0
 
 
 @hook(SIGHT)
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh every neighbour by an exponential of time."""
+    """Weigh every neighbour by an exponential of time, or robots alone."""
+    if parameters[2] > 0.0 and not state[KIND * n + j] > 0.0:
+        return 1.0
     later = (state[TIME * n + i] - parameters[1]) / 3600.0
     return math.exp(cut(-parameters[0] * later, -_MOST, _MOST))
 
@@ -33,7 +35,14 @@ def _attention(seen: Seen) -> Floats:
     )
 
 
-_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention),)
+def _attention_to_robots(seen: Seen) -> Floats:
+    return _attention(seen) * seen.is_robot[..., None]
+
+
+_FEATURES: tuple[Feature, ...] = (
+    factor_on_attention(_attention),
+    factor_on_attention(_attention_to_robots, label="attention to robots"),
+)
 
 
 EFFECT = Effect(
@@ -56,12 +65,20 @@ EFFECT = Effect(
             default=900.0,
             says="When attention is as the base model has it, in seconds of the trial.",
         ),
+        EffectParameter(
+            name="robots",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: attention to robots changes, and no other.",
+        ),
     ),
     strength="per_hour",
     probe=0.05,
     sight=sight,
     lacks=needs_neighbour,
-    fixed=("usual_at_s",),
+    further_shapes=lambda _arena: ({"robots": 1.0},),
+    fixed=("usual_at_s", "robots"),
     per_hour=True,
     shown_against="time",
     features=lambda _arena: _FEATURES,

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
 from zfcal.model.features import Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
+from zfcal.model.kernels.state import ZONE
 
 
 @hook(SIGHT)
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Take away from what is farther than the range."""
-    return 1.0 - parameters[0] * beyond(apart(state, n, i, j), parameters[1])
+    """Take away from what is farther than the range, or from who is not among the nearest."""
+    away_m = apart(state, n, i, j)
+    if not parameters[2] > 0.0:
+        return 1.0 - parameters[0] * beyond(away_m, parameters[1])
+    nearer = 0.0
+    for k in range(n):
+        if k not in (i, j) and state[ZONE * n + k] > 0.0 and apart(state, n, i, k) < away_m:
+            nearer += 1.0
+    return 1.0 - parameters[0] * min(1.0, max(0.0, nearer + 1.0 - parameters[2]))
 
 
 _KNOTS_M = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7)
@@ -23,7 +33,16 @@ def _attention(seen: Seen) -> Floats:
     return hats(seen.distance_m, _KNOTS_M)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention, high=0.0),)
+def _farther(seen: Seen) -> Floats:
+    """Return one for who is not the nearest, and for who is not one of the two nearest."""
+    rank = np.argsort(np.argsort(seen.distance_m, axis=1), axis=1)
+    return np.stack([rank > 0, rank > 1], axis=-1).astype(np.float64)
+
+
+_FEATURES: tuple[Feature, ...] = (
+    factor_on_attention(_attention, high=0.0),
+    factor_on_attention(_farther, label="the nearest alone", high=0.0),
+)
 
 
 EFFECT = Effect(
@@ -45,6 +64,13 @@ EFFECT = Effect(
             default=0.12,
             says="Distance at which half of that share is lost, in metres.",
         ),
+        EffectParameter(
+            name="nearest",
+            low=0.0,
+            high=9.0,
+            default=0.0,
+            says="So many of the nearest count, however far they are; 0: the range counts.",
+        ),
     ),
     strength="ignored",
     probe=0.01,
@@ -52,6 +78,8 @@ EFFECT = Effect(
     shapes=lambda _arena: tuple(
         {"range_m": range_m} for range_m in (0.06, 0.09, 0.13, 0.19, 0.28, 0.4)
     ),
+    further_shapes=lambda _arena: ({"nearest": 1.0}, {"nearest": 2.0}),
+    fixed=("nearest",),
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,
 )

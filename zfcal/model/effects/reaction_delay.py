@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import Component, Feature, Seen
+from zfcal.model.features import LAGS, Component, Feature, Seen
 
 
 def _late(
@@ -21,17 +19,34 @@ def _late(
     """Return a share of the attention that goes to where others were, not to where they are."""
     return Component(
         label=label,
-        toward=lambda seen: np.concatenate([toward(seen), seen.toward], axis=1),
-        weights=lambda seen: np.concatenate([attention(seen), -seen.attention], axis=1)[..., None],
+        toward=toward,
+        weights=lambda seen: attention(seen)[..., None],
+        instead=True,
         high=high,
+    )
+
+
+def _ago(k: int) -> Component:
+    """Return where others were some steps ago, from where the fish is."""
+    return _late(f"{LAGS[k]} steps", lambda seen: seen.ago_toward[k], lambda seen: seen.attention)
+
+
+def _then(k: int) -> Component:
+    """Return where others were some steps ago, from where the fish was."""
+    return _late(
+        f"{LAGS[k]} steps, from there",
+        lambda seen: seen.then_toward[k],
+        lambda seen: seen.attention,
     )
 
 
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
     _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
-    _late("a step", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
-    _late("two steps", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
+    _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
+    _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
+    *(_ago(k) for k in range(len(LAGS))),
+    *(_then(k) for k in range(len(LAGS))),
 )
 
 
@@ -69,6 +84,13 @@ EFFECT = Effect(
             says="1: whom fish see, and how large, is of that moment; 0: the direction alone, and "
             "near ones are felt at once.",
         ),
+        EffectParameter(
+            name="then",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: from where the fish is; 1: from where it was at that moment.",
+        ),
     ),
     strength="share",
     lag="delay_s",
@@ -77,12 +99,19 @@ EFFECT = Effect(
         for felt_m, whole in ((0.0, 1.0), (0.05, 0.0))
         for delay_s in (0.2, 0.4, 0.6, 1.0, 1.6)
     ),
-    further_shapes=lambda _arena: tuple(
-        {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
-        for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
+    further_shapes=lambda _arena: (
+        tuple(
+            {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
+            for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
+        )
+        + tuple(
+            {"delay_s": delay_s, "felt_m": 0.0, "whole": whole, "then": 1.0}
+            for whole in (0.0, 1.0)
+            for delay_s in (0.2, 0.4, 0.6, 0.8, 1.0)
+        )
     ),
     lacks=needs_neighbour,
     identity_s=2.4,
-    fixed=("delay_s", "felt_m", "whole"),
+    fixed=("delay_s", "felt_m", "whole", "then"),
     features=lambda _arena: _FEATURES,
 )

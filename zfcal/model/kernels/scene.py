@@ -110,8 +110,8 @@ def _was_there(states: Floats, now: int, lag: float, j: int) -> bool:
 
 @kernel
 def perceive(
-    states: Floats, at: Ints, who: Ints, lag: float, cos_fov: float
-) -> tuple[Floats, Floats]:
+    states: Floats, at: Ints, who: Ints, lag: float, cos_fov: float, is_then: bool
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Return unit vectors to neighbours and the solid angles at which they are seen.
 
     Parameters
@@ -120,6 +120,8 @@ def perceive(
         Sample and agent of each step.
     lag
         Steps by which others are seen late; between two steps they swam straight.
+    is_then
+        Whether they are seen from where the fish itself was then.
 
     Returns
     -------
@@ -131,11 +133,15 @@ def perceive(
     toward, angle = np.zeros((at.size, n, 2)), np.zeros((at.size, n))
     sight = make_sight(n)
     for s in range(at.size):
-        own, i = states[at[s]], who[s]
+        i = who[s]
+        own_lag = lag if is_then else 0.0
+        x, y = _once(states, at[s], own_lag, X, i), _once(states, at[s], own_lag, Y, i)
+        own_hx, own_hy = _once(states, at[s], own_lag, HX, i), _once(states, at[s], own_lag, HY, i)
+        was_there = not is_then or _was_there(states, at[s], lag, i)
         for j in range(n):
-            there = j != i and _was_there(states, at[s], lag, j)
-            dx = _once(states, at[s], lag, X, j) - own[X, i] if there else 0.0
-            dy = _once(states, at[s], lag, Y, j) - own[Y, i] if there else 0.0
+            there = j != i and was_there and _was_there(states, at[s], lag, j)
+            dx = _once(states, at[s], lag, X, j) - x if there else 0.0
+            dy = _once(states, at[s], lag, Y, j) - y if there else 0.0
             hx, hy = _once(states, at[s], lag, HX, j), _once(states, at[s], lag, HY, j)
             length = math.hypot(hx, hy)
             if lag > math.floor(lag) and length > 0.0:
@@ -145,7 +151,7 @@ def perceive(
                 hx, hy = (dx / away, dy / away) if away > 0.0 else (1.0, 0.0)
             sight.dx_m[j], sight.dy_m[j] = dx, dy
             sight.hx[j], sight.hy[j] = hx, hy
-            sight.ahead_m[j] = dx * own[HX, i] + dy * own[HY, i]
+            sight.ahead_m[j] = dx * own_hx + dy * own_hy
         see(sight, cos_fov)
         for j in range(n):
             if sight.angle_sr[j] > 0.0:
@@ -157,7 +163,8 @@ def perceive(
 
 @kernel
 def head_late(
-    states: Floats, at: Ints, who: Ints, lag: float, felt_m: float, toward: Floats, made: Floats
+    states: Floats, at: Ints, who: Ints, lag: float, felt_m: float, is_then: bool, toward: Floats,
+    made: Floats,
 ) -> None:  # fmt: skip
     """Write unit vectors to where others were; to where they are who are near.
 
@@ -167,11 +174,15 @@ def head_late(
         Steps by which others are late.
     felt_m
         Neighbours as near as that are felt at once.
+    is_then
+        Whether it is the direction from where the fish itself was.
     toward, made : ndarray, shape (step, agent, 2)
         As at once, and as received.
     """
     for s in range(at.size):
         own, i = states[at[s]], who[s]
+        own_lag = lag if is_then and _was_there(states, at[s], lag, i) else 0.0
+        x, y = _once(states, at[s], own_lag, X, i), _once(states, at[s], own_lag, Y, i)
         for j in range(states.shape[2]):
             made[s, j, 0], made[s, j, 1] = toward[s, j, 0], toward[s, j, 1]
             near_x, near_y = own[X, j] - own[X, i], own[Y, j] - own[Y, i]
@@ -180,8 +191,7 @@ def head_late(
                 or near_x * near_x + near_y * near_y <= felt_m * felt_m
             ):
                 continue
-            dx = _once(states, at[s], lag, X, j) - own[X, i]
-            dy = _once(states, at[s], lag, Y, j) - own[Y, i]
+            dx, dy = _once(states, at[s], lag, X, j) - x, _once(states, at[s], lag, Y, j) - y
             away = math.sqrt(dx * dx + dy * dy)
             if away > 0.0:
                 made[s, j, 0], made[s, j, 1] = dx / away, dy / away

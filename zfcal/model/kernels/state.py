@@ -41,9 +41,10 @@ LAG_MAX = 10
 # Columns of a zone's parameters.
 KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
 
-# What is late of what agents see: which share; beyond which distance; and whether who is seen,
-# and how large, is late too, or the direction alone.
-LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART, LATE_COLUMNS = range(5)
+# What is late of what agents see: which share; beyond which distance; whether who is seen, and
+# how large, is late too, or the direction alone; and whether it is seen from where the agent itself
+# was.
+LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART, LATE_THEN, LATE_COLUMNS = range(6)
 
 # Laws of a zone's tables of von Mises draws.
 LAW_BASE, LAW_F, LAWS = range(3)
@@ -80,7 +81,8 @@ class Packed(NamedTuple):
     lags : ndarray of int64, shape (model,)
         Steps by which agents respond late, the begun one counted: others are seen where they were.
     lates : ndarray, shape (model, LATE_COLUMNS)
-        Columns LATE_SHARE, LATE_FELT_M (m), LATE_WHOLE, LATE_PART: the share of the begun step.
+        Columns LATE_SHARE, LATE_FELT_M (m), LATE_WHOLE, LATE_PART, the share of the begun step,
+        and LATE_THEN.
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
@@ -285,7 +287,7 @@ def _find_mouth(i: int, state: Floats, tank: Tank) -> None:
 def look_back(
     state: Floats, past: Floats, slot: int, model: int, packed: Packed, sight: Sight
 ) -> None:
-    """Write what each agent sees of where each other one was.
+    """Write what each agent sees of where each other one was, from where it is or was itself.
 
     Parameters
     ----------
@@ -295,13 +297,17 @@ def look_back(
         The step that is seen.
     """
     n = state.shape[1]
+    is_then = packed.lates[model, LATE_THEN] > 0.0
     for i in range(n):
+        x, y, hx, hy = state[X, i], state[Y, i], state[HX, i], state[HY, i]
+        if is_then:
+            x, y, hx, hy = past[slot, 0, i], past[slot, 1, i], past[slot, 2, i], past[slot, 3, i]
         for j in range(n):
             k = i * n + j
-            sight.dx_m[k] = past[slot, 0, j] - state[X, i] if i != j else 0.0
-            sight.dy_m[k] = past[slot, 1, j] - state[Y, i] if i != j else 0.0
+            sight.dx_m[k] = past[slot, 0, j] - x if i != j else 0.0
+            sight.dy_m[k] = past[slot, 1, j] - y if i != j else 0.0
             sight.hx[k], sight.hy[k] = past[slot, 2, j], past[slot, 3, j]
-            sight.ahead_m[k] = sight.dx_m[k] * state[HX, i] + sight.dy_m[k] * state[HY, i]
+            sight.ahead_m[k] = sight.dx_m[k] * hx + sight.dy_m[k] * hy
     see(sight, packed.cos_fov[model])
     if packed.sights.shape[0] > 0:
         _attend(state, model, packed, sight)
@@ -336,7 +342,9 @@ def note_late(
         out[k, 2] = sight.dy_m[k] * sight.toward_per_m[k]
         away = math.hypot(sight.dx_m[k], sight.dy_m[k])
         if late[LATE_WHOLE] == 0.0 and away > late[LATE_FELT_M] and sight.toward_per_m[k] > 0.0:
-            dx, dy = past[slot, 0, j] - state[X, i], past[slot, 1, j] - state[Y, i]
+            is_then = late[LATE_THEN] > 0.0
+            x, y = (past[slot, 0, i], past[slot, 1, i]) if is_then else (state[X, i], state[Y, i])
+            dx, dy = past[slot, 0, j] - x, past[slot, 1, j] - y
             length = math.hypot(dx, dy)
             if length > 0.0:
                 out[k, 1], out[k, 2] = dx / length, dy / length
