@@ -21,6 +21,14 @@ def test_with_fast_neighbours_a_fish_is_fast(ask):
     assert asked.speed() == 1.0
 
 
+def test_who_is_not_seen_counts_where_a_model_says_so(ask):
+    """Both behind: of those of known speed the mean is twice the usual one."""
+    given = {"exponent": 0.5, "unseen": 1.0}
+    asked = ask("speed-matching", given, X=[0.0, 0.1, 0.2], SPEED=[0.07, 0.14, np.nan])
+    asked.sight[:] = 0.0
+    assert asked.speed() == pytest.approx(math.sqrt(2.0))
+
+
 def test_with_focus_the_nearest_neighbour_counts(ask):
     """At 0.05 m and 0.2 m with focus 6: 4096 to one."""
     asked = ask(

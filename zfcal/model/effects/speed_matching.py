@@ -17,7 +17,7 @@ from zfcal.model.effects.forms import (
 from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
-from zfcal.model.kernels.state import SPEED
+from zfcal.model.kernels.state import SPEED, ZONE
 from zfcal.model.paces import Pace, Swum
 
 _LEAST_M = 0.01
@@ -25,10 +25,12 @@ _LEAST_M = 0.01
 
 @hook(SPEED_HOOK)
 def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Return a power of the mean speed of those that are seen, over the usual speed."""
+    """Return a power of the mean speed of those that are seen, or of all, over the usual speed."""
     total, whole = 0.0, 0.0
     for j in range(n):
-        if sight[i * n + j] > 0.0:
+        # Of unknown speed is who has just come into sight.
+        is_there = j != i and state[ZONE * n + j] > 0.0 and state[SPEED * n + j] >= 0.0
+        if sight[i * n + j] > 0.0 or (parameters[4] > 0.0 and is_there):
             weight = max(_LEAST_M, apart(state, n, i, j)) ** -parameters[1]
             total += weight * state[SPEED * n + j]
             whole += weight
@@ -91,14 +93,24 @@ EFFECT = Effect(
             default=0.0,
             says="0: a power of that speed; 1: an exponential of it, per 0.05 m/s.",
         ),
+        EffectParameter(
+            name="unseen",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: those that are not seen count as well.",
+        ),
     ),
     strength="exponent",
     probe=0.01,
     speed=speed,
     shapes=lambda _arena: ({"focus": 0.0}, {"focus": 4.0}),
     lacks=needs_neighbour,
-    further_shapes=lambda _arena: tuple({"focus": focus, "evenly": 1.0} for focus in (0.0, 4.0)),
-    fixed=("focus", "usual_m_s", "evenly"),
+    further_shapes=lambda _arena: (
+        *({"focus": focus, "evenly": 1.0} for focus in (0.0, 4.0)),
+        *({"focus": focus, "evenly": 1.0, "unseen": 1.0} for focus in (0.0, 2.0, 6.0)),
+    ),
+    fixed=("focus", "usual_m_s", "evenly", "unseen"),
     other_forms=("generic:speed:neighbour-speed",),
     paces=(
         Pace(label="of those near", weights=_near),
