@@ -16,12 +16,12 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Told
 from zfcal.diagnose.findings import Verdict
-from zfcal.diagnose.looks import Found, bound, stays
+from zfcal.diagnose.looks import Found, bound, level_of, stays
 from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.second_look import _noise_nats, second_look
-from zfcal.diagnose.selection import Best, Step
+from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 
@@ -223,6 +223,38 @@ def test_features_are_asked_of_the_model_as_it_is(question, looked):
     ((looks, how),) = looked[0]
     assert (looks.case, looks.screen, looks.beside) == (case, case.screen, ())
     assert how == {"there": None}
+
+
+def test_what_no_form_bears_out_is_unexplained_where_nothing_else_was_named(question, looked):
+    """Beside what was named nothing changes, and further looks go on."""
+    case = open_case(question())
+    doubt = Found(steps=(), confirmed=(), nats=30.0, suspicious=True)
+    looked[1].append(doubt)
+    assert second_look(case, NOTHING) is doubt
+    looked[1].append(doubt)
+    assert second_look(case, found("turning-bias")) is None
+    assert [looks.number for looks, _ in looked[0]] == [0, 0, 1]
+
+
+@pytest.mark.slow
+def test_a_name_without_a_form_of_ours_is_unexplained(question, monkeypatch):
+    """Features gain, no form does and the name does not lead: the verdict says so."""
+    asked = question({"directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0}})
+    plain = whole._judged
+    monkeypatch.setattr(
+        whole, "_judged",
+        lambda *args: dataclasses.replace(plain(*args), kept=(), confirmed=(), suspicious=False),
+    )  # fmt: skip
+    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
+    monkeypatch.setattr(looking, "BY_ITSELF", math.inf)
+    monkeypatch.setattr(looking._Looks, "explains", lambda *_: False)
+    assert diagnose(asked, lambda *_: None).verdict is Verdict.UNEXPLAINED
+
+
+def test_looks_share_a_level():
+    """The first ones at speeds and at headings have it together, and so have all that follow."""
+    assert 2 * level_of(0) == LEVEL
+    assert 2 * sum(level_of(k) for k in range(1, 30)) == pytest.approx(LEVEL)
 
 
 def test_where_noise_is_not_known_it_is_that_of_the_likeliest_law(question):

@@ -6,10 +6,10 @@ such as a reach or a lag are drawn by the seed. Lengths are metres, times second
 
 Strengths are calibrated as those of `hidden.effects`, on half hours of four fish and a
 robot, the base refitted, each law with its best lapse, and lower: a median of 20 to 50 nats is
-faint, 50 to 150 clear, more is strong. One to three strengths of a form were measured, the others follow from these
-by a power law; `hidden.strengths` prints what each is worth. Bouts (freezing) scatter by the
-number that happen; an oracle counts them as known, which takes some nats off. A component of
-the mixture changes few steps, each by much.
+faint, 50 to 150 clear, more is strong. One to three strengths of a form were measured, the others
+follow from these by a power law; `hidden.strengths` prints what each is worth. Bouts (freezing)
+scatter by the number that happen; an oracle counts them as known, which takes some nats off. A
+component of the mixture changes few steps, each by much.
 """
 
 from __future__ import annotations

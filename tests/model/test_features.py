@@ -55,7 +55,7 @@ def seen():
         last_turn_rad=rng.normal(0, 0.3, N),
         time=np.linspace(0, 1, N),
         left_s=rng.uniform(0, 9, N),
-        left_at_all_s=rng.uniform(0, 9, N),
+        each_left_s=rng.uniform(0, 9, (N, OTHERS)),
     )
 
 
@@ -183,6 +183,27 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
         np.testing.assert_array_equal(here.toward(seen), seen.ago_toward[k])
         np.testing.assert_array_equal(there.toward(seen), seen.then_toward[k])
         np.testing.assert_array_equal(there.weights(seen)[..., 0], seen.attention)
+
+
+def test_each_that_left_counts_though_it_is_back(arena, seen):
+    """Two that left draw out twice as much as one, and who left long ago does not count."""
+    freshly, drawn = (
+        next(each for each in features_of("collective-departure", arena) if each.label == label)
+        for label in ("time, though it came back", "drawn out by each")
+    )
+    since = np.full((N, OTHERS), np.inf)
+    one, two = since.copy(), since.copy()
+    one[:, 0] = two[:, :2] = 2.0
+    weights = [
+        freshly.weights(dataclasses.replace(seen, each_left_s=each)) for each in (since, one, two)
+    ]
+    assert not weights[0].any()
+    np.testing.assert_allclose(weights[2], 2 * weights[1])
+    assert weights[1].sum(axis=1) == pytest.approx(1.0)
+    found = drawn.weights(dataclasses.replace(seen, each_left_s=two))
+    np.testing.assert_array_equal(found[:, 0], weights[2])
+    long_ago = dataclasses.replace(seen, each_left_s=np.full((N, OTHERS), 60.0))
+    assert not freshly.weights(long_ago).any()
 
 
 def test_the_nearest_alone_is_a_range_by_rank(arena, seen):

@@ -184,7 +184,7 @@ def _looked_again(case: Case, judged: _Judged) -> _Judged:
         judged,
         kept=found.steps,
         confirmed=found.confirmed,
-        suspicious=False,
+        suspicious=found.suspicious,
         without_noise=found.without_noise,
     )
 

@@ -38,13 +38,29 @@ class Found:
     """Effects that are missing, in the order of adding, and what each gains on held-out steps.
 
     ``nats`` is what the clearest of them gains by features, whatever its form. ``without_noise``
-    where one explains what noise of positions had seemed to.
+    where one explains what noise of positions had seemed to. ``suspicious`` where nothing is named
+    though features gain more than chance: no form of ours bears out what they say.
     """
 
     steps: tuple[Step, ...]
     confirmed: tuple[Confirmed, ...]
     nats: float = 0.0
     without_noise: bool = False
+    suspicious: bool = False
+
+
+def level_of(number: int) -> float:
+    """Return the false-alarm level of a look: the first ones, at speeds and at headings, share one.
+
+    Each further look has half of what the one before had. So the level is that of a name where
+    nothing is missing, and of all further names together where something is.
+
+    Parameters
+    ----------
+    number
+        How many looks at the same there were before.
+    """
+    return float(LEVEL / 2 ** (number + 1))
 
 
 def on_headings(step: Step) -> bool:

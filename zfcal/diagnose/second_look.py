@@ -30,6 +30,7 @@ from zfcal.diagnose.looks import (
     in_all_minutes,
     in_all_phases,
     in_the_model,
+    level_of,
     not_yet_there,
     on_headings,
     replicate_nats,
@@ -64,6 +65,9 @@ def look_again(case: Case, before: Found) -> Found | None:
 def second_look(case: Case, before: Found) -> Found | None:
     """Return what is missing once features were asked; None where nothing is to be changed.
 
+    Where nothing was named, and features gain more than chance though no form of ours bears them
+    out, what is found is nothing that has a name: see `Found.suspicious`.
+
     Parameters
     ----------
     case
@@ -82,6 +86,10 @@ def second_look(case: Case, before: Found) -> Found | None:
     has_later = any(on_headings(step) for step in before.steps[n + 1 :])
     looks = _Looks(case=case, screen=screen, beside=tuple(known), has_later=has_later)
     first = _named(looks, there=there)
+    if first is not None and first.suspicious:
+        if not before.steps:
+            return first
+        first = None
     found = before if first is None else with_further(before, n, first)
     if first is not None:
         later = zip(before.steps[n:], before.confirmed[n:], strict=False)
@@ -96,13 +104,14 @@ def second_look(case: Case, before: Found) -> Found | None:
             screen=found.steps[-1].choice.best.screen,
             beside=(*known, *(step.choice.best.candidate.effect for step in named)),
             without_noise=found.without_noise,
+            number=len(named),
         )
         most = max(found.nats, *(step.choice.best.nats for step in named))
         # One beyond the list has no features: its own form is a guess.
         is_guess = any(step.choice.best.is_generic for step in named)
         share = GENERIC_SHARE if is_guess else LEAST_SHARE
         further = _named(looks, least=share * most)
-        if further is None:
+        if further is None or further.suspicious:
             break
         found = with_further(found, len(found.steps), further)
     return None if found is before else found
@@ -130,13 +139,14 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     same = None if there is None or there.choice.best.name != found.name else there.choice.best
     if same is not None and (looks.has_later or not found.worth > same.worth):
         return None
+    nothing = Found(steps=(), confirmed=(), nats=told.gain.nats, suspicious=True)
     step, confirmed = held_out(case, screen, told, (found, score))
     if found.values[found.candidate.effect.strength] == 0.0:
         # No form of ours goes that way: it is another effect, which the list does not have.
-        return None
+        return nothing
     is_borne_out = gains_by_itself(found) and _is_steady(confirmed, found.screen, screen)
     if not (is_borne_out or told.lead > BY_ITSELF or looks.explains(told)):
-        return None
+        return nothing
     return Found(
         steps=(step,),
         confirmed=(confirmed,),
@@ -163,6 +173,8 @@ class _Looks:
     has_later
         Whether more on headings was named after what is held against features: that was
         confirmed beside the form that it has.
+    number
+        How many looks there were before.
     """
 
     case: Case
@@ -170,6 +182,7 @@ class _Looks:
     beside: tuple[Effect, ...]
     without_noise: bool = False
     has_later: bool = False
+    number: int = 0
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:
@@ -208,7 +221,7 @@ class _Looks:
         case, gains = self.case, self.gains(self._asked, self.beside)
         is_noisy = self.laws[0].noise_m > 0
         noise = (lambda clear: _noise_nats(case, clear, self.beside)) if is_noisy else None
-        told = tell(gains, noise)
+        told = tell(gains, noise, level=level_of(self.number))
         return None if told is None else without_idle_ties(told, self._stands)
 
     def explains(self, told: Told) -> bool:

@@ -24,6 +24,7 @@ from zfcal.diagnose.looks import (
     in_all_minutes,
     in_all_phases,
     in_the_model,
+    level_of,
     not_yet_there,
     on_headings,
     replicate_nats,
@@ -65,7 +66,7 @@ def speed_look(case: Case, before: Found) -> Found | None:
         there = [each.choice.best.candidate.effect for each in found.steps]
         screen = found.steps[-1].choice.best.screen if found.steps else case.screen
         least = LEAST_SHARE * max((best.nats for best in named), default=0.0)
-        looks = _Looks(case=case, screen=screen, beside=(*_given(case), *there))
+        looks = _Looks(case=case, screen=screen, beside=(*_given(case), *there), number=len(named))
         further = _named(looks, least=least)
         if further is None:
             break
@@ -95,11 +96,14 @@ class _Looks:
         The model.
     beside
         Effects that are there: whatever form they have, what they explain is not named.
+    number
+        How many looks there were before.
     """
 
     case: Case
     screen: Screen
     beside: tuple[Effect, ...]
+    number: int = 0
 
     @cached_property
     def paces(self) -> Paces:
@@ -109,7 +113,8 @@ class _Looks:
     def tell(self) -> Told | None:
         """Return which name it is; None where chance may have made all gains."""
         noise = self._noise_nats if has_noise(self.case.question) else None
-        told = tell(pace_gains(self.paces, not_yet_there(self.case, self.beside)), noise)
+        gains = pace_gains(self.paces, not_yet_there(self.case, self.beside))
+        told = tell(gains, noise, level=level_of(self.number))
         return None if told is None else without_idle_ties(told, self._stands)
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:

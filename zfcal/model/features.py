@@ -70,8 +70,10 @@ class Seen:
         To the left; 0 where it is not known.
     time : ndarray, shape (step,)
         Share of the recording that has passed.
-    left_s, left_at_all_s : ndarray, shape (step,)
-        Since another one that is still away left the room; since any other one did.
+    left_s : ndarray, shape (step,)
+        Since another one that is still away left the room.
+    each_left_s : ndarray, shape (step, other)
+        Since each other one left it, though it may have come back; infinite for who did not.
     """
 
     attention: Floats
@@ -104,7 +106,7 @@ class Seen:
     last_turn_rad: Floats
     time: Floats
     left_s: Floats
-    left_at_all_s: Floats
+    each_left_s: Floats
 
     @property
     def nearest(self) -> Floats:

@@ -214,7 +214,6 @@ def _seen(
     )
     left_here = here & (theirs(LEFT_FROM, at) == own[:, ROOM, None]) & (own[:, ROOM, None] > 0)
     since_s = own[:, TIME, None] - theirs(LEFT_AT_S, at)
-    left_at_all_s = np.where(left_here, since_s, np.inf).min(axis=1, initial=np.inf)
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
@@ -246,7 +245,7 @@ def _seen(
         last_turn_rad=turned,
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
-        left_at_all_s=left_at_all_s,
+        each_left_s=np.where(left_here, since_s, np.inf),
     )
 
 

@@ -6,42 +6,49 @@ import math
 
 import numpy as np
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.von_mises import exponential
 
 
 @kernel
 def bells(  # noqa: PLR0913, PLR0917 - a kernel
-    toward: Floats, kappa: Floats, weight: Floats, taken: Floats, at_taken: Floats, over: Floats
+    toward: Floats, kappa: Floats, order: Ints, series: Floats, waves: Floats, taken: Floats,
+    at_taken: Floats, over: Floats,
 ) -> None:  # fmt: skip
     """Write von Mises laws, not scaled, at the heading taken and over all cells.
+
+    The sum over cells is that of the Fourier series of the law times the waves of the weights: a
+    few products in place of an exponential for each cell.
 
     Parameters
     ----------
     toward : ndarray, shape (step, source, 2)
         Unit vectors; zeros for no source.
     kappa : ndarray, shape (step,)
-    weight : ndarray, shape (step, cell)
-        Of each cell of headings in the integral.
+    order : ndarray of int64, shape (step,)
+        Row of the series of a step's kappa.
+    series : ndarray, shape (kappa, wave)
+        exp(-kappa) I_m(kappa), twice that from the first wave on; zeros where it ends.
+    waves : ndarray, shape (step, wave, 2)
+        Sums over the cells of weight times cosine and sine of so many times the cell's angle.
     taken : ndarray, shape (step, 2)
     at_taken, over : ndarray, shape (step, source)
     """
-    cells = weight.shape[1]
-    gx, gy = np.empty(cells), np.empty(cells)
-    for g in range(cells):
-        gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
     for s in range(toward.shape[0]):
-        k = kappa[s]
+        k, row = kappa[s], series[order[s]]
         for j in range(toward.shape[1]):
             x, y = toward[s, j, 0], toward[s, j, 1]
             at_taken[s, j], over[s, j] = 0.0, 0.0
             if x == 0.0 and y == 0.0:
                 continue
             at_taken[s, j] = exponential(k * (taken[s, 0] * x + taken[s, 1] * y - 1.0))
-            total = 0.0
-            for g in range(cells):
-                total += weight[s, g] * exponential(k * (gx[g] * x + gy[g] * y - 1.0))
+            total, c, d = 0.0, 1.0, 0.0  # cosine and sine of so many times the angle
+            for m in range(row.size):
+                if row[m] == 0.0:
+                    break
+                total += row[m] * (waves[s, m, 0] * c + waves[s, m, 1] * d)
+                c, d = c * x - d * y, d * x + c * y
             over[s, j] = total
 
 

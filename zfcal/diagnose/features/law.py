@@ -23,6 +23,7 @@ from scipy.special import i0e
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, turn
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
+from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.features import Component, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
@@ -138,6 +139,11 @@ class Law:
         return np.ascontiguousarray(made)
 
     @cached_property
+    def _waves(self) -> Floats:
+        """Fourier sums of the weights, shape (step, wave, 2)."""
+        return waves_of(self.weight)
+
+    @cached_property
     def _gamma(self) -> Floats:
         """Attraction of each zone to who is where a step begins, shape (step, zone)."""
         made = np.exp(self._x[:, 3:-1])
@@ -212,7 +218,10 @@ class Law:
         shape = toward.shape[:2]
         k = np.broadcast_to(np.asarray(kappa, dtype=np.float64), shape[:1]).copy()
         at, over = np.empty(shape), np.empty(shape)
-        bells(np.ascontiguousarray(toward), k, self.weight, self.turns.taken, at, over)
+        order, series = series_of(k)
+        bells(
+            np.ascontiguousarray(toward), k, order, series, self._waves, self.turns.taken, at, over
+        )
         scale = (1 / (2 * math.pi * i0e(k)))[:, None]
         return at * scale, over * scale
 

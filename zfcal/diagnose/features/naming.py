@@ -39,7 +39,7 @@ class Told:
     lead: float = math.inf
 
 
-def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
+def tell(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = LEVEL) -> Told | None:
     """Return which name it is; None where chance may have made all gains.
 
     Parameters
@@ -48,16 +48,18 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None) -> Told | None:
         Of all features of all names.
     noise
         Asked of those alone that stand out; None for positions that are exact.
+    level
+        Of false alarms.
     """
     n_tried = sum(gain.n_tried for gain in once(gains))
-    clear = [gain for gain in gains if gain.p * n_tried < LEVEL and gain.nats > 0]
+    clear = [gain for gain in gains if gain.p * n_tried < level and gain.nats > 0]
     if noise is not None:
         ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
         doubted = [g for g in clear if g.name in ahead and not g.without_noise]
         known = zip(doubted, noise(doubted) if doubted else (), strict=True)
         clear = [gain for gain in clear if gain.without_noise and gain.name in ahead]
         clear += [replace(gain, noise_nats=nats) for gain, nats in known]
-        clear = [gain for gain in clear if gain.p * n_tried < LEVEL and gain.nats > 0]
+        clear = [gain for gain in clear if gain.p * n_tried < level and gain.nats > 0]
     best = best_by_name(clear)
     if not best:
         return None

@@ -66,15 +66,16 @@ def _lacks(company: Company) -> str | None:
     return needs_neighbour(company) if company.has_rooms else "rooms"
 
 
-_KNOTS_S = (0.0, 1.0, 2.0, 4.0, 6.0)
+_KNOTS_S = (0.0, 1.0, 2.5, 5.0, 10.0)
 
 
 def _freshly_left(seen: Seen) -> Floats:
     return hats(seen.left_s, _KNOTS_S)[:, :-1]
 
 
-def _left_at_all(seen: Seen) -> Floats:
-    return hats(seen.left_at_all_s, _KNOTS_S)[:, :-1]
+def _each_left(seen: Seen) -> Floats:
+    """Return how many others have left, by the time since, though they may be back."""
+    return np.asarray(hats(seen.each_left_s, _KNOTS_S)[..., :-1].sum(axis=1))
 
 
 def _way_out(seen: Seen) -> Floats:
@@ -85,14 +86,19 @@ def _freshly(seen: Seen) -> Floats:
     return only(_freshly_left(seen))
 
 
+def _each(seen: Seen) -> Floats:
+    return only(_each_left(seen))
+
+
 def _leaning(seen: Seen) -> Floats:
     return np.asarray(_freshly_left(seen)[..., None] * seen.way_out[:, None])
 
 
 _FEATURES: tuple[Feature, ...] = (
     Leaving(label="time", weights=_freshly_left),
-    Leaving(label="time, though it came back", weights=_left_at_all),
+    Leaving(label="time, though it came back", weights=_each_left),
     Component(label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0),
+    Component(label="drawn out by each", toward=_way_out, weights=_each, kappa=3.0),
     Tilt(label="leaning to the way out", vectors=_leaning),
 )
 

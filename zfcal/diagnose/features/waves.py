@@ -1,0 +1,52 @@
+"""Von Mises laws as Fourier series, for integrals over cells of headings."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ive
+
+from zfcal.arrays import Floats, Ints
+
+WAVES = 96
+"""Terms of a series: as many as a kappa of 150 needs."""
+
+_LEAST = 1e-12
+"""A smaller share of the first term is left out."""
+
+
+def series_of(kappa: Floats) -> tuple[Ints, Floats]:
+    """Return the Fourier series of von Mises laws, times exp(-kappa) and not scaled.
+
+    Parameters
+    ----------
+    kappa : ndarray, shape (step,)
+
+    Returns
+    -------
+    order : ndarray of int64, shape (step,)
+        Row of each step's series.
+    series : ndarray, shape (kappa, wave)
+        exp(-kappa) I_m(kappa), twice that from the first wave on; zeros where it ends (Abramowitz
+        and Stegun 1964, 9.6.34).
+    """
+    known, order = np.unique(kappa, return_inverse=True)
+    m = np.arange(WAVES)
+    series = np.asarray(ive(m, known[:, None]) * np.where(m > 0, 2.0, 1.0), dtype=np.float64)
+    series[series < _LEAST * series[:, :1]] = 0.0
+    return np.asarray(order, dtype=np.int64), series
+
+
+def waves_of(weight: Floats) -> Floats:
+    """Return sums over cells of weight times cosine and sine of so many times the cell's angle.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (step, cell)
+        Of cells of headings all round, the first at 0.
+
+    Returns
+    -------
+    ndarray, shape (step, wave, 2)
+    """
+    whole = np.fft.fft(weight, axis=1)[:, np.arange(WAVES) % weight.shape[1]]
+    return np.ascontiguousarray(np.stack([whole.real, -whole.imag], axis=-1))
