@@ -53,6 +53,7 @@ def seen():
         track=np.arange(N, dtype=np.int32) % 3,
         own_speed_m_s=rng.uniform(0.02, 0.2, N),
         last_turn_rad=rng.normal(0, 0.3, N),
+        recent_turn_rad=rng.normal(0, 0.3, N),
         time=np.linspace(0, 1, N),
         left_s=rng.uniform(0, 9, N),
         each_left_s=rng.uniform(0, 9, (N, OTHERS)),
@@ -163,7 +164,7 @@ def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
 def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
     """There the base forgets the heading, and a heading before is but the present one."""
     unknown = dataclasses.replace(seen, last_turn_rad=np.array([0.0, 0.2] * (N // 2)))
-    drawn, _, leaning = features_of("turning-memory", arena)[2:]
+    drawn, _, leaning = features_of("turning-memory", arena)[3:]
     expected = (~seen.follows_walls) & (unknown.last_turn_rad != 0)
     np.testing.assert_array_equal(drawn.weights(unknown)[:, 0, 0], expected)
     np.testing.assert_array_equal(leaning.vectors(unknown)[:, 0].any(axis=1), expected)

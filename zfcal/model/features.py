@@ -68,6 +68,8 @@ class Seen:
         Of the step itself, which is given.
     last_turn_rad : ndarray, shape (step,)
         To the left; 0 where it is not known.
+    recent_turn_rad : ndarray, shape (step,)
+        Mean of the last turns, the later the more it counts; wide ones count as 1.2.
     time : ndarray, shape (step,)
         Share of the recording that has passed.
     left_s : ndarray, shape (step,)
@@ -104,6 +106,7 @@ class Seen:
     track: NDArray[np.int32]
     own_speed_m_s: Floats
     last_turn_rad: Floats
+    recent_turn_rad: Floats
     time: Floats
     left_s: Floats
     each_left_s: Floats

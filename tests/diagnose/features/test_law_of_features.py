@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from zfcal.diagnose.features.draws import Steps, draw_of, turn
+from zfcal.diagnose.features.draws import Steps, _recent_turn, draw_of, turn
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
 from zfcal.model.features import Component, Turned
-from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, TAU_X, TAU_Y, X, Y
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, X, Y
 
 
 @pytest.fixture(scope="module")
@@ -181,6 +181,17 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     for name in ("base", "toward", "angle_sr"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-9)
     np.testing.assert_allclose(found.seen.off_axis_rad, plain.seen.off_axis_rad, atol=1e-7)
+
+
+def test_recent_turns_are_remembered_the_later_the_more():
+    """A fish that turns by 0.5 at each step, and one that turned round two steps ago."""
+    angle = np.array([[0.5 * k, 0.0 if k < 4 else math.pi] for k in range(7)])
+    states = np.zeros((7, STATES, 2))
+    states[:, HX], states[:, HY] = np.cos(angle), np.sin(angle)
+    at, who = np.array([6, 6, 0]), np.array([0, 1, 0])
+    weights = 0.6 ** np.arange(5) / (0.6 ** np.arange(5)).sum()
+    expected = [0.5, 1.2 * weights[2], 0.0]
+    np.testing.assert_allclose(np.abs(_recent_turn(states, at, who)), expected, atol=1e-12)
 
 
 def test_a_law_without_some_zone_leaves_its_turns_out(base):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,12 @@ from zfcal.units import HEADING_MIN_STEP_M
 
 _SOON = 0.1
 """Share of a step of a response that is a little late."""
+
+_RECENT, _FADING = 5, 0.6
+"""So many turns are remembered, each that much less than the one after it."""
+
+_WIDE_RAD = 1.2
+"""Wider turns count as that: a fish that turns round does not spin."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -243,10 +250,22 @@ def _seen(
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
         last_turn_rad=turned,
+        recent_turn_rad=_recent_turn(states, at, turns.who),
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
     )
+
+
+def _recent_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
+    """Return the mean of the turns before some samples, the later the more it counts."""
+    headings = [states[np.maximum(at - k, 0), :, who][:, [HX, HY]] for k in range(_RECENT + 1)]
+    total, weights = np.zeros(len(at)), _FADING ** np.arange(_RECENT)
+    for weight, (now, before) in zip(weights, pairwise(headings), strict=True):
+        left = before[:, 0] * now[:, 1] - before[:, 1] * now[:, 0]
+        turned = np.arctan2(left, (before * now).sum(axis=1))
+        total += weight * np.clip(turned, -_WIDE_RAD, _WIDE_RAD)
+    return np.asarray(total / weights.sum())
 
 
 def _turned_back(seen: Seen, back: Floats) -> Seen:

@@ -112,6 +112,7 @@ def _leaning(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=_last_turn, neighbours=False),
+    Turned(label="offset by recent turns", by=lambda seen: seen.recent_turn_rad, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
     Component(label="drawn on as it turned", toward=_on, weights=_one, kappa=_KAPPA),
