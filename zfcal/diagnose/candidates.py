@@ -10,6 +10,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
+from zfcal.model.features import LAGS
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import Scene
@@ -150,6 +151,11 @@ def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
             for whole in (1.0, 0.0)
             for steps in _LATE_STEPS
             if steps * scene.dt_s <= longest_s
+        ]
+        shapes += [
+            {effect.lag: lag * scene.dt_s, "felt_m": 0.0, "whole": 0.0, "then": 1.0}
+            for lag in LAGS
+            if lag * scene.dt_s <= longest_s
         ]
     return tuple(_at(effect, shape) for shape in shapes)
 

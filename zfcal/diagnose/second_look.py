@@ -15,7 +15,7 @@ from functools import cached_property
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import in_model
-from zfcal.diagnose.case import Case, has_noise, noise_of
+from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
 from zfcal.diagnose.confirming import Confirmed
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.gains import Gain
@@ -87,7 +87,7 @@ def second_look(case: Case, before: Found) -> Found | None:
     looks = _Looks(case=case, screen=screen, beside=tuple(known), has_later=has_later)
     first = _named(looks, there=there)
     if first is not None and first.suspicious:
-        if not before.steps:
+        if not before.steps and can_suspect(case.question):
             return first
         first = None
     found = before if first is None else with_further(before, n, first)

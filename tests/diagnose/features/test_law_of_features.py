@@ -14,7 +14,7 @@ from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
 from zfcal.model.features import Component, Turned
-from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, X, Y
+from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_von_mises_laws_by_plain_numpy():
     ways = rng.uniform(-np.pi, np.pi, 5)
     taken = np.stack([np.cos(ways), np.sin(ways)], axis=-1)
     at, over = np.empty((5, 2)), np.empty((5, 2))
-    bells(toward, kappa, *series_of(kappa), waves_of(weight), taken, at, over)
+    bells(toward, kappa, *series_of(kappa), waves_of(weight), weight, taken, at, over)
     grid = 2 * np.pi * np.arange(cells) / cells
     plain = np.exp(kappa[:, None, None] * (np.cos(grid - angle[..., None]) - 1))
     plain[0, 1] = 0.0
@@ -86,6 +86,22 @@ def test_von_mises_laws_by_plain_numpy():
     found = np.zeros((5, cells))
     bells_on_cells(toward, kappa, share, found)
     np.testing.assert_allclose(found, (share[..., None] * plain).sum(axis=1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("kappa", [20.0, 60.0, 120.0])
+def test_what_hardly_lands_inside_is_as_exact(kappa):
+    """Cells within 60 degrees of the direction lie outside, where a series would cancel."""
+    angle = np.linspace(-np.pi, np.pi, 50)
+    toward = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+    grid = 2 * np.pi * np.arange(72) / 72
+    apart = np.abs((grid - angle[:, None] + np.pi) % (2 * np.pi) - np.pi)
+    weight = np.where(apart < math.radians(60), 0.0, 0.7)
+    k = np.full(50, kappa)
+    at, over = np.empty((50, 1)), np.empty((50, 1))
+    bells(toward, k, *series_of(k), waves_of(weight), weight, toward[:, 0].copy(), at, over)
+    expected = (weight * np.exp(kappa * (np.cos(apart) - 1))).sum(axis=1)
+    np.testing.assert_allclose(over[:, 0], expected, rtol=1e-4)
+    assert (over > 0).all()
 
 
 def test_tilts_by_plain_numpy():
@@ -187,10 +203,13 @@ def test_recent_turns_are_remembered_the_later_the_more():
     """A fish that turns by 0.5 at each step, and one that turned round two steps ago."""
     angle = np.array([[0.5 * k, 0.0 if k < 4 else math.pi] for k in range(7)])
     states = np.zeros((7, STATES, 2))
-    states[:, HX], states[:, HY] = np.cos(angle), np.sin(angle)
+    states[:, HX], states[:, HY], states[:, ZONE] = np.cos(angle), np.sin(angle), 1.0
     at, who = np.array([6, 6, 0]), np.array([0, 1, 0])
     weights = 0.6 ** np.arange(5) / (0.6 ** np.arange(5)).sum()
     expected = [0.5, 1.2 * weights[2], 0.0]
+    np.testing.assert_allclose(np.abs(_recent_turn(states, at, who)), expected, atol=1e-12)
+    states[4, ZONE] = 0.0
+    expected = [0.5 * weights[:1].sum(), 0.0, 0.0]
     np.testing.assert_allclose(np.abs(_recent_turn(states, at, who)), expected, atol=1e-12)
 
 

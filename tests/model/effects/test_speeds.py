@@ -25,6 +25,7 @@ def test_who_is_not_seen_counts_where_a_model_says_so(ask):
     """Both behind: of those of known speed the mean is twice the usual one."""
     given = {"exponent": 0.5, "unseen": 1.0}
     asked = ask("speed-matching", given, X=[0.0, 0.1, 0.2], SPEED=[0.07, 0.14, np.nan])
+    assert asked.speed() == pytest.approx(math.sqrt(2.0))
     asked.sight[:] = 0.0
     assert asked.speed() == pytest.approx(math.sqrt(2.0))
 

@@ -261,10 +261,13 @@ def _recent_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) 
     """Return the mean of the turns before some samples, the later the more it counts."""
     headings = [states[np.maximum(at - k, 0), :, who][:, [HX, HY]] for k in range(_RECENT + 1)]
     total, weights = np.zeros(len(at)), _FADING ** np.arange(_RECENT)
-    for weight, (now, before) in zip(weights, pairwise(headings), strict=True):
+    is_known = np.ones(len(at), dtype=bool)
+    for k, (weight, (now, before)) in enumerate(zip(weights, pairwise(headings), strict=True)):
+        # Before a gap it may have been another one.
+        is_known &= states[np.maximum(at - k - 1, 0), ZONE, who] > 0
         left = before[:, 0] * now[:, 1] - before[:, 1] * now[:, 0]
         turned = np.arctan2(left, (before * now).sum(axis=1))
-        total += weight * np.clip(turned, -_WIDE_RAD, _WIDE_RAD)
+        total += np.where(is_known, weight * np.clip(turned, -_WIDE_RAD, _WIDE_RAD), 0.0)
     return np.asarray(total / weights.sum())
 
 

@@ -220,8 +220,9 @@ class Law:
         at, over = np.empty(shape), np.empty(shape)
         order, series = series_of(k)
         bells(
-            np.ascontiguousarray(toward), k, order, series, self._waves, self.turns.taken, at, over
-        )
+            np.ascontiguousarray(toward), k, order, series, self._waves, self.weight,
+            self.turns.taken, at, over,
+        )  # fmt: skip
         scale = (1 / (2 * math.pi * i0e(k)))[:, None]
         return at * scale, over * scale
 

@@ -30,7 +30,7 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
     for j in range(n):
         # Of unknown speed is who has just come into sight.
         is_there = j != i and state[ZONE * n + j] > 0.0 and state[SPEED * n + j] >= 0.0
-        if sight[i * n + j] > 0.0 or (parameters[4] > 0.0 and is_there):
+        if is_there and (sight[i * n + j] > 0.0 or parameters[4] > 0.0):
             weight = max(_LEAST_M, apart(state, n, i, j)) ** -parameters[1]
             total += weight * state[SPEED * n + j]
             whole += weight

@@ -137,6 +137,9 @@ def perceive(
         own_lag = lag if is_then else 0.0
         x, y = _once(states, at[s], own_lag, X, i), _once(states, at[s], own_lag, Y, i)
         own_hx, own_hy = _once(states, at[s], own_lag, HX, i), _once(states, at[s], own_lag, HY, i)
+        length = math.hypot(own_hx, own_hy)
+        if own_lag > math.floor(own_lag) and length > 0.0:
+            own_hx, own_hy = own_hx / length, own_hy / length
         was_there = not is_then or _was_there(states, at[s], lag, i)
         for j in range(n):
             there = j != i and was_there and _was_there(states, at[s], lag, j)
