@@ -294,6 +294,23 @@ def test_what_was_seen_then_is_seen_from_where_the_fish_was(two_rooms, lag):
     assert not np.allclose(from_here, now, atol=1e-3)
 
 
+def test_between_two_steps_a_fish_looks_half_way(two_rooms):
+    """It turned by 120 degrees: half way it heads for 60, and 70 aside lies in a field of 75.5."""
+    turned, half = math.radians(120), math.radians(60)
+    own = line((0.18, 0.75), 5)
+    own += [(own[-1][0] + 0.01 * math.cos(turned), own[-1][1] + 0.01 * math.sin(turned))]
+    middle = np.mean([own[-2], own[-1]], axis=0)
+    aside = half + math.radians(70)
+    other = [tuple(middle + 0.08 * np.array([math.cos(aside), math.sin(aside)]))] * 6
+    scene = make_scene(samples_of(own, other), two_rooms)
+    at, who = np.array([5]), np.array([0])
+    seen = [
+        perceive(scene.states, at, who, 0.5, field, True)[1][0, 1] > 0
+        for field in (math.cos(math.radians(60)), 0.25)
+    ]
+    assert seen == [False, True]
+
+
 def test_the_order_of_tracks_does_not_matter(two_rooms, walk):
     """With ids dealt anew the same steps come out."""
     other = walk.take_agents(np.array([3, 1, 4, 0, 2]))
