@@ -15,6 +15,7 @@ from zfcal.diagnose.candidates import (
 )
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.generic import generic_effects
+from zfcal.model.features import LAGS
 from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import make_scene
 
@@ -175,5 +176,11 @@ def test_no_response_is_later_than_it_can_be(scene_of):
     scene = scene_of()
     here = forms_of(scene, "reaction-delay", "delay_s")
     assert {0.5 * scene.dt_s, scene.dt_s, 1.5 * scene.dt_s, 2 * scene.dt_s} <= here
+    then = [each.shape for each in further_forms(find_effect("reaction-delay"), scene)
+            if each.shape["then"]]  # fmt: skip
+    assert {(shape["delay_s"], shape["whole"]) for shape in then} == {
+        (lag * scene.dt_s, whole) for lag in LAGS for whole in (0.0, 1.0)
+    }
+    assert len(then) == 2 * len(LAGS)
     slow = dataclasses.replace(scene, dt_s=1.25)
     assert max(forms_of(slow, "reaction-delay", "delay_s")) <= 2.0

@@ -135,8 +135,9 @@ def candidates_of(
 def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
     """Return an effect at the shapes in which features alone may find it.
 
-    One that responds late may do so by half a step of the recording, by one, and so on. One that
-    is about a certain agent is asked of fish that are the same from beginning to end.
+    One that responds late may do so by half a step of the recording, by one, and so on, and to what
+    was seen then from where the fish was itself. One that is about a certain agent is asked of fish
+    that are the same from beginning to end.
     """
     sure = _lasting_fish(scene)
     shapes = [
@@ -153,7 +154,8 @@ def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
             if steps * scene.dt_s <= longest_s
         ]
         shapes += [
-            {effect.lag: lag * scene.dt_s, "felt_m": 0.0, "whole": 0.0, "then": 1.0}
+            {effect.lag: lag * scene.dt_s, "felt_m": 0.0, "whole": whole, "then": 1.0}
+            for whole in (1.0, 0.0)
             for lag in LAGS
             if lag * scene.dt_s <= longest_s
         ]

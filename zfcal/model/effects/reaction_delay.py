@@ -99,16 +99,9 @@ EFFECT = Effect(
         for felt_m, whole in ((0.0, 1.0), (0.05, 0.0))
         for delay_s in (0.2, 0.4, 0.6, 1.0, 1.6)
     ),
-    further_shapes=lambda _arena: (
-        tuple(
-            {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
-            for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
-        )
-        + tuple(
-            {"delay_s": delay_s, "felt_m": 0.0, "whole": whole, "then": 1.0}
-            for whole in (0.0, 1.0)
-            for delay_s in (0.2, 0.4, 0.6, 0.8, 1.0)
-        )
+    further_shapes=lambda _arena: tuple(
+        {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
+        for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
     ),
     lacks=needs_neighbour,
     identity_s=2.4,
