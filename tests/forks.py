@@ -26,6 +26,8 @@ STAGES = (
     "zfcal.stages.track.track",
 )
 
+POLL_S = 0.002
+
 
 class Forks:
     """Runs one command at a time in such a fork; leaving its block ends it."""
@@ -78,11 +80,16 @@ class Forks:
         """Whether a command was started that nobody has waited for."""
         return self._running is not None
 
-    def run(self, folder, words, *, kill_after_s=None):
-        """Run a command; with a time, kill it then. Return whether it had ended by itself."""
+    def run(self, folder, words, *, kill_after_s=None, once=None):
+        """Run a command; with a time, kill it then. Return whether it had ended by itself.
+
+        The time begins at the start, or once something holds, unless it ends before.
+        """
         self.start(folder, *words)
         if kill_after_s is None:
             return self.wait()
+        while once and not once() and not select.select([self._process.stdout], [], [], 0.0)[0]:
+            time.sleep(POLL_S)
         time.sleep(kill_after_s)
         return self.kill()
 
