@@ -1,5 +1,6 @@
 """A diagnosis as a document, and back."""
 
+import dataclasses
 import json
 import math
 
@@ -10,7 +11,7 @@ import shapely
 from zfcal.arena import make_arena
 from zfcal.artifacts.validation import check
 from zfcal.diagnose.document import findings_document, gap_document, read_document
-from zfcal.diagnose.findings import Gap, Trace
+from zfcal.diagnose.findings import FeatureCurve, Gap, Trace
 from zfcal.diagnose.pictured import MOST_AGENTS, picture_of
 from zfcal.diagnose.question import Question
 from zfcal.errors import InputError
@@ -83,6 +84,26 @@ def test_what_is_read_back_is_what_was_found(tank, model, make_diagnosis):
     assert np.array_equal(found.pictured[0].place_n, pictured.place_n)
     assert found.pictured[0].place == pytest.approx(pictured.place, rel=1e-5, nan_ok=True)
     assert found.pictured[0].minutes.after == pytest.approx(pictured.minutes.after, rel=1e-5)
+
+
+def test_curves_of_features_are_read_back(tank, model, make_diagnosis):
+    """Those of an effect on headings; an end of an interval that is not known is null."""
+    curve = FeatureCurve(
+        label="leaning", nats=84.0, form_nats=76.25, cue="distance (m)", strength_name="nats",
+        at=np.array([0.0, 0.1]), strength=np.array([0.2, 0.05]), low=np.array([0.1, np.nan]),
+        high=np.array([0.3, 0.1]), form=np.array([0.15, 0.06]), besides={"x": (0.1, 0.05, 0.15)},
+    )  # fmt: skip
+    diagnosis = make_diagnosis(tank, model)
+    first = dataclasses.replace(diagnosis.effects[0], by_features=curve)
+    diagnosis = dataclasses.replace(diagnosis, effects=(first, *diagnosis.effects[1:]))
+    document = json.loads(json.dumps(findings_document(diagnosis, tank)))
+    check(document, "findings", "findings.json")
+    assert document["details"]["effects"][0]["by_features"]["low"] == [0.1, None]
+    found = read_document(document).effects[0].by_features
+    assert (found.label, found.nats, found.form_nats) == ("leaning", 84.0, 76.25)
+    assert (found.cue, found.strength_name, found.besides) == (curve.cue, "nats", curve.besides)
+    for key in ("at", "strength", "low", "high", "form"):
+        assert getattr(found, key) == pytest.approx(getattr(curve, key), nan_ok=True)
 
 
 def test_a_document_of_the_contract_alone_can_be_read(tank, model, make_diagnosis):

@@ -122,22 +122,35 @@ def test_what_was_named_stays_by_what_it_gains(law, generic, share, kept):
     assert stays(there, told, law.scene, law.turns.at) is kept
 
 
-def test_the_same_name_stays_in_its_own_form_unless_features_gain_more(law):
-    """What features cannot tell from the best stays as well."""
-    values = np.full(len(law.rows), 0.1)
-    by = np.bincount(law.turns.at, values, minlength=len(law.scene.k))
-    apart = np.random.default_rng(6).normal(0, 0.1, len(by))
-    same = by + apart - apart.mean()
-    told = Told(gain=gain("alignment", values), p=0.0, ties=())
-    for share, kept in ((1.0, True), (0.5, False)):
-        there = SimpleNamespace(
-            name="alignment", gain=share * same, nats=share * same.sum(), is_generic=False
-        )
-        assert stays(there, told, law.scene, law.turns.at) is kept
-    nothing = np.zeros(len(law.scene.k))
-    there = SimpleNamespace(name="alignment", gain=nothing, nats=0.0, is_generic=False)
-    tied = Told(gain=gain("x", values), p=0.0, ties=(gain("alignment", values),))
-    assert stays(there, tied, law.scene, law.turns.at)
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("group-cohesion", {"weight": 2.5}),
+        ("directional-drift", {"strength": 1.5, "direction_rad": 2.0}),
+        ("place-preference", {"strength": 3.0, "x_m": 0.3, "y_m": 0.8}),
+    ],
+)
+def test_a_name_gets_the_form_that_the_fish_have(question, name, values):
+    """Fish that turn to something look as if all their headings leaned toward it, or to a place."""
+    given = {**values, "turning": 1.0}
+    (effect,) = diagnose(question({name: given}), lambda *_: None).effects
+    strength = find_effect(name).strength
+    assert (effect.name, effect.strength["turning"]) == (name, 1.0)
+    low, high = effect.interval[strength]
+    assert low < values[strength] < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("direction_rad", [2.0, 2.0 - math.pi])
+def test_of_a_direction_and_its_opposite_the_right_one_is_fitted(question, direction_rad):
+    """Their scores have the same size: only the sign tells which of them fish prefer."""
+    given = {"strength": 0.3, "direction_rad": direction_rad}
+    case = open_case(question({"directional-drift": given}))
+    found, _ = common.in_the_model(case, case.screen, "directional-drift")
+    assert found.values["turning"] == found.values["drawn"] == 0.0
+    assert found.interval["strength"][0] > 0.1
+    assert abs(math.remainder(found.values["direction_rad"] - direction_rad, math.tau)) < 0.5
 
 
 def test_what_says_the_same_in_another_form_gets_the_listed_name(law):

@@ -45,6 +45,7 @@ def seen():
         is_robot=robot,
         other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:OTHERS], (N, 1)),
         own_heading=ways(N),
+        x_axis=np.tile([1.0, 0.0], (N, 1)),
         way_out=ways(N),
         along_wall=ways(N),
         xy_m=rng.uniform(0.1, 0.3, (N, 2)),
@@ -108,12 +109,19 @@ def test_features_have_a_number_for_each_step_and_weight(name, arena, seen):
             assert values[0].shape[::2] == (N, 2)
         elif isinstance(each, Turned):
             values = (each.by(seen),)
-            assert values[0].shape == (N,)
+            assert values[0].shape[0] == N
         else:
             assert isinstance(each, Leaving)
             values = (each.weights(seen),)
             assert values[0].shape[0] == N
         assert all(np.isfinite(value).all() for value in values)
+        along = getattr(each, "along", None)
+        if along is not None:
+            # A curve has a weight for each of its knots.
+            n = values[-1].shape[1 if isinstance(each, Tilt) else -1]
+            assert n == len(along.knots) + len(along.besides)
+            assert list(along.knots) == sorted(along.knots)
+            assert along.none_at is None or along.none_at < along.knots[0]
 
 
 def test_who_is_not_there_has_no_weight(arena, seen):

@@ -100,6 +100,20 @@ def test_effects_take_part():
     assert near[1] > near[0] + 0.2
 
 
+def test_a_model_without_turns_forgets_those_of_the_one_before():
+    """A model that leans against all that it draws, so that rare draws are of a grid."""
+    back = OWN[2] + math.pi
+    lean = with_effects(**{"directional-drift": {"strength": 4.0, "direction_rad": back}})
+    turn = with_effects(
+        **{"directional-drift": {"strength": 4.0, "direction_rad": 2.0, "turning": 1.0}}
+    )
+    packed, other = pack([lean], ARENA), pack([turn], ARENA)
+    fresh, used = among(), among()
+    for seed in range(600):
+        used.step(other, seed)
+        assert used.step(packed, seed) == fresh.step(packed, seed)
+
+
 def test_a_response_that_lags_sees_where_the_others_were():
     """Fish that jump across the agent are approached where they were some steps ago."""
     model = with_effects(**{"reaction-delay": {}})

@@ -168,8 +168,8 @@ def free_of_model(model: Parameters) -> Free:
         for name in model.effects
         for effect in (find_effect(name),)
         if not effect.on_speed
-        for key in effect.names
-        if key not in effect.fixed and key in model.effects[name]
+        for key in effect.free(model.effects[name])
+        if key in model.effects[name]
     )
 
 

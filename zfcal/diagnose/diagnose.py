@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.answers import effect_found, screened_of, verdict_of
 from zfcal.diagnose.candidates import Candidate, in_model, not_forms_of
 from zfcal.diagnose.case import (
     QUICK_REPLICATES,
@@ -26,11 +26,8 @@ from zfcal.diagnose.confirming import Confirmed, confirm
 from zfcal.diagnose.controls import ask_controls
 from zfcal.diagnose.findings import (
     Diagnosis,
-    EffectFound,
     Located,
     Note,
-    Screened,
-    Verdict,
 )
 from zfcal.diagnose.heats import Sampled, hopeful
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
@@ -47,7 +44,7 @@ from zfcal.diagnose.omnibus import Omnibus, judge
 from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.second_look import look_again
+from zfcal.diagnose.second_look import curves_of, look_again
 from zfcal.diagnose.selection import (
     LEVEL,
     RIVALS,
@@ -58,9 +55,7 @@ from zfcal.diagnose.selection import (
     Step,
     best_of,
 )
-from zfcal.diagnose.telling import says
 from zfcal.diagnose.together import together
-from zfcal.diagnose.tracing import trace
 
 _GENERIC_REPLICATES = 8
 _AT_LARGE_REPLICATES = 20
@@ -69,9 +64,6 @@ _AT_LARGE_REPLICATES = 20
 _QUICK_Z = 2.5
 """Where positions are not sharp, a quick answer holds what is larger than that against a few
 replicates."""
-
-_NOTICED = 5.0
-"""Standard errors at which an effect of faint strength must stand to be testable."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -315,9 +307,12 @@ def _diagnosis(
     where: tuple[Located, ...],
 ) -> Diagnosis:
     steps = judged.kept
+    curves = curves_of(case, steps, without_noise=judged.without_noise)
     effects = tuple(
-        _effect(step, held, ties_of(step.choice, [each.choice for each in steps[number:]]))
-        for number, (step, held) in enumerate(zip(steps, judged.confirmed, strict=False), start=1)
+        effect_found(step, held, ties_of(step.choice, [each.choice for each in steps[n:]]), curve)
+        for n, (step, held, curve) in enumerate(
+            zip(steps, judged.confirmed[: len(steps)], curves, strict=True), start=1
+        )
     )
     final = steps[-1].choice.best.screen if steps else case.screen
     question = case.question
@@ -325,9 +320,9 @@ def _diagnosis(
         question = dataclasses.replace(
             question, noise_m=0.0, noise_source="the law of headings, with what was found"
         )
-    screened = _screened(case, selection.screened)
+    screened = screened_of(case, selection.screened)
     return Diagnosis(
-        verdict=_verdict(effects, screened, suspicious=judged.suspicious or selection.left_over),
+        verdict=verdict_of(effects, screened, suspicious=judged.suspicious or selection.left_over),
         where=where,
         effects=effects,
         screened=screened,
@@ -338,59 +333,6 @@ def _diagnosis(
         extended=final.fitted.parameters,
         minutes=case.scene.duration_s / 60,
         n_steps=len(case.scene.turns),
-    )
-
-
-def _effect(step: Step, held: Confirmed, ties: tuple[str, ...]) -> EffectFound:
-    best = step.choice.best
-    return EffectFound(
-        name=best.name,
-        says=says(best.candidate, best.values, best.interval),
-        strength=best.values,
-        interval=best.interval,
-        gain_nats_per_step=held.gain_nats_per_step,
-        gain_se=held.gain_se,
-        p=step.best.p,
-        ties=ties,
-        trace=trace(step.best.score, step.before, best),
-    )
-
-
-def _verdict(
-    effects: tuple[EffectFound, ...], screened: tuple[Screened, ...], *, suspicious: bool
-) -> Verdict:
-    if effects:
-        return Verdict.TIE if effects[0].ties else Verdict.NAMED
-    if suspicious:
-        return Verdict.UNEXPLAINED
-    asked = [each for each in screened if each.lacks is None]
-    blind = [each for each in asked if each.minutes_needed is not None]
-    return Verdict.UNTESTABLE if 2 * len(blind) > len(asked) else Verdict.NO_EFFECT
-
-
-def _screened(case: Case, ranked: Sequence[Best]) -> tuple[Screened, ...]:
-    minutes = case.scene.duration_s / 60
-    made = [_as_screened(best, minutes) for best in ranked]
-    made += [
-        Screened(name=name, z=math.nan, p=1.0, minutes_needed=None, lacks=what)
-        for name, what in case.lacks.items()
-    ]
-    return tuple(made)
-
-
-def _as_screened(best: Best, minutes: float) -> Screened:
-    candidate = best.score.candidate
-    expected = abs(candidate.faint) * math.sqrt(max(best.information, 0.0))
-    # Of a change with the hour a recording twice as long tells eight times as much.
-    power = 2 / 3 if candidate.is_slow else 2
-    needed = minutes * (_NOTICED / max(expected, 1e-3)) ** power
-    enough = expected >= _NOTICED or best.p < LEVEL
-    return Screened(
-        name=candidate.name,
-        z=best.z,
-        p=best.p,
-        minutes_needed=None if enough else needed,
-        shape=candidate.shape,
     )
 
 

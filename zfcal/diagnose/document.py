@@ -13,6 +13,7 @@ from zfcal.arena import Arena
 from zfcal.diagnose.findings import (
     Diagnosis,
     EffectFound,
+    FeatureCurve,
     Gap,
     Located,
     Note,
@@ -182,6 +183,8 @@ def _effect(effect: EffectFound) -> dict[str, Any]:
 def _details(effect: EffectFound, arena: Arena) -> dict[str, Any]:
     pictured = None if effect.trace is None else picture_of(effect.trace, arena)
     made: dict[str, Any] = {"gain_se": _value(effect.gain_se)}
+    if effect.by_features is not None:
+        made["by_features"] = _plain(effect.by_features)
     if pictured is not None:
         made |= {
             "place": {
@@ -228,6 +231,26 @@ def _found(entry: Mapping[str, Any], details: Mapping[str, Any] | None) -> Effec
         gain_se=_number((details or {}).get("gain_se")),
         p=_number(entry["p"]),
         ties=tuple(entry["ties"]),
+        by_features=_curve((details or {}).get("by_features")),
+    )
+
+
+def _three(values: Sequence[float | None]) -> tuple[float, float, float]:
+    value, low, high = map(_number, values)
+    return value, low, high
+
+
+def _curve(entry: Mapping[str, Any] | None) -> FeatureCurve | None:
+    if entry is None:
+        return None
+    return FeatureCurve(
+        label=entry["label"],
+        nats=_number(entry["nats"]),
+        form_nats=_number(entry["form_nats"]),
+        cue=entry["cue"],
+        strength_name=entry["strength_name"],
+        **{key: _array(entry[key]) for key in ("at", "strength", "low", "high", "form")},
+        besides={name: _three(values) for name, values in entry["besides"].items()},
     )
 
 

@@ -116,6 +116,40 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FeatureCurve:
+    """What an effect's best feature says, whatever the form in which fish have the effect.
+
+    Parameters
+    ----------
+    label
+        Of the feature.
+    nats, form_nats
+        Log likelihood gained by it, and by the form that goes into the model; less one for each
+        strength of the feature.
+    cue, strength_name
+        What its strengths go by, and what they are, with units; empty where they are no curve.
+    at, strength, low, high : ndarray, shape (knot,)
+        The curve, linear between knots, and its 95 % interval.
+    form : ndarray, shape (knot,)
+        The same of headings drawn from the model with the effect.
+    besides
+        By name, further strengths that are no part of the curve, and their 95 % intervals.
+    """
+
+    label: str
+    nats: float
+    form_nats: float
+    cue: str = ""
+    strength_name: str = ""
+    at: Floats = field(default_factory=lambda: np.zeros(0))
+    strength: Floats = field(default_factory=lambda: np.zeros(0))
+    low: Floats = field(default_factory=lambda: np.zeros(0))
+    high: Floats = field(default_factory=lambda: np.zeros(0))
+    form: Floats = field(default_factory=lambda: np.zeros(0))
+    besides: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EffectFound:
     """An effect that the model lacks.
 
@@ -135,6 +169,8 @@ class EffectFound:
         Effects that cannot be told from it on this recording.
     trace
         For the pictures.
+    by_features
+        What its features say; None for an effect on speed, or one beyond the list.
     """
 
     name: str
@@ -146,6 +182,7 @@ class EffectFound:
     p: float
     ties: tuple[str, ...] = ()
     trace: Trace | None = None
+    by_features: FeatureCurve | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -111,20 +111,18 @@ def stays(there: Refit, told: Told, scene: Scene, at: NDArray[np.int64]) -> bool
 
     A listed effect is kept where it gains as much as features of another name do, within the error
     of the difference; one beyond the list where it gains more, and does not say what that name
-    says in another form. Where both are the same name it may get another form.
+    says in another form.
 
     Parameters
     ----------
     there
-        What was named.
+        What was named: another name, that can be told from it.
     told
         What features name.
     scene, at
         The recording, and the sample in which each step of the features begins.
     """
     name = told.gain.name
-    if there.name in {gain.name for gain in told.ties}:
-        return True
     if there.is_generic and there.name in find_effect(name).other_forms:
         return False
     by = by_sample(scene, at, told.gain.log_p) - there.gain
@@ -276,14 +274,14 @@ def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
     own += further_forms(find_effect(name), case.scene)
     scores = ask_all(screen, own, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}
-    for score in sorted(scores, key=lambda each: -abs(each.z)):
-        forms.setdefault(_form(score.candidate), score)
+    for score in sorted(scores, key=lambda each: -each.clearness):
+        forms.setdefault(form_of(score.candidate), score)
     tried = list(forms.values())[:_FORMS]
     made = [refit(screen, score, n_workers=case.question.n_workers) for score in tried]
     k = int(np.argmax([each.worth for each in made]))
     return made[k], tried[k]
 
 
-def _form(candidate: Candidate) -> tuple[float, ...]:
+def form_of(candidate: Candidate) -> tuple[float, ...]:
     """Return the shapes of a candidate that a fit leaves as they are."""
     return tuple(candidate.shape[key] for key in candidate.effect.fixed if key in candidate.shape)

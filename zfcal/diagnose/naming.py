@@ -113,7 +113,7 @@ class Refit:
 def free_of(candidate: Candidate) -> Free:
     """Return the parameters of an effect that a fit moves."""
     effect = candidate.effect
-    return tuple((effect.name, name) for name in effect.names if name not in effect.fixed)
+    return tuple((effect.name, name) for name in effect.free(candidate.shape))
 
 
 def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers: int = 1) -> Refit:

@@ -44,4 +44,4 @@ def placebo_for(name: str, company: Company, *, without: Collection[str]) -> Eff
 
 def count_free(effect: Effect) -> int:
     """Return how many parameters of an effect a fit moves, at least one."""
-    return max(1, len([name for name in effect.names if name not in effect.fixed]))
+    return max(1, len(effect.free({})))

@@ -18,13 +18,16 @@ from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
 from zfcal.diagnose.confirming import Confirmed
 from zfcal.diagnose.features.asking import fits_beside, gains_of
+from zfcal.diagnose.features.curves import curve_of
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Told, tell
+from zfcal.diagnose.features.naming import Noise, Told, tell
+from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
+    form_of,
     gains_by_itself,
     held_out,
     in_all_minutes,
@@ -39,6 +42,7 @@ from zfcal.diagnose.looks import (
     with_further,
     without_idle_ties,
 )
+from zfcal.diagnose.naming import SURE, Choice
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import (
     GENERIC_SHARE,
@@ -133,12 +137,13 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     if told is None or told.gain.nats < least:
         return None
     law = looks.laws[0]
-    if there is not None and stays(there.choice.best, told, law.scene, law.turns.at):
-        return None
+    if there is not None:
+        was = there.choice.best
+        if was.name in {told.gain.name, *(tie.name for tie in told.ties)}:
+            return _in_better_form(looks, there, told)
+        if stays(was, told, law.scene, law.turns.at):
+            return None
     found, score = in_the_model(case, screen, told.gain.name)
-    same = None if there is None or there.choice.best.name != found.name else there.choice.best
-    if same is not None and (looks.has_later or not found.worth > same.worth):
-        return None
     nothing = Found(steps=(), confirmed=(), nats=told.gain.nats, suspicious=True)
     step, confirmed = held_out(case, screen, told, (found, score))
     if found.values[found.candidate.effect.strength] == 0.0:
@@ -152,6 +157,32 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
         confirmed=(confirmed,),
         nats=told.gain.nats,
         without_noise=told.gain.without_noise,
+    )
+
+
+def _in_better_form(looks: _Looks, there: Step, told: Told) -> Found | None:
+    """Return what was named, and what features name or cannot tell from it, in the form it has.
+
+    None where it has that form already. What it leads by enough in this form is no tie any more.
+    """
+    if looks.has_later:
+        return None
+    case, screen, was = looks.case, looks.screen, there.choice.best
+    made = in_the_model(case, screen, was.name)
+    is_new = form_of(made[0].candidate) != form_of(was.candidate)
+    if not (is_new and made[0].worth > was.worth):
+        return None
+    names = [told.gain, *told.ties]
+    own = next(gain for gain in names if gain.name == was.name)
+    ties = tuple(gain for gain in names if gain is not own)
+    step, confirmed = held_out(case, screen, dataclasses.replace(told, gain=own, ties=ties), made)
+    left = tuple(tie for tie in step.choice.ties if not made[0].over(tie) > SURE)
+    choice = Choice(best=made[0], ties=left, considered=step.choice.considered)
+    return Found(
+        steps=(dataclasses.replace(step, choice=choice),),
+        confirmed=(confirmed,),
+        nats=own.nats,
+        without_noise=own.without_noise,
     )
 
 
@@ -218,10 +249,8 @@ class _Looks:
 
     def tell(self) -> Told | None:
         """Return which name it is; None where chance may have made all gains."""
-        case, gains = self.case, self.gains(self._asked, self.beside)
-        is_noisy = self.laws[0].noise_m > 0
-        noise = (lambda clear: _noise_nats(case, clear, self.beside)) if is_noisy else None
-        told = tell(gains, noise, level=level_of(self.number))
+        gains = self.gains(self._asked, self.beside)
+        told = tell(gains, self._noise(self.beside), level=level_of(self.number))
         return None if told is None else without_idle_ties(told, self._stands)
 
     def explains(self, told: Told) -> bool:
@@ -230,8 +259,8 @@ class _Looks:
         What is no effect of the list answers to features of several names.
         """
         others = [effect for effect in self._asked if effect.name != told.gain.name]
-        found = self.gains(others, [*self.beside, find_effect(told.gain.name)])
-        return tell(found, None) is None
+        beside = (*self.beside, find_effect(told.gain.name))
+        return tell(self.gains(others, beside), self._noise(beside)) is None
 
     @cached_property
     def _asked(self) -> list[Effect]:
@@ -240,7 +269,45 @@ class _Looks:
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         """Return whether features of an effect gain more than chance beside those of another."""
-        return tell(self.gains([effect], [*self.beside, beside]), None) is not None
+        both = (*self.beside, beside)
+        return tell(self.gains([effect], both), self._noise(both)) is not None
+
+    def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
+        """Return what tells how much of a gain beside some effects noise of positions makes."""
+        if not self.laws[0].noise_m > 0:
+            return None
+        return lambda clear: _noise_nats(self.case, clear, beside)
+
+
+def curves_of(
+    case: Case, steps: Sequence[Step], *, without_noise: bool
+) -> list[FeatureCurve | None]:
+    """Return what features say of each effect that was named; None for those without features.
+
+    Parameters
+    ----------
+    case
+        The question.
+    steps
+        What was named.
+    without_noise
+        Whether what seemed to be noise is explained by it.
+    """
+    is_noisy = has_noise(case.question) and not without_noise
+    noise_m = noise_of(case.question) if is_noisy else 0.0
+    given = [each.effect for each in in_model(case.screen.fitted.parameters)]
+    known = [effect for effect in given if not effect.on_speed]
+    made: list[FeatureCurve | None] = []
+    for step in steps:
+        best = step.choice.best
+        effect = best.candidate.effect
+        if not on_headings(step) or not effect.features(case.question.arena):
+            made.append(None)
+            continue
+        law = _law(case, step.before, noise_m)
+        made.append(curve_of(law, effect, best.screen, nats=best.nats, beside=known))
+        known.append(effect)
+    return made
 
 
 def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:

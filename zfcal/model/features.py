@@ -61,6 +61,9 @@ class Seen:
         Track of the other; -1 for who is not there.
     own_heading, along_wall, way_out, xy_m : ndarray, shape (step, 2)
         ``way_out``: to the nearest way out of a room; zeros elsewhere.
+    x_axis : ndarray, shape (step, 2)
+        That of the tank. Where positions are drawn anew all directions are turned, so that the
+        heading taken stays the measured one.
     follows_walls : ndarray of bool, shape (step,)
         Whether the zone does.
     zone, track : ndarray of int, shape (step,)
@@ -101,6 +104,7 @@ class Seen:
     along_wall: Floats
     way_out: Floats
     xy_m: Floats
+    x_axis: Floats
     follows_walls: NDArray[np.bool_]
     zone: NDArray[np.int64]
     track: NDArray[np.int32]
@@ -129,6 +133,28 @@ Weights: TypeAlias = Callable[[Seen], Floats]
 """Of a `Seen`: shape (step, source, weight); of a tilt or a landing (step, weight)."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Along:
+    """What the first weights of a feature go by: hat functions of one number.
+
+    Parameters
+    ----------
+    cue
+        That number, with its unit.
+    knots
+        One for each of these weights, ascending.
+    none_at
+        A knot before them at which there is nothing to fit; None without one.
+    besides
+        What the weights after those of the knots are for.
+    """
+
+    cue: str
+    knots: tuple[float, ...]
+    none_at: float | None = None
+    besides: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Component:
     """Headings drawn about the directions of some sources: one more component of the mixture.
@@ -148,6 +174,8 @@ class Component:
         Whether it takes the place of as large a share of what the others' present places draw.
     low, high
         Bounds of the strengths.
+    along
+        What its weights go by, where that is one number: they are a curve then.
     """
 
     label: str
@@ -157,6 +185,7 @@ class Component:
     instead: bool = False
     low: float = 0.0
     high: float | None = None
+    along: Along | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -171,11 +200,14 @@ class Tilt:
         Direction times weight, shape (step, weight, 2).
     low
         Lower bound of the strengths, where the opposite is no form of the effect.
+    along
+        What its weights go by, where that is one number: they are a curve then.
     """
 
     label: str
     vectors: Weights
     low: float | None = None
+    along: Along | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,17 +219,20 @@ class Turned:
     label
         Tells it from other features of the effect.
     by
-        The angle at a strength of one, shape (step,).
+        The angle at a strength of one, shape (step,) or (step, weight).
     neighbours
         Whether those to neighbours turn as well.
     low
-        Lower bound of the strength, where the opposite is no form of the effect.
+        Lower bound of the strengths, where the opposite is no form of the effect.
+    along
+        What its weights go by, where that is one number: they are a curve then.
     """
 
     label: str
     by: Callable[[Seen], Floats]
     neighbours: bool
     low: float | None = None
+    along: Along | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -214,11 +249,14 @@ class Leaving:
         ``between`` the rooms; or into the ``open``,
         the last other zone that does not follow walls. Steps that begin between the rooms do not
         count.
+    along
+        What its weights go by, where that is one number: they are a curve then.
     """
 
     label: str
     weights: Weights
     into: Literal["between", "open"] = "between"
+    along: Along | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -234,9 +272,10 @@ class OneOf:
     """
 
     kind: str
-    features: tuple[Component, ...] | tuple[Tilt, ...]
+    features: tuple[Component, ...] | tuple[Tilt, ...] | tuple[Turned, ...]
 
 
+Single: TypeAlias = Component | Tilt | Turned | Leaving
 Feature: TypeAlias = Component | Tilt | Turned | Leaving | OneOf
 
 
@@ -264,6 +303,23 @@ def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
     return made
 
 
+def of_tank(seen: Seen, ways: Floats) -> Floats:
+    """Return directions of the tank, shape (step or 1, way, 2), as they are seen."""
+    x, y = ways[..., 0], ways[..., 1]
+    c, s = seen.x_axis[:, :1], seen.x_axis[:, 1:]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def aside_of(seen: Seen, toward: Floats) -> Floats:
+    """Return the sines of the angles from the own heading to unit vectors; none along walls.
+
+    Shape (step, vector), of vectors of shape (step, vector, 2).
+    """
+    own = seen.own_heading[:, None]
+    sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
+    return np.where(seen.follows_walls[:, None], 0.0, sine)
+
+
 def only(weights: Floats) -> Floats:
     """Return weights of a source that is the only one: an axis for it is put in."""
     return weights[:, None]
@@ -275,7 +331,10 @@ def attended(weights: Weights) -> Weights:
 
 
 def factor_on_attention(
-    weights: Weights, label: str = "attention", high: float | None = None
+    weights: Weights,
+    label: str = "attention",
+    high: float | None = None,
+    along: Along | None = None,
 ) -> Component:
     """Return a factor on what fish attend to of the others: 1 + strength times weight, never none.
 
@@ -287,8 +346,12 @@ def factor_on_attention(
         Of the feature.
     high
         Upper bound of the strengths: 0 where attention can but be lost.
+    along
+        Of the feature.
     """
-    return Component(label=label, toward="toward", weights=attended(weights), low=_LEAST, high=high)
+    return Component(
+        label=label, toward="toward", weights=attended(weights), low=_LEAST, high=high, along=along
+    )
 
 
 def evenly(seen: Seen) -> Floats:

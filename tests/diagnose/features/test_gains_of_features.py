@@ -141,7 +141,7 @@ def test_features_are_asked_by_kind(nothing):
     found = gains_of(nothing.law, effects, kinds={("place-preference", "leaning")})
     assert {each.key for each in found} <= {("place-preference", "leaning")}
     kinds = [kind_of(each) for each in effects[1].features(nothing.law.scene.arena)]
-    assert kinds == ["drawn", "leaning"]
+    assert kinds == ["drawn", "leaning", "turning"]
 
 
 def test_numbers_do_not_depend_on_threads(base):
@@ -228,7 +228,8 @@ def test_a_search_ends_where_a_library_ends():
         return log_p(x).sum(), scores
 
     bounds = [(None, None), (0.2, 1.0)]
-    ours = climb(objective, np.array([0.0, 0.5, -3.0]), bounds)
+    peak = climb(objective, np.array([0.0, 0.5, -3.0]), bounds)
+    ours = peak.x
     ends = [*bounds, tuple(logit(LAPSE))]
     theirs = minimize(lambda x: -log_p(x).sum(), [0.0, 0.5, -3.0], bounds=ends)
     assert log_p(ours).sum() == pytest.approx(-theirs.fun, abs=0.02)

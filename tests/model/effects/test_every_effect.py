@@ -140,6 +140,36 @@ def test_it_says_what_it_means(effect):
 
 
 @EVERY
+def test_an_idle_parameter_does_nothing_in_its_form(effect, natural_model, two_rooms):
+    """All swim alike whatever its value, and a fit leaves it."""
+    for shape in (*effect.shapes(two_rooms), *effect.further_shapes(two_rooms)):
+        given = {**shape, effect.strength: strength_of(effect).default}
+        for name in effect.idle(dict(zip(effect.names, effect.values(given), strict=True))):
+            assert name not in {*effect.free(shape), *effect.fixed, effect.strength}
+            (own,) = (each for each in effect.parameters if each.name == name)
+            low, high = (
+                simulate_tracks(
+                    dataclasses.replace(natural_model, effects={effect.name: given | {name: end}}),
+                    two_rooms, n_agents=4, n_robots=1, n_steps=60, seed=3,
+                )[0]
+                for end in (own.low, own.high)
+            )  # fmt: skip
+            assert np.array_equal(low, high)
+
+
+def test_forms_of_the_list_have_the_parameters_that_they_use():
+    """Where all lean or turn nothing is drawn, so a concentration is idle; else it is not."""
+    cohesion, robot = find_effect("group-cohesion"), find_effect("robot-avoidance")
+    assert cohesion.free({}) == ("weight", "kappa")
+    assert cohesion.free({"leaning": 1.0}) == cohesion.free({"turning": 1.0}) == ("weight",)
+    assert robot.free({"drawn": 1.0}) == ("strength", "reach_m", "kappa")
+    assert robot.free({}) == robot.free({"flight": 1.0}) == ("strength",)
+    drift = find_effect("directional-drift")
+    assert "by_slowness" in drift.free({})
+    assert "by_slowness" not in drift.free({"drawn": 1.0})
+
+
+@EVERY
 def test_what_else_it_says_holds_together(effect):
     """Times of rest are parameters of effects on speed; individuals differ in headings alone."""
     assert not effect.rests or (effect.on_speed and effect.rests in effect.names)

@@ -17,7 +17,7 @@ import pytest
 
 from zfcal.diagnose import case
 from zfcal.diagnose.document import Sheet, findings_document, gap_document, read_document
-from zfcal.diagnose.findings import Gap, Note, Screened, Verdict
+from zfcal.diagnose.findings import FeatureCurve, Gap, Note, Screened, Verdict
 from zfcal.parameters import natural
 from zfcal.report.diagnosis import page as diagnosis_page
 from zfcal.report.diagnosis import words as diagnosis_words
@@ -522,6 +522,36 @@ def test_texts_of_a_finding_do_not_cover_each_other(make_sheet, arenas, covered_
     )
     picture = finding_picture("alignment", 1, replace(pictured, curve=curve), arena)
     assert not covered_texts(picture)
+
+
+@pytest.mark.parametrize("name", ["two-rooms", "narrow"])
+def test_the_curve_of_a_feature_is_drawn_beside_the_form(make_sheet, arenas, covered_texts, name):
+    """With its interval, what it gains and what is no part of it; without knots there is none."""
+    pictured = make_sheet().findings.pictured[0]
+    curve = FeatureCurve(
+        label="leaning", nats=84.0, form_nats=76.3, cue="distance to the other (m)",
+        strength_name="preference (nats)", at=np.array([0.0, 0.1, 0.4]),
+        strength=np.array([0.2, 0.05, 0.0]), low=np.array([0.1, 0.0, 0.0]),
+        high=np.array([0.3, 0.1, 0.02]), form=np.array([0.15, 0.06, 0.0]),
+        besides={"the nearest, wherever it is": (0.1, 0.05, 0.15)},
+    )  # fmt: skip
+    picture = finding_picture("alignment", 1, pictured, arenas[name], curve)
+    panel = picture.panels[-1]
+    assert panel.title == "How strong, by distance to the other"
+    assert "largest, 0.2, at 0" in panel.alt
+    assert "gains 84 nats" in picture.note
+    assert "form gains 76" in picture.note
+    assert "Besides, the nearest, wherever it is: 0.1 (0.05 to 0.15)." in picture.note
+    assert [entry.label for entry in picture.key][-1] == "fish, 95 % interval"
+    assert not covered_texts(picture)
+    with theme.style():
+        axes = compose(picture).axes[4]
+    fish, form = (line for line in axes.lines if line.get_marker() in {"o", "D"})
+    assert list(fish.get_ydata()) == [0.2, 0.05, 0.0]
+    assert list(form.get_ydata()) == [0.15, 0.06, 0.0]
+    none = finding_picture("alignment", 1, pictured, arenas[name], replace(curve, at=np.zeros(0)))
+    assert len(none.panels) == len(picture.panels) - 1
+    assert "Besides" not in none.note
 
 
 def test_the_map_says_where_in_words(make_sheet, two_rooms):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import TypeAlias
 
 from scipy.special import chdtrc
 
@@ -15,12 +14,10 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, once
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
-from zfcal.model.features import Component, Feature, Leaving, OneOf, Tilt, Turned
+from zfcal.model.features import Component, Feature, Leaving, OneOf, Single, Tilt, Turned
 
 _IN_REACH = 0.5
 """Share of the nats of the best one below which a feature is not fitted anew."""
-
-Single: TypeAlias = Component | Turned | Tilt | Leaving
 
 
 def gains_of(  # noqa: PLR0913 - the last ones have defaults
@@ -82,6 +79,20 @@ def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -
     return gain
 
 
+def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
+    """Return the feature of an effect that gains most; None where none can be fitted."""
+    fits.prepare()
+    arena = fits.law.scene.arena
+    asked = [
+        each
+        for each in effect.features(arena)
+        if not isinstance(each, Leaving) or fits.law.zone_into(each.into)
+    ]
+    found = [pair for feature in asked for pair in _gains(fits, effect.name, feature)]
+    some = [pair for pair in found if pair[1].n_strengths]
+    return max(some, key=lambda pair: pair[1].nats, default=None)
+
+
 def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
     """Return fits in which effects are there, in whatever form their features can have.
 
@@ -125,14 +136,12 @@ def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
     fits = Fits(law=law)
     if isinstance(feature, Tilt):
         feature = replace(feature, low=None)
-        gain, there, n = fits.tilt(feature)
-    else:
-        gain, there, n = fits.leaving(feature)
-    if chdtrc(n, 2 * max(float(gain.sum()), 0.0)) > LEVEL:
+    made = fits.fit(feature)
+    if chdtrc(len(made.strengths), 2 * max(float(made.log_p.sum()), 0.0)) > LEVEL:
         return law
     if isinstance(feature, Tilt):
-        return law.absorbing(leaning=there)
-    return law.absorbing(leaving=(law.zone_into(feature.into), there))
+        return law.absorbing(leaning=made.factor)
+    return law.absorbing(leaving=(law.zone_into(feature.into), made.factor))
 
 
 def kind_of(feature: Feature) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -23,12 +25,101 @@ _PART = 1e-3
 _RIDGE = 1e-9
 """Added to the squares of scores of length one: columns may be sums of each other."""
 
+_AT_END = 1e-6
+_SIDES = 1.96
+"""Standard errors to either side of a 95 % interval."""
+
 Bounds: TypeAlias = tuple[float | None, float | None]
 Objective: TypeAlias = Callable[[Floats], tuple[float, Callable[[], Floats]]]
 """Of strengths: a log likelihood, and what gives its derivatives, shape (step, strength)."""
 
 
-def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Floats:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Peak:
+    """Where a log likelihood is highest.
+
+    Parameters
+    ----------
+    x : ndarray, shape (argument,)
+        There; the last one is the lapse.
+    scores : ndarray, shape (step, argument)
+        Derivatives of the log density of each step.
+    low, high : ndarray, shape (argument,)
+        Bounds.
+    """
+
+    x: Floats
+    scores: Floats
+    low: Floats
+    high: Floats
+
+    def interval(self) -> Floats:
+        """Return the 95 % interval of each argument, shape (argument, 2).
+
+        The squares of single steps' scores stand for the curvature. One at a bound has the range in
+        which the likelihood falls by 1.92 nats, the others being fitted again.
+        """
+        size = np.maximum(np.linalg.norm(self.scores, axis=0), 1e-300)
+        units = self.scores / size
+        square, slope = units.T @ units + _RIDGE * np.eye(len(size)), units.sum(axis=0)
+        near = _AT_END * np.maximum(np.abs(self.x), 1.0)
+        at_high = self.high - self.x <= near
+        free = ~(at_high | (self.x - self.low <= near))
+        inner = np.linalg.inv(square[np.ix_(free, free)])
+        half = np.zeros(len(self.x))
+        half[free] = _SIDES * np.sqrt(np.diag(inner))
+        for k in np.flatnonzero(~free):
+            beside = square[k, free]
+            curved = max(float(square[k, k] - beside @ inner @ beside), _RIDGE)
+            falls = max(float(slope[k] if at_high[k] else -slope[k]), 0.0)
+            half[k] = (math.sqrt(falls**2 + _SIDES**2 * curved) - falls) / curved
+        half /= size
+        return np.column_stack(
+            [np.maximum(self.x - half, self.low), np.minimum(self.x + half, self.high)]
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A feature at the maximum.
+
+    Parameters
+    ----------
+    log_p : ndarray, shape (step,)
+        What it adds to the log densities; without a feature these themselves.
+    peak
+        Of the search, whose last arguments but the lapse are the feature's strengths.
+    n
+        How many these are.
+    scale : ndarray, shape (argument,)
+        What the search's arguments are divided by.
+    factor : ndarray
+        Of a tilt its vectors, shape (step, 2); of leaving its logs, shape (step,). Else empty.
+    """
+
+    log_p: Floats
+    peak: Peak
+    n: int
+    scale: Floats
+    factor: Floats
+
+    @property
+    def strengths(self) -> Floats:
+        """Of the feature, shape (strength,)."""
+        return self.x[len(self.x) - 1 - self.n : -1]
+
+    @property
+    def x(self) -> Floats:
+        """Strengths of all that was fitted, and the lapse."""
+        return self.peak.x / self.scale
+
+    @property
+    def interval(self) -> Floats:
+        """95 % of each strength, shape (strength, 2)."""
+        return (self.peak.interval() / self.scale[:, None])[len(self.x) - 1 - self.n : -1]
+
+
+def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
     """Return where a log likelihood is highest; the last of its arguments is the lapse.
 
     The squares of the scores of single steps stand for the curvature, so that a step of the search
@@ -43,10 +134,6 @@ def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Floats:
         Where the search begins.
     bounds
         Of all arguments but the lapse.
-
-    Returns
-    -------
-    ndarray, shape (strength,)
     """
     all_ = [*bounds, (float(logit(LAPSE[0])), float(logit(LAPSE[1])))]
     low = np.array([-np.inf if pair[0] is None else pair[0] for pair in all_])
@@ -67,7 +154,9 @@ def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Floats:
         else:
             break
         x, value, scores_of = tried, reached, their_scores
-    return x
+    else:
+        scores = scores_of()
+    return Peak(x=x, scores=scores, low=low, high=high)
 
 
 def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:

@@ -242,6 +242,7 @@ def _seen(
         is_robot=(theirs(KIND, at) > 0) & here,
         other=np.where(here, steps.scene.tracks[at[:, None], others], -1),
         own_heading=heading,
+        x_axis=np.broadcast_to((1.0, 0.0), heading.shape),
         along_wall=own[:, [TAU_X, TAU_Y]],
         way_out=np.where(own[:, [ROOM]] > 0, own[:, [MOUTH_X, MOUTH_Y]], 0.0),
         xy_m=own[:, [X, Y]],
@@ -288,4 +289,5 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
         own_heading=turn(seen.own_heading, back),
         along_wall=turn(seen.along_wall, back),
         way_out=turn(seen.way_out, back),
+        x_axis=turn(seen.x_axis, back),
     )

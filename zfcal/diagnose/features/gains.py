@@ -18,11 +18,11 @@ import numpy as np
 from scipy.special import chdtrc, expit, logit
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.climbing import Bounds, Objective, climb
+from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.law import Columns, Law
 from zfcal.model.extended import LAPSE
-from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
+from zfcal.model.features import Component, Leaving, OneOf, Single, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES
 
 _UNIFORM = 1 / (2 * math.pi)
@@ -39,6 +39,8 @@ _MOST_TURN = 0.3
 
 _TRIED = (0.005, 0.02, 0.06)
 """Strengths of a component at which it is first asked for."""
+
+_AS_IT_IS = np.ones(1)
 
 _FITTED = 2
 """Of features of which the most promising are fitted, so many."""
@@ -124,7 +126,8 @@ class Fits:
     def _columns(self, feature: Component | Turned) -> tuple[Columns, list[Bounds]]:
         """Return the columns of a feature, and the bounds of its strengths."""
         if isinstance(feature, Turned):
-            return self.law.turned(feature), [(_low(feature, _MOST_TURN), _MOST_TURN)]
+            columns = self.law.turned(feature)
+            return columns, [(_low(feature, _MOST_TURN), _MOST_TURN)] * columns[0].shape[1]
         columns = self.law.component(feature)
         return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 
@@ -133,7 +136,7 @@ class Fits:
         return float(np.clip(self.law.lapse.mean(), *LAPSE))
 
     @cached_property
-    def _null(self) -> tuple[Floats, Floats]:
+    def _null(self) -> Fit:
         """Log densities with the base's own columns alone, and where that fit ended."""
         return self._linear([], [], None)
 
@@ -145,19 +148,12 @@ class Fits:
     @property
     def null_log_p(self) -> Floats:
         """Log density of each step by the base alone, its parameters and the lapse refitted."""
-        return self._null[0]
+        return self._null.log_p
 
-    def gain(self, name: str, feature: Component | Turned | Tilt | Leaving) -> Gain:
+    def gain(self, name: str, feature: Single) -> Gain:
         """Return what a feature of an effect adds."""
-        if isinstance(feature, Component | Turned):
-            columns, bounds = self._columns(feature)
-            null, start = self._null
-            log_p, _ = self._linear([columns], bounds, start)
-            made, n = log_p - null, len(bounds)
-        elif isinstance(feature, Tilt):
-            made, _, n = self.tilt(feature)
-        else:
-            made, _, n = self.leaving(feature)
+        fit = self.fit(feature)
+        made, n = fit.log_p, len(fit.strengths)
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
@@ -165,20 +161,30 @@ class Fits:
             without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
 
+    def fit(self, feature: Single) -> Fit:
+        """Return a feature at the maximum, and what it adds to each step."""
+        if isinstance(feature, Tilt):
+            return self.tilt(feature)
+        if isinstance(feature, Leaving):
+            return self.leaving(feature)
+        columns, bounds = self._columns(feature)
+        made = self._linear([columns], bounds, self._null.x)
+        return replace(made, log_p=made.log_p - self.null_log_p)
+
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
         """Return what a tilt adds with the base's parameters fitted once more beside it."""
-        _, leaning, _ = self.tilt(feature)
+        leaning = self.tilt(feature).factor
         beside = Fits(law=self.law.absorbing(leaning=leaning), also=self.also)
         made = beside.null_log_p - (self.null_log_p if self.beyond is None else self.beyond)
         return replace(gain, log_p=made) if made.sum() > gain.log_p.sum() else gain
 
-    def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Component | Tilt]:
+    def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Component | Tilt | Turned]:
         """Return the features that a first look says most of."""
         promise = [self._promise(feature) for feature in choice.features]
         order = np.argsort(promise)[::-1][:n]
         return [choice.features[k] for k in order if promise[k] > 0]
 
-    def _promise(self, feature: Component | Tilt) -> float:
+    def _promise(self, feature: Component | Tilt | Turned) -> float:
         """Return how clear a feature is with all its weights alike: a score, or a gain in nats.
 
         The score of a component has no variance where the density is next to nothing, so it is
@@ -186,8 +192,12 @@ class Fits:
         """
         if isinstance(feature, Component):
             return self._promise_of(self.law.component(feature, first=True))
-        vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
-        score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
+        if isinstance(feature, Turned):
+            (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
+            score = self._no_lapse * (at / base_at - over / base_over).sum(axis=1)
+        else:
+            vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
+            score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
         squares = float((score * score).sum())
         return float(score.sum()) ** 2 / squares if squares > 0 else 0.0
 
@@ -209,6 +219,13 @@ class Fits:
         return max(gains[1:]) - gains[0]
 
     @cached_property
+    def _no_lapse(self) -> Floats:
+        """Probability of each step that it was none, shape (step,)."""
+        base_at, base_over = self.law.base
+        density = (1 - self._lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
+        return np.asarray(density / (density + self._lapse * _UNIFORM))
+
+    @cached_property
     def _mean_heading(self) -> Floats:
         angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
         whole = self.law.cells.sum(axis=1, keepdims=True)
@@ -217,8 +234,8 @@ class Fits:
 
     def _linear(
         self, added: Sequence[Columns], bounds: Sequence[Bounds], start: Floats | None
-    ) -> tuple[Floats, Floats]:
-        """Return log densities at the best strengths of columns, and these."""
+    ) -> Fit:
+        """Return the log densities at the best strengths of columns."""
         own, limits = self._own
         at = np.concatenate([c[0] for c in (*own, *added)], axis=1)
         over = np.concatenate([c[1] for c in (*own, *added)], axis=1)
@@ -250,12 +267,14 @@ class Fits:
         if start is not None:
             x0[: len(start) - 1], x0[-1] = start[:-1] * scale[: len(start) - 1], start[-1]
         ranges = [_scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
-        x = climb(objective, x0, ranges)
-        strengths = np.append(x[:-1] / scale, x[-1])
-        return _log_mixed(densities(x)[0], x[-1]), strengths
+        peak = climb(objective, x0, ranges)
+        log_p = _log_mixed(densities(peak.x)[0], peak.x[-1])
+        return Fit(
+            log_p=log_p, peak=peak, n=len(bounds), scale=np.append(scale, 1.0), factor=np.zeros(0)
+        )
 
-    def tilt(self, feature: Tilt) -> tuple[Floats, Floats, int]:
-        """Return what a tilt adds to each step, its vectors and the number of its strengths."""
+    def tilt(self, feature: Tilt) -> Fit:
+        """Return what a tilt adds to each step."""
         vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
         taken, base = self.law.turns.taken, self._untilted
         n = len(taken)
@@ -274,9 +293,10 @@ class Fits:
 
         n_strengths = vectors.shape[1]
         bounds = [(_low(feature, _MOST_TILT), _MOST_TILT)] * n_strengths
-        x = self._climb_from_null(objective, bounds)
-        log_p = _log_mixed(density(x), x[-1]) - base
-        return log_p, np.einsum("sbd,b->sd", vectors, x[:-1]), n_strengths
+        peak = self._climb_from_null(objective, bounds)
+        log_p = _log_mixed(density(peak.x), peak.x[-1]) - base
+        factor = np.einsum("sbd,b->sd", vectors, peak.x[:-1])
+        return Fit(log_p=log_p, peak=peak, n=n_strengths, scale=_AS_IT_IS, factor=factor)
 
     @cached_property
     def _untilted(self) -> Floats:
@@ -287,17 +307,10 @@ class Fits:
             value, _, slope = _mixed(at, x[-1])
             return value, lambda: slope[:, None]
 
-        x = self._climb_from_null(objective, [])
-        return _log_mixed(at, x[-1])
+        return _log_mixed(at, self._climb_from_null(objective, []).x[-1])
 
-    def leaving(self, feature: Leaving) -> tuple[Floats, Floats, int]:
-        """Return what a factor on landing in a zone adds, beside one for each zone left.
-
-        Returns
-        -------
-        gain, log_factor : ndarray, shape (step,)
-        n_strengths : int
-        """
+    def leaving(self, feature: Leaving) -> Fit:
+        """Return what a factor on landing in a zone adds, beside one for each zone left."""
         law, into = self.law, self.law.zone_into(feature.into)
         inside = (law.cells * law.share_of(into)).sum(axis=1) / law.cells.sum(axis=1)
         landed = (law.turns.landing == into).astype(np.float64)
@@ -308,7 +321,7 @@ class Fits:
         weights = feature.weights(law.draws[0].seen)
         may_ = may[:, None].astype(np.float64)
 
-        def fitted(columns: Floats) -> tuple[Floats, Floats]:
+        def fitted(columns: Floats) -> Fit:
             def density(x: Floats) -> tuple[Floats, Floats]:
                 log_factor = columns @ x[:-1]
                 factor = np.exp(log_factor)
@@ -322,16 +335,17 @@ class Fits:
                 return value, lambda: np.column_stack([ahead[:, None] * columns, slope])
 
             bounds = [(-_MOST_LEAVING, _MOST_LEAVING)] * columns.shape[1]
-            x = self._climb_from_null(objective, bounds)
-            return _log_mixed(density(x)[0], x[-1]), columns @ x[:-1]
+            peak = self._climb_from_null(objective, bounds)
+            log_p = _log_mixed(density(peak.x)[0], peak.x[-1])
+            factor = columns @ peak.x[:-1]
+            n = columns.shape[1] - len(zones)
+            return Fit(log_p=log_p, peak=peak, n=n, scale=_AS_IT_IS, factor=factor)
 
-        null, _ = fitted(each * may_)
-        log_p, log_factor = fitted(np.concatenate([each, weights], axis=1) * may_)
-        return log_p - null, log_factor, weights.shape[1]
+        null = fitted(each * may_)
+        made = fitted(np.concatenate([each, weights], axis=1) * may_)
+        return replace(made, log_p=made.log_p - null.log_p)
 
-    def _climb_from_null(
-        self, objective: Objective, bounds: Sequence[tuple[float, float]]
-    ) -> Floats:
+    def _climb_from_null(self, objective: Objective, bounds: Sequence[tuple[float, float]]) -> Peak:
         x0 = np.append(np.zeros(len(bounds)), logit(self._lapse))
         return climb(objective, x0, bounds)
 

@@ -262,17 +262,26 @@ class Law:
         return kappa
 
     def turned(self, feature: Turned) -> Columns:
-        """Return the derivative of the law by a turn of its directions, shape (step, 1)."""
+        """Return the derivative of the law by a turn of its directions, shape (step, weight)."""
 
         def of(draw: Draw) -> Columns:
-            left, right = (
-                self._mixture(draw, angle, neighbours=feature.neighbours)
-                for angle in (_TURN_RAD, -_TURN_RAD)
-            )
-            by = (feature.by(draw.seen) / (2 * _TURN_RAD))[:, None]
-            return by * (left[0] - right[0]), by * (left[1] - right[1])
+            by = feature.by(draw.seen).reshape(len(draw.seen.zone), -1)
+            slope = self._slope(draw, neighbours=feature.neighbours)
+            return by * slope[0], by * slope[1]
 
         return self.mean([of(draw) for draw in self.draws])
+
+    def _slope(self, draw: Draw, *, neighbours: bool) -> Columns:
+        """Return the derivative of the mixture by a turn of its directions, shape (step, 1)."""
+        key = (id(draw), "turned", float(neighbours))
+        if key not in self._kept:
+            left, right = (
+                self._mixture(draw, angle, neighbours=neighbours)
+                for angle in (_TURN_RAD, -_TURN_RAD)
+            )
+            at, over = _less(left, right)
+            self._kept[key] = at / (2 * _TURN_RAD), over / (2 * _TURN_RAD)
+        return self._kept[key]
 
     def _mixture(self, draw: Draw, angle: float, *, neighbours: bool) -> Columns:
         parts = [self._own(turn(draw.base, angle))]

@@ -16,7 +16,7 @@ from zfcal.model.effects.forms import (
     seen_by_rank,
     tilt,
 )
-from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, attended, evenly
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, attended, evenly
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
@@ -132,6 +132,14 @@ def _late(states: Floats, dt_s: float, _random: np.random.Generator) -> Floats:
 
 _KNOTS_M = (0.0, 0.025, 0.05, 0.1, 0.2, 0.4, 1.0)
 _COMPANY_M = 0.15
+_BY_DISTANCE = Along(
+    cue="distance to the other (m)", knots=_KNOTS_M[:-1], besides=("the nearest, wherever it is",)
+)
+_AND_AS_SEEN = Along(
+    cue=_BY_DISTANCE.cue,
+    knots=_BY_DISTANCE.knots,
+    besides=(*_BY_DISTANCE.besides, "each, by the attention that it gets"),
+)
 
 
 def _near_and_far(seen: Seen) -> Floats:
@@ -160,10 +168,12 @@ def _toward_mean(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0),
-    Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0),
+    Component(
+        label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0, along=_AND_AS_SEEN
+    ),
+    Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0, along=_AND_AS_SEEN),
     Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
-    Tilt(label="leaning", vectors=_summed, low=0.0),
+    Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
     Tilt(label="leaning, the mean", vectors=_mean, low=0.0),
     Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0),
 )
@@ -247,6 +257,7 @@ EFFECT = Effect(
     ),
     lacks=needs_neighbour,
     fixed=("grading", "leaning", "turning", "among"),
+    idle=lambda values: ("kappa",) if values["leaning"] + values["turning"] > 0 else (),
     needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
     other_forms=("generic:heading:neighbour-heading",),
     control=Control(name="neighbours' heading 12 s ago", states=_late),

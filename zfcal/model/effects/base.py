@@ -139,6 +139,10 @@ def _no_further(_arena: Arena) -> Shapes:
     return ()
 
 
+def _none_idle(_values: Mapping[str, float]) -> tuple[str, ...]:
+    return ()
+
+
 def _no_features(_arena: Arena) -> tuple[Feature, ...]:
     return ()
 
@@ -220,6 +224,9 @@ class Effect:
         What its name means for speeds, whatever its form.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
+    idle
+        Of parameters: names of those that do nothing in that form, such as a concentration where
+        all headings lean. A fit leaves them as well.
     needs
         By kind of function: it does nothing, and is not called, where all of these
         parameters are zero.
@@ -257,6 +264,7 @@ class Effect:
     features: Callable[[Arena], tuple[Feature, ...]] = _no_features
     paces: tuple[Pace, ...] = ()
     fixed: tuple[str, ...] = ()
+    idle: Callable[[Mapping[str, float]], tuple[str, ...]] = _none_idle
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
     @property
@@ -293,6 +301,11 @@ class Effect:
     def may_be_placebo(self) -> bool:
         """Whether it can be added to a model as any other one, though it is not there."""
         return self.in_any_steps and self.lag is None
+
+    def free(self, shape: Mapping[str, float]) -> tuple[str, ...]:
+        """Return the parameters that a fit moves in a form: those that are smooth and not idle."""
+        idle = self.idle(dict(zip(self.names, self.values(shape), strict=True)))
+        return tuple(name for name in self.names if name not in {*self.fixed, *idle})
 
     def calls(self, kind: str, given: Mapping[str, float]) -> bool:
         """Return whether a function of a kind has anything to do at these parameters."""

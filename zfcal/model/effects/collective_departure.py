@@ -6,11 +6,31 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import Hooked, beyond, needs_neighbour, tilt, way_out
-from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, hats, only
+from zfcal.model.effects.forms import (
+    RAD_PER_STRENGTH,
+    Hooked,
+    beyond,
+    needs_neighbour,
+    tilt,
+    turn_to,
+    way_out,
+)
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    hats,
+    only,
+)
 from zfcal.model.kernels.compiled import hook, inlined
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import (
+    FOLLOWS,
     LEFT_AT_S,
     LEFT_FROM,
     LEFT_S,
@@ -43,6 +63,8 @@ def since(state: Hooked, n: int, i: int, back: float) -> float:
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Add a component about the direction of the way out while another's leaving is fresh."""
     since_s = since(state, n, i, parameters[4])
+    if parameters[5] > 0.0:
+        return 0.0
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 0.0
     out[0], out[1], out[2] = state[MOUTH_X * n + i], state[MOUTH_Y * n + i], _KAPPA
@@ -53,13 +75,31 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the way out while another's leaving is fresh."""
-    if parameters[3] > 0.0:
+    if parameters[5] > 0.0:
+        if not state[FOLLOWS * n + i] > 0.0:
+            return 1.0
+    elif parameters[3] > 0.0:
         return 1.0
     since_s = since(state, n, i, parameters[4])
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 1.0
     fresh = 1.0 - beyond(since_s, parameters[1])
+    if parameters[5] > 0.0:
+        fresh *= RAD_PER_STRENGTH
     return tilt(parameters[0] * fresh, way_out(state, n, i, (ux, uy, landing), parameters[2]), 1.0)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn to the way out while another's leaving is fresh; not along a wall."""
+    if not parameters[5] > 0.0 or not state[ROOM * n + i] > 0.0:
+        return 0.0
+    since_s = since(state, n, i, parameters[4])
+    if since_s > 4.0 * parameters[1]:
+        return 0.0
+    fresh = 1.0 - beyond(since_s, parameters[1])
+    out = turn_to(state, n, i, state[MOUTH_X * n + i], state[MOUTH_Y * n + i])
+    return RAD_PER_STRENGTH * parameters[0] * fresh * out
 
 
 def _lacks(company: Company) -> str | None:
@@ -94,12 +134,21 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(_freshly_left(seen)[..., None] * seen.way_out[:, None])
 
 
+def _turning(seen: Seen) -> Floats:
+    return np.asarray(aside_of(seen, only(seen.way_out)) * _freshly_left(seen))
+
+
+_BY_TIME = Along(cue="time since the other left (s)", knots=_KNOTS_S[:-1])
+
 _FEATURES: tuple[Feature, ...] = (
-    Leaving(label="time", weights=_freshly_left),
-    Leaving(label="time, though it came back", weights=_each_left),
-    Component(label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0),
-    Component(label="drawn out by each", toward=_way_out, weights=_each, kappa=3.0),
-    Tilt(label="leaning to the way out", vectors=_leaning),
+    Leaving(label="time", weights=_freshly_left, along=_BY_TIME),
+    Leaving(label="time, though it came back", weights=_each_left, along=_BY_TIME),
+    Component(
+        label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0, along=_BY_TIME
+    ),
+    Component(label="drawn out by each", toward=_way_out, weights=_each, kappa=3.0, along=_BY_TIME),
+    Tilt(label="leaning to the way out", vectors=_leaning, along=_BY_TIME),
+    Turned(label="turning to the way out", by=_turning, neighbours=False, along=_BY_TIME),
 )
 
 
@@ -128,7 +177,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=1.0,
-            says="1: headings toward the way out, all over the room; 0: steps across it.",
+            says="1: headings toward the way out, all over the room; 0: steps across it. Of those "
+            "that lean.",
         ),
         EffectParameter(
             name="drawn",
@@ -145,10 +195,19 @@ EFFECT = Effect(
             default=0.0,
             says="0: the leaving of those that are still away; 1: of those that came back as well.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all turn to the way out, by a tenth of a radian per strength times the sine "
+            "of the angle to it; along a wall they prefer the sense that is nearer to it.",
+        ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
+    rotation=rotation,
     harmonics=1,
     by_landing=True,
     shapes=lambda _arena: tuple(
@@ -163,12 +222,13 @@ EFFECT = Effect(
             {"drawn": 1.0, "back": 1.0},
             {"heading_share": 0.0, "back": 1.0},
             {"back": 1.0},
+            {"turning": 1.0},
         )
         for memory_s in (1.0, 2.0, 4.0, 8.0)
     ),
     lacks=_lacks,
     identity_s=10.0,
-    fixed=("heading_share", "drawn", "back"),
-    needs={"component": ("drawn",)},
+    fixed=("heading_share", "drawn", "back", "turning"),
+    needs={"component": ("drawn",), "rotation": ("turning",)},
     features=lambda _arena: _FEATURES,
 )

@@ -8,10 +8,11 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import SLOWEST_M_S, SPEED_M_S, cut, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, SLOWEST_M_S, SPEED_M_S, cut, tilt, turn_to
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, of_tank
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
+from zfcal.model.kernels.state import FOLLOWS
 
 _MOST = 4.0
 
@@ -20,17 +21,34 @@ _MOST = 4.0
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Add a component about the direction."""
     out[0], out[1], out[2] = math.cos(parameters[1]), math.sin(parameters[1]), parameters[4]
-    return parameters[0] if parameters[3] > 0.0 else 0.0
+    return parameters[0] if parameters[3] > 0.0 and not parameters[5] > 0.0 else 0.0
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by their component along the direction, those of slow steps more."""
-    if parameters[3] > 0.0:
+    """Weigh headings by their component along the direction, those of slow steps more.
+
+    Where fish turn to it, those along walls alone.
+    """
+    if parameters[5] > 0.0:
+        if not state[FOLLOWS * n + i] > 0.0:
+            return 1.0
+    elif parameters[3] > 0.0:
         return 1.0
     along = ux * math.cos(parameters[1]) + uy * math.sin(parameters[1])
+    if parameters[5] > 0.0:
+        return tilt(RAD_PER_STRENGTH * parameters[0], along, 1.0)
     strength = parameters[0] * (SPEED_M_S / max(speed, SLOWEST_M_S)) ** parameters[2]
     return tilt(cut(strength, 0.0, _MOST), along, 1.0)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn to the direction by the sine of the angle to it; not along a wall."""
+    if not parameters[5] > 0.0:
+        return 0.0
+    aside = turn_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
+    return RAD_PER_STRENGTH * parameters[0] * aside
 
 
 _DIRECTIONS = tuple(float(angle) for angle in np.arange(6) * np.pi / 3)
@@ -38,9 +56,8 @@ _SLOW_M_S = 0.01
 
 
 def _compass(seen: Seen) -> Floats:
-    """Return six directions, the same for all steps, shape (step, 6, 2)."""
-    vectors = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=-1)
-    return np.broadcast_to(vectors, (len(seen.zone), *vectors.shape))
+    """Return six directions of the tank, shape (step, 6, 2)."""
+    return of_tank(seen, np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=-1)[None])
 
 
 def _each(seen: Seen) -> Floats:
@@ -48,19 +65,28 @@ def _each(seen: Seen) -> Floats:
 
 
 def _axes(seen: Seen) -> Floats:
-    return np.broadcast_to(np.eye(2), (len(seen.zone), 2, 2))
+    return of_tank(seen, np.eye(2)[None])
+
+
+def _aside(seen: Seen) -> Floats:
+    return aside_of(seen, _axes(seen))
 
 
 def _carried(seen: Seen) -> Floats:
     """Return the axes, heavier for slow steps: a current carries fish that swim."""
     by = 1.0 / np.maximum(seen.own_speed_m_s, _SLOW_M_S)
-    return np.asarray((by / by.mean())[:, None, None] * np.eye(2))
+    return np.asarray((by / by.mean())[:, None, None] * _axes(seen))
 
+
+_BY_DIRECTION = Along(cue="direction (rad)", knots=_DIRECTIONS)
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="drawn, widely", toward=_compass, weights=_each, kappa=1.0),
-    Component(label="drawn", toward=_compass, weights=_each, kappa=3.0),
+    Component(
+        label="drawn, widely", toward=_compass, weights=_each, kappa=1.0, along=_BY_DIRECTION
+    ),
+    Component(label="drawn", toward=_compass, weights=_each, kappa=3.0, along=_BY_DIRECTION),
     Tilt(label="leaning", vectors=_axes),
+    Turned(label="turning", by=_aside, neighbours=False),
     Tilt(label="carried", vectors=_carried),
 )
 
@@ -91,7 +117,8 @@ EFFECT = Effect(
             high=1.0,
             default=0.0,
             says="How much more slow steps have of it: 0 for all steps alike, as with a light; 1 "
-            "for the inverse of the speed, as where a current carries fish that swim.",
+            "for the inverse of the speed, as where a current carries fish that swim. Of "
+            "those that lean.",
         ),
         EffectParameter(
             name="drawn",
@@ -108,17 +135,29 @@ EFFECT = Effect(
             default=2.0,
             says="Von Mises concentration about the direction of those that are drawn.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all turn to that direction, by a tenth of a radian per strength times the "
+            "sine of the angle to it; along a wall they prefer the sense that is nearer to it.",
+        ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
     harmonics=1,
     shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
+    rotation=rotation,
     further_shapes=lambda _arena: tuple(
-        {"direction_rad": eighth * math.pi / 4, "drawn": 1.0} for eighth in range(-3, 5)
+        {"direction_rad": eighth * math.pi / 4, form: 1.0}
+        for form in ("drawn", "turning")
+        for eighth in range(-3, 5)
     ),
-    fixed=("drawn", "kappa"),
-    needs={"component": ("drawn",)},
+    fixed=("drawn", "kappa", "turning"),
+    idle=lambda values: ("by_slowness",) if values["drawn"] + values["turning"] > 0 else (),
+    needs={"component": ("drawn",), "rotation": ("turning",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,
 )

@@ -31,6 +31,9 @@ SLOWEST_M_S = 0.005
 MOST_TIMES = 3.0
 """An effect on speed at most so many times speeds up or slows down."""
 
+RAD_PER_STRENGTH = 0.1
+"""Where fish turn to something: by so much per strength, times the sine of the angle to it."""
+
 _EDGE = 8.0
 _SENSE = 3.0
 _PER_SENSE = 1.0 / math.tanh(_SENSE)
@@ -82,6 +85,14 @@ def leftward(state: Hooked, n: int, i: int, ux: float, uy: float, along_walls: f
         return 2.0 * (tau_x * uy - tau_y * ux) * (tau_x * ux + tau_y * uy)
     hx, hy = state[HX * n + i], state[HY * n + i]
     return hx * uy - hy * ux
+
+
+@inlined
+def turn_to(state: Hooked, n: int, i: int, x: float, y: float) -> float:
+    """Return the sine of the angle from the heading to a unit vector; 0 along walls."""
+    if state[FOLLOWS * n + i] > 0.0:
+        return 0.0
+    return float(state[HX * n + i] * y - state[HY * n + i] * x)
 
 
 @inlined

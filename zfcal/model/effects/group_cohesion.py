@@ -8,11 +8,19 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, seen_by_rank, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, hats, only
+from zfcal.model.effects.forms import (
+    RAD_PER_STRENGTH,
+    Hooked,
+    apart,
+    needs_neighbour,
+    seen_by_rank,
+    tilt,
+    turn_to,
+)
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, hats, only
 from zfcal.model.kernels.compiled import hook, inlined
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
-from zfcal.model.kernels.state import ZONE, X, Y
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
+from zfcal.model.kernels.state import FOLLOWS, ZONE, X, Y
 
 
 @inlined
@@ -59,7 +67,7 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
     Or one about that of each that is seen.
     """
-    if parameters[3] > 0.0:
+    if parameters[3] > 0.0 or parameters[6] > 0.0:
         return 0.0
     if parameters[4] > 0.0 or parameters[7] > 0.0:
         if not parameters[4] > 0.0 or not parameters[7] > 0.0:
@@ -80,12 +88,27 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the bearing of the centroid of all others, seen or not, or the nearest."""
-    if not parameters[3] > 0.0:
+    leaning = parameters[3]
+    if parameters[6] > 0.0:
+        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i]
+    if not leaning > 0.0:
         return 1.0
     x, y, away_m = middle(state, n, i, parameters[5])
     if not away_m > 0.0:
         return 1.0
-    return tilt(parameters[0] * parameters[3] * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
+    return tilt(parameters[0] * leaning * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn to that bearing by the sine of the angle to it; not along a wall."""
+    if not parameters[6] > 0.0:
+        return 0.0
+    x, y, away_m = middle(state, n, i, parameters[5])
+    if not away_m > 0.0:
+        return 0.0
+    pull = parameters[0] * grown(away_m, parameters[2])
+    return RAD_PER_STRENGTH * pull * turn_to(state, n, i, x, y)
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
@@ -125,6 +148,15 @@ def _of_nearest(seen: Seen) -> Floats:
     return _of_each(seen) * seen.nearest
 
 
+def _turning(seen: Seen) -> Floats:
+    toward, weights = _middle(seen)
+    return np.asarray(aside_of(seen, toward[:, None]) * weights)
+
+
+def _turning_to_nearest(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sj->sb", _of_nearest(seen), aside_of(seen, seen.bearing)))
+
+
 def _leaning_to_nearest(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _of_nearest(seen), seen.bearing))
 
@@ -133,16 +165,35 @@ def _leaning_to_each(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _of_each(seen), seen.bearing))
 
 
+_TO_MIDDLE = Along(cue="distance to the middle of the others (m)", knots=_KNOTS_M)
+_TO_EACH = Along(cue="distance to the other (m)", knots=_KNOTS_M)
+_TO_NEAREST = Along(cue="distance to the nearest (m)", knots=_KNOTS_M)
+
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0),
-    Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0),
-    Component(label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0),
-    Component(label="drawn to each seen", toward="bearing", weights=_of_each_seen, kappa=5.0),
-    Component(label="drawn to the nearest", toward="bearing", weights=_of_nearest, kappa=5.0),
-    Tilt(label="leaning", vectors=_leaning, low=0.0),
-    Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0),
-    Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0),
-)
+    Component(
+        label="drawn, widely", toward=_toward, weights=_by_distance, kappa=2.0, along=_TO_MIDDLE
+    ),
+    Component(label="drawn", toward=_toward, weights=_by_distance, kappa=8.0, along=_TO_MIDDLE),
+    Component(
+        label="drawn to each", toward="bearing", weights=_of_each, kappa=5.0, along=_TO_EACH
+    ),
+    Component(
+        label="drawn to each seen", toward="bearing", weights=_of_each_seen, kappa=5.0,
+        along=_TO_EACH,
+    ),
+    Component(
+        label="drawn to the nearest", toward="bearing", weights=_of_nearest, kappa=5.0,
+        along=_TO_NEAREST,
+    ),
+    Tilt(label="leaning", vectors=_leaning, low=0.0, along=_TO_MIDDLE),
+    Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0, along=_TO_EACH),
+    Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0, along=_TO_NEAREST),
+    Turned(label="turning", by=_turning, neighbours=False, low=0.0, along=_TO_MIDDLE),
+    Turned(
+        label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
+        along=_TO_NEAREST,
+    ),
+)  # fmt: skip
 
 
 EFFECT = Effect(
@@ -194,11 +245,20 @@ EFFECT = Effect(
             default=0.0,
             says="1: the nearest, seen or not, in place of the centroid.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all turn to that bearing, by a tenth of a radian per weight times the sine "
+            "of the angle to it; along a wall they prefer the sense that is nearer to it.",
+        ),
     ),
     strength="weight",
     probe=0.005,
     component=component,
     factor=factor,
+    rotation=rotation,
     harmonics=1,
     shapes=lambda _arena: (
         {"kappa": 2.0, "full_m": 0.0},
@@ -220,9 +280,15 @@ EFFECT = Effect(
             for form in ({"kappa": 2.0}, {"kappa": 6.0}, {"leaning": 1.0})
             for full_m in (0.0, 0.3)
         )
+        + tuple(
+            {"turning": 1.0, "full_m": full_m, "nearest": nearest}
+            for nearest in (0.0, 1.0)
+            for full_m in (0.0, 0.3)
+        )
     ),
     lacks=needs_neighbour,
-    fixed=("full_m", "leaning", "each", "nearest"),
-    needs={"factor": ("leaning",)},
+    fixed=("full_m", "leaning", "each", "nearest", "turning"),
+    idle=lambda values: ("kappa",) if values["leaning"] + values["turning"] > 0 else (),
+    needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
     features=lambda _arena: _FEATURES,
 )

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.features import Feature, Seen, factor_on_attention, hats
+from zfcal.model.features import Along, Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import KIND, TIME
@@ -39,9 +39,11 @@ def _attention_to_robots(seen: Seen) -> Floats:
     return _attention(seen) * seen.is_robot[..., None]
 
 
+_BY_TIME = Along(cue="share of the recording that has passed", knots=_KNOTS[1:], none_at=_KNOTS[0])
+
 _FEATURES: tuple[Feature, ...] = (
-    factor_on_attention(_attention),
-    factor_on_attention(_attention_to_robots, label="attention to robots"),
+    factor_on_attention(_attention, along=_BY_TIME),
+    factor_on_attention(_attention_to_robots, label="attention to robots", along=_BY_TIME),
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
-from zfcal.model.features import Feature, Seen, factor_on_attention, hats
+from zfcal.model.features import Along, Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import ZONE
@@ -40,7 +40,11 @@ def _farther(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    factor_on_attention(_attention, high=0.0),
+    factor_on_attention(
+        _attention,
+        high=0.0,
+        along=Along(cue="distance to the other (m)", knots=_KNOTS_M[1:], none_at=_KNOTS_M[0]),
+    ),
     factor_on_attention(_farther, label="the nearest alone", high=0.0),
 )
 

@@ -10,6 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
 from zfcal.model.features import (
+    Along,
     Component,
     Feature,
     OneOf,
@@ -136,7 +137,10 @@ _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
 _REACH_M = (0.1, 0.2, 9.0)
 
 _FEATURES: tuple[Feature, ...] = (
-    factor_on_attention(_attention),
+    factor_on_attention(
+        _attention,
+        along=Along(cue="speed of the other (m/s)", knots=_KNOTS_M_S[1:], none_at=_KNOTS_M_S[0]),
+    ),
     factor_on_attention(_fastest, label="the fastest in view"),
     factor_on_attention(_who, label="who"),
     OneOf(

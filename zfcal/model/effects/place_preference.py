@@ -11,13 +11,25 @@ import shapely
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
-from zfcal.model.effects.forms import tilt
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, tilt, turn_to
 from zfcal.model.effects.places import places
-from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, hats, only
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    hats,
+    of_tank,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
-from zfcal.model.kernels.state import X, Y
+from zfcal.model.kernels.state import FOLLOWS, X, Y
 
 _AT_IT_M = 0.02
 
@@ -27,7 +39,8 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
     """Add a component about the bearing of the place; far from it less, and at it not at all."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not (away > 0.0 and parameters[4] > 0.0 and parameters[0] > 0.0):
+    is_drawn = parameters[4] > 0.0 and not parameters[6] > 0.0
+    if not (away > 0.0 and is_drawn and parameters[0] > 0.0):
         return 0.0
     out[0], out[1], out[2] = dx / away, dy / away, parameters[5]
     return parameters[0] * away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
@@ -38,10 +51,23 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     """Weigh headings by the bearing of the place; far from it less, and at it not at all."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not away > 0.0 or parameters[4] > 0.0:
+    if not away > 0.0 or (parameters[4] > 0.0 and not parameters[6] > 0.0):
         return 1.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    if parameters[6] > 0.0:
+        pull *= RAD_PER_STRENGTH * state[FOLLOWS * n + i]
     return tilt(parameters[0], pull * (ux * dx + uy * dy) / away, pull)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn to the place by the sine of the angle to it; not along a wall."""
+    dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    away = math.sqrt(dx * dx + dy * dy)
+    if not away > 0.0 or not parameters[6] > 0.0:
+        return 0.0
+    pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    return RAD_PER_STRENGTH * parameters[0] * pull * turn_to(state, n, i, dx / away, dy / away)
 
 
 def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
@@ -58,6 +84,7 @@ def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
 
 
 _KNOTS_M = (0.0, 0.15, 0.3, 0.6)
+_BY_DISTANCE = Along(cue="distance to the place (m)", knots=_KNOTS_M)
 _PER_SIDE = 7
 _KAPPA = 3.0
 
@@ -77,13 +104,15 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     return (
         OneOf(kind="drawn", features=tuple(_drawn(spot, room) for spot, room in asked)),
         OneOf(kind="leaning", features=tuple(_leaning(spot, room) for spot, room in asked)),
+        OneOf(kind="turning", features=tuple(_turning(spot, room) for spot, room in asked)),
     )
 
 
 def _toward(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
     way = spot - seen.xy_m
     far = np.linalg.norm(way, axis=1)
-    return way / np.maximum(far, 1e-9)[:, None], hats(far, _KNOTS_M)
+    toward = of_tank(seen, (way / np.maximum(far, 1e-9)[:, None])[:, None])
+    return toward[:, 0], hats(far, _KNOTS_M)
 
 
 def _within(seen: Seen, room: shapely.Polygon | None) -> Floats:
@@ -98,6 +127,7 @@ def _drawn(spot: Floats, room: shapely.Polygon | None) -> Component:
         toward=lambda seen: only(_toward(seen, spot)[0]),
         weights=lambda seen: only(_toward(seen, spot)[1] * _within(seen, room)[:, None]),
         kappa=_KAPPA,
+        along=_BY_DISTANCE,
     )
 
 
@@ -106,7 +136,21 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
         toward, weights = _toward(seen, spot)
         return np.asarray((weights * _within(seen, room)[:, None])[..., None] * toward[:, None])
 
-    return Tilt(label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors)
+    return Tilt(
+        label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors, along=_BY_DISTANCE
+    )
+
+
+def _turning(spot: Floats, room: shapely.Polygon | None) -> Turned:
+    def by(seen: Seen) -> Floats:
+        toward, weights = _toward(seen, spot)
+        here = aside_of(seen, toward[:, None]) * _within(seen, room)[:, None]
+        return np.asarray(weights * here)
+
+    return Turned(
+        label=f"turning to {spot[0]:.2f}, {spot[1]:.2f}", by=by, neighbours=False,
+        along=_BY_DISTANCE,
+    )  # fmt: skip
 
 
 EFFECT = Effect(
@@ -150,17 +194,26 @@ EFFECT = Effect(
             default=3.0,
             says="Von Mises concentration about that bearing of those that are drawn.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all turn to the place, by a tenth of a radian per strength times the sine "
+            "of the angle to it; along a wall they prefer the sense that is nearer to it.",
+        ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
+    rotation=rotation,
     harmonics=1,
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
     further_shapes=lambda arena: tuple(
-        {"x_m": x, "y_m": y, "drawn": 1.0} for x, y in places(arena)
+        {"x_m": x, "y_m": y, form: 1.0} for form in ("drawn", "turning") for x, y in places(arena)
     ),
-    fixed=("drawn", "kappa"),
-    needs={"component": ("drawn",)},
+    fixed=("drawn", "kappa", "turning"),
+    needs={"component": ("drawn",), "rotation": ("turning",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.
     looks_like=Likeness(name="directional-drift", share=_one_sided),

@@ -7,7 +7,7 @@ import math
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import Feature, Seen, factor_on_attention, hats
+from zfcal.model.features import Along, Feature, Seen, factor_on_attention, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import HX, HY, X, Y
@@ -31,7 +31,15 @@ def _attention(seen: Seen) -> Floats:
     return hats(seen.off_axis_rad, _KNOTS_RAD)[..., 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (factor_on_attention(_attention, high=0.0),)
+_FEATURES: tuple[Feature, ...] = (
+    factor_on_attention(
+        _attention,
+        high=0.0,
+        along=Along(
+            cue="bearing off the own heading (rad)", knots=_KNOTS_RAD[1:], none_at=_KNOTS_RAD[0]
+        ),
+    ),
+)
 
 
 EFFECT = Effect(

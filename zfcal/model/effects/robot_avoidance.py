@@ -8,11 +8,21 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import apart, beyond, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, factor_on_attention, hats
-from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR, SIGHT
-from zfcal.model.kernels.state import KIND, X, Y
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, Hooked, apart, beyond, tilt, turn_to
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    factor_on_attention,
+    hats,
+)
+from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
+from zfcal.model.kernels.state import FOLLOWS, KIND, X, Y
 
 _NEAR_M = 0.1
 _PER_STRENGTH = 0.1
@@ -23,7 +33,8 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Change the attention that a robot gets."""
     if not state[KIND * n + j] > 0.0:
         return 1.0
-    return math.exp(-parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]))
+    lost = parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]) * (1.0 - parameters[5])
+    return math.exp(-lost)
 
 
 @hook(COMPONENT)
@@ -35,7 +46,7 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
             away = apart(state, n, i, j)
             if away < far_m:
                 nearest, far_m = j, away
-    if nearest < 0 or not parameters[2] > 0.0:
+    if nearest < 0 or not parameters[2] > 0.0 or parameters[5] > 0.0:
         return 0.0
     side = (1.0 if parameters[0] > 0.0 else -1.0) / max(far_m, 1e-9)
     out[0] = side * (state[X * n + i] - state[X * n + nearest])
@@ -44,19 +55,40 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
     return _PER_STRENGTH * abs(parameters[0]) * (1.0 - beyond(far_m, parameters[3]))
 
 
+@inlined
+def from_robots(state: Hooked, sight: Hooked, n: int, i: int) -> tuple[float, float, float]:
+    """Return the sum of the ways from the robots that are seen, the nearer the longer."""
+    x, y, most = 0.0, 0.0, 0.0
+    for j in range(n):
+        if state[KIND * n + j] > 0.0 and sight[i * n + j] > 0.0:
+            dx, dy = state[X * n + i] - state[X * n + j], state[Y * n + i] - state[Y * n + j]
+            far_m = max(apart(state, n, i, j), 1e-9)
+            near = math.exp(-far_m / _NEAR_M)
+            x += near * dx / far_m
+            y += near * dy / far_m
+            most += near
+    return x, y, most
+
+
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings away from the robots that are seen; the nearer, the more."""
-    away, most = 0.0, 0.0
-    if parameters[1] > 0.0:
-        for j in range(n):
-            if state[KIND * n + j] > 0.0 and sight[i * n + j] > 0.0:
-                dx, dy = state[X * n + i] - state[X * n + j], state[Y * n + i] - state[Y * n + j]
-                far_m = max(apart(state, n, i, j), 1e-9)
-                near = math.exp(-far_m / _NEAR_M)
-                away += near * (ux * dx + uy * dy) / far_m
-                most += near
-    return tilt(parameters[0] * parameters[1], away, most)
+    leaning = parameters[1]
+    if parameters[5] > 0.0:
+        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i]
+    if not leaning > 0.0:
+        return 1.0
+    x, y, most = from_robots(state, sight, n, i)
+    return tilt(parameters[0] * leaning, ux * x + uy * y, most)
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]
+    """Turn away from the robots that are seen; not along a wall."""
+    if not parameters[5] > 0.0:
+        return 0.0
+    x, y, _ = from_robots(state, sight, n, i)
+    return RAD_PER_STRENGTH * parameters[0] * turn_to(state, n, i, x, y)
 
 
 def _lacks(company: Company) -> str | None:
@@ -85,13 +117,29 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
 
 
+def _turning(seen: Seen) -> Floats:
+    return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside_of(seen, seen.bearing)))
+
+
+_TO_ROBOT = Along(cue="distance to the robot (m)", knots=_KNOTS_M)
+
 _FEATURES: tuple[Feature, ...] = (
-    factor_on_attention(_attention),
-    Component(label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0),
-    Component(label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0),
-    Component(label="drawn to it", toward="bearing", weights=_seen_robots, kappa=5.0),
-    Tilt(label="leaning", vectors=_leaning),
-)
+    factor_on_attention(
+        _attention, along=Along(cue="distance to the robot (m)", knots=_ATTENTION_M)
+    ),
+    Component(
+        label="away, widely", toward=lambda s: -s.bearing, weights=_robots, kappa=3.0,
+        along=_TO_ROBOT,
+    ),
+    Component(
+        label="away", toward=lambda s: -s.bearing, weights=_robots, kappa=8.0, along=_TO_ROBOT
+    ),
+    Component(
+        label="drawn to it", toward="bearing", weights=_seen_robots, kappa=5.0, along=_TO_ROBOT
+    ),
+    Tilt(label="leaning", vectors=_leaning, along=_TO_ROBOT),
+    Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
+)  # fmt: skip
 
 
 EFFECT = Effect(
@@ -137,19 +185,37 @@ EFFECT = Effect(
             default=5.0,
             says="Von Mises concentration about that way.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: it gets the attention of a fish, and all turn away from it when it is close, "
+            "by a tenth of a radian per strength times the sine of the angle; along a wall they "
+            "prefer the sense that leads away.",
+        ),
     ),
     probe=0.01,
     component=component,
     sight=sight,
     factor=factor,
+    rotation=rotation,
     harmonics=1,
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
-    further_shapes=lambda _arena: tuple(
-        {"drawn": 1.0, "reach_m": reach_m, "kappa": 5.0} for reach_m in (0.07, 0.12, 0.2, 0.35)
+    further_shapes=lambda _arena: (
+        *({"drawn": 1.0, "reach_m": far_m, "kappa": 5.0} for far_m in (0.07, 0.12, 0.2, 0.35)),
+        {"turning": 1.0},
     ),
     lacks=_lacks,
-    fixed=("flight", "drawn"),
-    needs={"factor": ("flight",), "component": ("drawn",)},
+    fixed=("flight", "drawn", "turning"),
+    idle=lambda values: (
+        () if values["drawn"] > 0 and not values["turning"] > 0 else ("reach_m", "kappa")
+    ),
+    needs={
+        "factor": ("flight", "turning"),
+        "component": ("drawn",),
+        "rotation": ("turning",),
+    },
     features=lambda _arena: _FEATURES,
 )
 

@@ -114,6 +114,9 @@ def gather(
             count += 1
     if packed.rotations.shape[0] > 0:
         _spin(i, state, model, packed, sight, work)
+    else:
+        # The model before, of the same robot, may have had some.
+        work.spin[0], work.spin[1] = 1.0, 0.0
     return count, total
 
 

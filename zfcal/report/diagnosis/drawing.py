@@ -66,13 +66,14 @@ def pictures_of(sheet: Sheet) -> list[Picture]:
     """Return the pictures of findings, in the order in which they are told."""
     findings = sheet.findings
     found = [effect.name for effect in findings.effects]
+    pairs = zip(findings.effects, findings.pictured, strict=True)
     made = [
         gap_picture(findings.gap),
         *(
-            None if pictured is None else finding_picture(name, number, pictured, sheet.arena)
-            for number, (name, pictured) in enumerate(
-                zip(found, findings.pictured, strict=True), start=1
-            )
+            None
+            if pictured is None
+            else finding_picture(effect.name, n, pictured, sheet.arena, effect.by_features)
+            for n, (effect, pictured) in enumerate(pairs, start=1)
         ),
         screened_picture(findings.screened, found),
     ]

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
+from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.pictured import Parts, Pictured
 from zfcal.report.figures import theme
 from zfcal.report.figures.arena import arena_size_in, paint_walls
@@ -29,7 +30,13 @@ _DEEPEST = 0.98
 WITHOUT, WITH = theme.MODEL, theme.GROUP
 
 
-def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) -> Picture:
+def finding_picture(
+    name: str,
+    number: int,
+    pictured: Pictured,
+    arena: Arena,
+    by_features: FeatureCurve | None = None,
+) -> Picture:
     """Return the picture of one finding.
 
     Parameters
@@ -42,6 +49,8 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
         What to show.
     arena
         The tank.
+    by_features
+        What its features say, if it has any.
     """
     width_in, height_in = arena_size_in(arena, _WIDTH_IN)
     place = Panel(
@@ -55,6 +64,7 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
         _parts_panel("When", pictured.minutes, _draw_minutes, "minute"),
         _curve_panel(pictured),
         _parts_panel("In whom", pictured.agents, _draw_agents, "track"),
+        _feature_panel(by_features),
     ]
     return Picture(
         name=f"{number}-{slug(name)}",
@@ -66,10 +76,11 @@ def finding_picture(name: str, number: int, pictured: Pictured, arena: Arena) ->
             Entry(label="model without the effect", colour=WITHOUT, mark="dash", marker="^"),
             Entry(label="model with it", colour=WITH, mark="line", marker="D"),
             Entry(label="95 % of a right model", colour=theme.BAND, mark="band"),
+            *_feature_entries(by_features),
         ),
         note="In all panels the score shows how much more of the effect the fish show than the "
         "model expects: zero where the model is right, in standard deviations of a single step. "
-        "The map is of the model without the effect.",
+        "The map is of the model without the effect." + _note_on_feature(by_features),
     )
 
 
@@ -193,6 +204,52 @@ def _draw_curve(axes: Axes, *, pictured: Pictured, left: list[Floats]) -> None:
     axes.plot(cue, left[0], color=WITHOUT, ls="--", marker="^", zorder=3)
     axes.plot(cue, left[1], color=WITH, marker="D", zorder=3)
     axes.set(xlabel=_lines(pictured.curve.cue_name, 42), ylabel="score")
+    axes.xaxis.set_major_locator(MaxNLocator(6))
+
+
+def _feature_panel(found: FeatureCurve | None) -> Panel | None:
+    if found is None or not len(found.at):
+        return None
+    largest = int(np.nanargmax(np.abs(found.strength)))
+    return Panel(
+        title=f"How strong, by {_without_unit(found.cue)}",
+        alt=f"Strength of the feature {found.label!r} by {found.cue}, as the fish show it with its "
+        f"95 % interval, and as the model with the effect does: largest, "
+        f"{found.strength[largest]:.3g}, at {found.at[largest]:.3g}.",
+        draw=partial(_draw_feature, found=found),
+        size_in=PANEL_IN,
+    )
+
+
+def _note_on_feature(found: FeatureCurve | None) -> str:
+    if found is None or not len(found.at):
+        return ""
+    return (
+        f" How strong: the feature {found.label!r}, which gains {found.nats:.0f} nats, fitted to "
+        "the headings of the fish and to headings drawn from the model with the effect, whose "
+        f"form gains {found.form_nats:.0f}."
+        + "".join(
+            f" Besides, {name}: {value:.3g} ({low:.3g} to {high:.3g})."
+            for name, (value, low, high) in found.besides.items()
+        )
+    )
+
+
+def _feature_entries(found: FeatureCurve | None) -> tuple[Entry, ...]:
+    if found is None or not len(found.at):
+        return ()
+    return (Entry(label="fish, 95 % interval", colour=theme.FISH, mark="line", marker="o"),)
+
+
+def _draw_feature(axes: Axes, *, found: FeatureCurve) -> None:
+    reach = np.stack([found.strength - found.low, found.high - found.strength])
+    axes.axhline(0, color=theme.MUTED, lw=0.8)
+    axes.errorbar(
+        found.at, found.strength, np.nan_to_num(np.maximum(reach, 0.0)), color=theme.FISH,
+        marker="o", capsize=3, zorder=3,
+    )  # fmt: skip
+    axes.plot(found.at, found.form, color=WITH, marker="D", zorder=4)
+    axes.set(xlabel=_lines(found.cue, 42), ylabel=_lines(found.strength_name, 30))
     axes.xaxis.set_major_locator(MaxNLocator(6))
 
 

@@ -1,0 +1,146 @@
+"""The curve of a feature: how strong an effect is by what it goes by, whatever its form.
+
+Beside it stands what the same feature shows of the form that the model has: of headings drawn from
+that model, where all were when each step began.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from zfcal.arrays import Floats, Ints
+from zfcal.diagnose.features.asking import best_feature, fits_beside
+from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.findings import FeatureCurve
+from zfcal.diagnose.screening import Screen
+from zfcal.model.effects import Effect
+from zfcal.model.features import Component, Leaving, Single, Tilt
+from zfcal.model.kernels.landing import ANGLES
+
+_REDRAWN = 3
+"""Times that headings are drawn from the model with the effect."""
+
+
+def curve_of(
+    law: Law, effect: Effect, with_it: Screen, *, nats: float, beside: Sequence[Effect] = ()
+) -> FeatureCurve | None:
+    """Return what an effect's best feature says of a recording; None where none gains anything.
+
+    Parameters
+    ----------
+    law
+        Of the model without the effect.
+    effect
+        Has features.
+    with_it
+        The same recording under the model with it, in a form of ours.
+    nats
+        What that form gains.
+    beside
+        Effects on headings that the model without it has.
+    """
+    fits = fits_beside(law, beside)
+    found = best_feature(fits, effect)
+    if found is None:
+        return None
+    feature, gain = found
+    made = FeatureCurve(label=feature.label, nats=gain.nats, form_nats=nats)
+    if feature.along is None:
+        return made
+    n, fit = len(feature.along.knots), fits.fit(feature)
+    shown = _Knots(none_at=feature.along.none_at)
+    return replace(
+        made,
+        cue=feature.along.cue,
+        strength_name=_name_of(feature),
+        at=shown.knots(feature.along.knots),
+        strength=shown.values(fit.strengths[:n]),
+        low=shown.values(fit.interval[:n, 0]),
+        high=shown.values(fit.interval[:n, 1]),
+        form=shown.values(_of_the_form(fits, feature, with_it)[:n]),
+        besides={
+            name: (float(value), float(low), float(high))
+            for name, value, (low, high) in zip(
+                feature.along.besides, fit.strengths[n:], fit.interval[n:], strict=True
+            )
+        },
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Knots:
+    """Puts a knot at which there is nothing to fit before the others."""
+
+    none_at: float | None
+
+    def knots(self, values: Sequence[float]) -> Floats:
+        return np.array(values if self.none_at is None else (self.none_at, *values))
+
+    def values(self, values: Floats) -> Floats:
+        return np.asarray(values if self.none_at is None else np.append(0.0, values))
+
+
+def _of_the_form(fits: Fits, feature: Single, with_it: Screen) -> Floats:
+    """Return the strengths where headings are drawn from the model with the effect, their mean."""
+    random = np.random.default_rng([fits.law.seed, 11])
+    laws = [redrawn(fits.law, with_it, random) for _ in range(_REDRAWN)]
+    return np.mean([Fits(law=law, also=fits.also).fit(feature).strengths for law in laws], axis=0)
+
+
+def redrawn(law: Law, screen: Screen, random: np.random.Generator) -> Law:
+    """Return a law of the same steps with other headings, drawn from a model.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    screen
+        The same recording under the model that headings are drawn from. Within a cell of headings
+        the zones in which these land are drawn by the attractions of the base alone.
+    random
+        Draws them.
+    """
+    scene, view, rows = law.scene, law.fitted.view, law.rows
+    chosen = _chosen(screen.probability[rows], random)
+    angle = 2 * math.pi * (chosen + random.uniform(-0.5, 0.5, len(rows))) / ANGLES
+    x = np.stack(screen.fitted.x)[scene.turns.zone[rows] - 1]
+    zones = np.exp(x[:, 3:-1]) * scene.turns.share[rows, chosen].astype(np.float64)
+    taken, landing = scene.turns.taken.copy(), scene.turns.landing.copy()
+    taken[rows] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    landing[rows] = 1 + _chosen(zones, random)
+    if len(view.tilt):
+        tilt_taken = view.tilt_taken.copy()
+        tilt_taken[rows] = view.tilt[rows, chosen]
+        view = replace(view, tilt_taken=tilt_taken)
+    made = replace(
+        law,
+        scene=replace(scene, turns=replace(scene.turns, taken=taken, landing=landing)),
+        fitted=replace(law.fitted, view=view),
+    )
+    # Where everybody was stays as it was.
+    made.__dict__.update(draws=law.draws, _weights=law._weights)  # noqa: SLF001
+    return made
+
+
+def _chosen(weights: Floats, random: np.random.Generator) -> Ints:
+    """Return a column for each row, drawn by the weights."""
+    sums = np.cumsum(weights, axis=1)
+    return np.asarray((sums < (random.uniform(size=len(sums)) * sums[:, -1])[:, None]).sum(axis=1))
+
+
+def _name_of(feature: Single) -> str:
+    """Return what the strengths of a feature are, with their unit."""
+    if isinstance(feature, Component):
+        if feature.toward == "toward":
+            return "change of the attention (share)"
+        return "weight (own way: 1)"
+    if isinstance(feature, Tilt):
+        return "preference (nats)"
+    if isinstance(feature, Leaving):
+        return "log of the factor on leaving"
+    return "turn (rad)"
