@@ -153,6 +153,16 @@ def test_of_a_direction_and_its_opposite_the_right_one_is_fitted(question, direc
     assert abs(math.remainder(found.values["direction_rad"] - direction_rad, math.tau)) < 0.5
 
 
+@pytest.mark.slow
+def test_a_place_that_all_fish_have_on_one_side_is_a_direction(question):
+    """Features of places that fish turn to bend to any direction, and gain as much as it."""
+    given = {"strength": 0.8, "direction_rad": 2.0, "turning": 1.0}
+    case = open_case(question({"directional-drift": given}))
+    (named,) = second_look(case, NOTHING).steps
+    assert named.choice.best.name == "directional-drift"
+    assert named.choice.ties == ()
+
+
 def test_what_says_the_same_in_another_form_gets_the_listed_name(law):
     """A neighbour's heading, beyond the list, is alignment, whatever it gains by itself."""
     values = np.full(len(law.rows), 0.1)

@@ -21,7 +21,7 @@ from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.curves import curve_of
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Noise, Told, tell
+from zfcal.diagnose.features.naming import Noise, Told, tell, without_names
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
@@ -50,6 +50,7 @@ from zfcal.diagnose.selection import (
     MOST_EFFECTS,
     Step,
 )
+from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.speed_look import speed_look
 from zfcal.model.effects import Effect, find_effect
 
@@ -146,6 +147,11 @@ def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> F
     found, score = in_the_model(case, screen, told.gain.name)
     nothing = Found(steps=(), confirmed=(), nats=told.gain.nats, suspicious=True)
     step, confirmed = held_out(case, screen, told, (found, score))
+    aside = {each.name for each in feigned([found, *step.choice.ties], screen)}
+    if aside:
+        told = without_names(told, aside)
+        found, score = in_the_model(case, screen, told.gain.name)
+        step, confirmed = held_out(case, screen, told, (found, score))
     if found.values[found.candidate.effect.strength] == 0.0:
         # No form of ours goes that way: it is another effect, which the list does not have.
         return nothing

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from zfcal.diagnose.features.gains import Gain
@@ -69,6 +69,12 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = LE
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
     return Told(gain=first, p=min(1.0, first.p * n_tried), ties=ties, lead=lead)
+
+
+def without_names(told: Told, names: Collection[str]) -> Told:
+    """Return what is told without some of the names that cannot be told from each other."""
+    first, *ties = (gain for gain in (told.gain, *told.ties) if gain.name not in names)
+    return replace(told, gain=first, ties=tuple(ties))
 
 
 def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
