@@ -52,9 +52,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     asked = [
         (effect.name, feature)
         for effect in effects
-        for feature in effect.features(law.scene.arena)
-        if (kinds is None or (effect.name, kind_of(feature)) in kinds)
-        and (not isinstance(feature, Leaving) or law.zone_into(feature.into))
+        for feature in _askable(law, effect)
+        if kinds is None or (effect.name, kind_of(feature)) in kinds
     ]
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
@@ -82,15 +81,19 @@ def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -
 def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
     """Return the feature of an effect that gains most; None where none can be fitted."""
     fits.prepare()
-    arena = fits.law.scene.arena
-    asked = [
-        each
-        for each in effect.features(arena)
-        if not isinstance(each, Leaving) or fits.law.zone_into(each.into)
-    ]
+    asked = _askable(fits.law, effect)
     found = [pair for feature in asked for pair in _gains(fits, effect.name, feature)]
     some = [pair for pair in found if pair[1].n_strengths]
     return max(some, key=lambda pair: pair[1].nats, default=None)
+
+
+def _askable(law: Law, effect: Effect) -> list[Feature]:
+    """Return the features of an effect that a tank allows: not all have a zone to leave into."""
+    return [
+        feature
+        for feature in effect.features(law.scene.arena)
+        if not isinstance(feature, Leaving) or law.zone_into(feature.into)
+    ]
 
 
 def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
