@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.case import open_case
-from zfcal.diagnose.confirming import Confirmed
-from zfcal.diagnose.diagnose import _explains, _kept, _omnibus, _Row, diagnose
+from zfcal.diagnose.diagnose import _omnibus, _Row, diagnose
 from zfcal.diagnose.findings import Verdict
-from zfcal.diagnose.omnibus import Omnibus
 from zfcal.diagnose.question import Question
 from zfcal.errors import InputError
 from zfcal.model.effects import all_effects
@@ -278,72 +276,6 @@ def test_a_clear_effect_is_named_in_spite_of_noise(ask, record):
     found = ask(dataclasses.replace(exact, xy_m=exact.xy_m + wrong_m), noise_m=0.0005)
     assert found.effects[0].name == "turning-bias"
     assert found.effects[0].ties == ()
-
-
-@pytest.mark.parametrize(
-    ("left", "noise_m", "stands"), [(0.5, 0.0, True), (1e-6, 0.0, False), (0.5, 0.002, False)]
-)
-def test_an_effect_that_seems_to_come_and_go_stands_if_nothing_is_left_with_it(
-    question, record, left, noise_m, stands
-):
-    """A strong effect whose true form is another one; not where something is left, or might be."""
-    asks = question(record(23, BIAS, minutes=6.0), noise_m=noise_m)
-    told = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True, steady=False)
-    steady = dataclasses.replace(told, steady=True)
-    steps = ("the first", "the last")
-
-    last = Omnibus(p=left, worst="", z=0.0, p_in_time=left)
-    explained = _explains(asks, (steady, told), last)
-
-    assert explained == stands
-    kept = _kept(steps, (steady, told), explained=explained)
-    assert kept == (steps if stands else steps[:1])
-    assert _kept(steps, (dataclasses.replace(told, holds=False), told), explained=True) == ()
-
-
-@pytest.mark.parametrize("beside", [False, True])
-def test_what_comes_in_pulses_does_not_stand_however_little_is_left(question, record, beside):
-    """Its own form is then in the model on average, and of 400 statistics one tells."""
-    asks = question(record(23, BIAS, minutes=6.0), noise_m=0.0)
-    steady = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True)
-    told = dataclasses.replace(steady, steady=False, pulsed=True)
-    last = Omnibus(p=0.5, worst="", z=0.0, p_in_time=0.5)
-
-    assert not _explains(asks, (told, steady) if beside else (told,), last)
-
-
-@pytest.mark.parametrize(
-    ("in_time", "minutes", "other", "stands"),
-    [
-        (0.5, True, {}, True),
-        (1e-6, True, {}, False),
-        (0.5, False, {}, False),
-        (0.5, True, None, False),
-        (0.5, True, {"holds": False}, False),
-        (0.5, True, {"lasting": False}, False),
-        (0.5, True, {"steady": False}, False),
-    ],
-    ids=[
-        "of another form",
-        "as a sound is",
-        "from minute to minute",
-        "alone",
-        "beside one that does not hold",
-        "beside one that has its times",
-        "beside its like",
-    ],
-)
-def test_an_effect_that_seems_to_come_and_go_beside_another_that_leaves_something(
-    question, record, in_time, minutes, other, stands
-):
-    """It stands where what is left does not come and go itself, and all minutes have it."""
-    asks = question(record(23, BIAS, minutes=6.0), noise_m=0.0)
-    steady = Confirmed(gain_nats_per_step=0.1, gain_se=0.01, holds=True)
-    told = dataclasses.replace(steady, steady=False, in_all_minutes=minutes)
-    last = Omnibus(p=1e-9, worst="", z=7.0, p_in_time=in_time)
-
-    beside = () if other is None else (dataclasses.replace(steady, **other),)
-    assert _explains(asks, (told, *beside), last) == stands
 
 
 @pytest.mark.parametrize(("noise_m", "sure"), [(0.0, True), (0.001, False), (None, False)])

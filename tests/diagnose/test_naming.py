@@ -1,4 +1,4 @@
-"""Which of several suspects it is."""
+"""Effects in a model, and what they gain there."""
 
 import math
 
@@ -9,7 +9,6 @@ from zfcal.diagnose.naming import (
     Choice,
     Refit,
     by_sample,
-    choose,
     free_of,
     refit,
     ties_of,
@@ -39,11 +38,6 @@ def suspect(candidate):
     return of
 
 
-def stands(*names):
-    """Return what says that these suspects stand beside any other, and no others do."""
-    return lambda candidate, _beside: candidate.name in names
-
-
 def test_nats_are_less_what_idle_parameters_gain(suspect):
     """400 samples of 0.1 nats, less one for the one parameter."""
     assert suspect("alignment", 0.1).nats == pytest.approx(39.0)
@@ -70,58 +64,6 @@ def test_a_parameter_more_must_be_worth_it(suspect):
     assert few.worth == pytest.approx(100 - 0.5 * math.log(400))
     assert more.nats > few.nats
     assert more.over(few) < 0 < most.over(few)
-    assert choose([more, few], stands()).best is few
-    assert choose([most, few], stands()).best is most
-
-
-def test_a_clear_winner_is_named(suspect):
-    """100 nats ahead at a standard error of 10: what stands beside it does not matter."""
-    best = suspect("alignment", 0.5, scatter=0.5)
-    other = suspect("group-cohesion", 0.25)
-    choice = choose([other, best], stands("group-cohesion", "alignment"))
-    assert choice.best is best
-    assert choice.ties == ()
-    assert [each.name for each in choice.considered] == ["alignment", "group-cohesion"]
-
-
-def test_a_shadow_is_no_tie(suspect):
-    """It gains nearly as much, but falls beside the best one, which stands beside it."""
-    best = suspect("alignment", 0.26, scatter=0.5)
-    shadow = suspect("group-cohesion", 0.25)
-    assert choose([best, shadow], stands("alignment")).ties == ()
-
-
-def test_whoever_follows_another_has_no_shadows(suspect, candidate):
-    """A place says what a drift says, and more; so a drift that gains as much is a tie."""
-
-    def of(name, mean, **values):
-        return suspect(name, mean, n_free=len(free_of(candidate(name))), **values)
-
-    place = of("place-preference", 0.3)
-    drift = of("directional-drift", 0.26, scatter=0.5)
-    assert (place.n_free, drift.n_free) == (4, 3)
-    assert choose([place, drift], stands("place-preference")).ties == (drift,)
-
-
-def test_whoever_is_much_richer_has_no_shadows(suspect):
-    """Four parameters beside two and three: with two more an effect bends to nearly any form."""
-    place = suspect("place-preference", 0.3, n_free=4)
-    two, three = (suspect("turning-bias", 0.26, scatter=0.5, n_free=n) for n in (2, 3))
-    assert choose([place, two], stands("place-preference")).ties == (two,)
-    assert choose([place, three], stands("place-preference")).ties == ()
-
-
-@pytest.mark.parametrize(
-    "standing", [(), ("alignment", "group-cohesion"), ("group-cohesion",)],
-    ids=["both fall", "both stand", "the best one falls"],
-)  # fmt: skip
-def test_what_cannot_be_told_apart_is_a_tie(suspect, standing):
-    """With like gains, unless the best one alone stands."""
-    best = suspect("alignment", 0.26, scatter=0.5)
-    other = suspect("group-cohesion", 0.25)
-    choice = choose([other, best], stands(*standing))
-    assert choice.best is best
-    assert choice.ties == (other,)
 
 
 @pytest.mark.parametrize(
@@ -131,18 +73,9 @@ def test_what_cannot_be_told_apart_is_a_tie(suspect, standing):
 def test_what_is_chosen_as_well_is_no_other_name(suspect, beside, ties):
     """Two that are both there tie at first, since each stands beside the other."""
     best, other = suspect("rear-blind-zone", 0.26, scatter=0.5), suspect("boldness", 0.25)
-    first = choose([best, other], stands("rear-blind-zone", "boldness"))
-    assert first.ties == (other,)
     later = [] if beside is None else [suspect("boldness", beside)]
-    choices = [Choice(best=each, ties=(), considered=()) for each in later]
-    assert ties_of(first, choices) == ties
-
-
-def test_one_suspect_is_itself(suspect):
-    """There is nothing to tell it from."""
-    only = suspect("freezing", 0.1)
-    choice = choose([only], stands())
-    assert (choice.best, choice.ties, choice.considered) == (only, (), (only,))
+    choices = [Choice(best=each) for each in later]
+    assert ties_of(Choice(best=best, ties=(other,)), choices) == ties
 
 
 def test_what_is_no_smooth_matter_is_not_fitted(candidate):

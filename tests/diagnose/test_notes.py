@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose import notes
+from zfcal.diagnose.features.naming import Hidden
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.notes import notes_of
+from zfcal.diagnose.notes import noise_note, notes_of
 from zfcal.diagnose.omnibus import Omnibus
 
 NAMES = notes.control_names()
@@ -18,7 +19,7 @@ SILENT = np.zeros(len(NAMES))
 def noted(monkeypatch):
     """Return what takes the notes of a diagnosis: each by its name."""
 
-    def of(effects=(), *, controls=SILENT, replicates=(), noise_m=0.0, omnibus_p=0.5):
+    def of(effects=(), *, controls=SILENT, replicates=(), noise_m=0.0, omnibus_p=0.5, hidden=()):
         monkeypatch.setattr(notes, "ask_controls", lambda *_: controls)
         question = SimpleNamespace(seed=1, noise_m=noise_m, noise_source="asked for", quick=False)
         model = SimpleNamespace(effects=dict.fromkeys(effects))
@@ -26,7 +27,7 @@ def noted(monkeypatch):
         halves = Note(name="halves", says="", values={"largest": 1.0})
         omnibus = Omnibus(p=omnibus_p, worst="speed", z=6.0)
         made = notes_of(question, final, halves, omnibus, replicates)
-        return {note.name: note for note in made}
+        return {note.name: note for note in (noise_note(question, hidden), *made)}
 
     return of
 
@@ -61,3 +62,12 @@ def test_replicates_are_counted_and_noise_is_told(noted):
     unknown = noted(noise_m=None)
     assert "not known" in unknown["noise"].says
     assert "theory alone" in unknown["null"].says
+
+
+def test_what_noise_hides_is_untestable_at_this_noise(noted):
+    """With the noise at which as much would be told, in metres among the values."""
+    late = Hidden(name="reaction-delay", nats=25.0, noise_nats=40.0, noise_share=0.3)
+    note = noted(noise_m=2e-3, hidden=[late])["noise"]
+    assert "Untestable at this noise: reaction-delay. It gains 25 nats" in note.says
+    assert "noise may make 40; as much would be told at 0.6 mm" in note.says
+    assert note.values["reaction-delay testable_at_m"] == pytest.approx(6e-4)

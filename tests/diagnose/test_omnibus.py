@@ -171,7 +171,6 @@ def test_a_sound_at_fixed_times_is_noticed(base, worlds):
     found = omnibus(wrong, fitted)
 
     assert found.p < 1e-3
-    assert found.p_in_time < 1e-3
     assert any("pulses" in name for name, z in found.statistics.items() if z > 4)
 
 
@@ -248,14 +247,6 @@ def test_the_largest_of_all_counts_once_for_each():
 
     assert found.p == pytest.approx(3 * 0.0227501, rel=1e-5)
     assert (found.worst, found.z) == ("a", 2.0)
-    assert found.p_in_time == 1.0
-
-
-def test_bursts_and_pulses_count_by_themselves_as_well():
-    """Of two that ask about times 2.0 is the larger: p = 2 * 0.02275, whatever else there is."""
-    found = judge({"speed: bursts of 1 s": 2.0, "turn: pulses": 0.0, "turn by zone": 9.0})
-
-    assert found.p_in_time == pytest.approx(2 * 0.0227501, rel=1e-5)
 
 
 def test_sharp_positions_have_the_theory_beside_few_replicates():

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from zfcal.diagnose.candidates import candidates_of
-from zfcal.diagnose.confirming import confirm, half_of
-from zfcal.diagnose.null import theory
-from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import Asked, Selector
+from zfcal.diagnose.confirming import half_of
+from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed, held_out_gain, log_density
-from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene
 
@@ -127,20 +123,6 @@ def test_what_one_half_says_of_crowding_holds_in_the_other(screen, candidate):
     assert 0 < max(unknown) < 0.2
     for gain, learnt in zip(gains, halves, strict=True):
         assert np.nansum(gain[~learnt]) > 30
-
-
-def test_crowding_in_a_lit_room_is_named(screen, tank):
-    """Where across fields the one takes from the other: five times as many nats as it needs."""
-    names = ("crowding", "speed-matching", "fatigue")
-    family = candidates_of(tuple(find_effect(name) for name in names), tank)
-    asked = Asked(candidates=family, held=(), null=theory(0))
-    selector = Selector(listed=asked, rivals=lambda *_: [], suspicious=False, n_workers=2)
-    own = screen(40, shy_by(0.1))
-    steps = selector.select(own, ask_all(own, family, 2)).steps
-    assert [step.choice.best.name for step in steps] == ["crowding"]
-    (told,), _ = confirm(own, steps, n_workers=2)
-    assert told.holds
-    assert told.gain_nats_per_step * len(own.scene.moves) > 100
 
 
 def test_no_steps_have_no_density():

@@ -37,10 +37,6 @@ LEAST_STEPS = 200
 QUICK_REPLICATES = 6
 
 _UNEXPLAINED = 1e-3
-_AT_TIMES = 1e-2
-"""Chance at which model and data disagree at times. Larger than that at which they disagree at
-all: it forgives an effect that is not there all the time."""
-
 _ASSUMED_NOISE_M = 0.0
 
 _SHARP_M = 1e-4
@@ -98,11 +94,6 @@ def is_suspicious(question: Question, omnibus: Omnibus) -> bool:
     A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
     """
     return can_suspect(question) and omnibus.p < _UNEXPLAINED
-
-
-def comes_and_goes(question: Question, omnibus: Omnibus) -> bool:
-    """Tell whether model and data disagree at times: in bursts, or in regular pulses."""
-    return can_suspect(question) and omnibus.p_in_time < _AT_TIMES
 
 
 def can_suspect(question: Question) -> bool:

@@ -2,8 +2,8 @@
 
 Blocks of 60 s alternate between two halves. Both models are fitted to one half and
 judged on the other, and the other way round. A listed effect is there all the time: one
-whose strength differs between minutes, or seconds, by more than its mean is another one.
-Beside individuals that differ an effect is there in more than one of them.
+whose strength differs between minutes, or phases of a period, by more than its mean is another
+one. Beside individuals that differ an effect is there in more than one of them.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, in_model
+from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.leftover import outlasts
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score, by_track
 from zfcal.diagnose.screening import Screen
@@ -43,7 +42,7 @@ _OF_OTHERS = 2.0
 PHASES = 20
 """Parts of the time from pulse to pulse."""
 
-MINUTES_S, SECONDS_S = 60.0, 10.0
+MINUTES_S = 60.0
 """Blocks of time in which an effect is to be of one strength."""
 
 WAVERS = 3e-3
@@ -60,26 +59,13 @@ class Confirmed:
         Mean over all steps of the log density with it less that without it, and the
         standard error of that mean.
     holds
-        Whether the gain is more than two standard errors, beside individuals that differ not
-        that of one fish, and not what an effect before it leaves over.
-    steady
-        Whether the effect is there all the time.
-    pulsed
-        Whether it comes in pulses at regular times: it is not steady then.
-    in_all_minutes
-        Whether it is there in all minutes, if not in all seconds.
-    lasting
-        Whether it is one that could not be there at times: listed, and neither of individuals nor
-        of rests.
+        Whether the gain is more than two standard errors, and beside individuals that differ not
+        that of one fish.
     """
 
     gain_nats_per_step: float
     gain_se: float
     holds: bool
-    steady: bool = True
-    pulsed: bool = False
-    in_all_minutes: bool = True
-    lasting: bool = True
 
 
 def half_of(scene: Scene, steps: Moves, which: int) -> NDArray[np.bool_]:
@@ -125,18 +111,11 @@ def confirm(
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         made = list(pool.map(lambda each: _half(models[each[0]], each[1]), asked))
         halves_of = {key: (made[2 * n], made[2 * n + 1]) for n, key in enumerate(models)}
-        added = [step.choice.best.candidate for step in steps]
-        had = in_model(screen.fitted.parameters)
-        earlier = [(*had, *added[:n]) for n in range(len(steps))]
-        confirmed = pool.map(
-            lambda step, before: _confirmed(step, before, halves_of), steps, earlier
-        )
+        confirmed = pool.map(lambda step: _confirmed(step, halves_of), steps)
         return tuple(confirmed), _note(screen, halves_of[id(screen)])
 
 
-def _confirmed(
-    step: Step, earlier: Sequence[Candidate], halves_of: Mapping[int, tuple[_Half, _Half]]
-) -> Confirmed:
+def _confirmed(step: Step, halves_of: Mapping[int, tuple[_Half, _Half]]) -> Confirmed:
     best = step.choice.best
     if best.candidate.effect.on_speed:
         told = _of_speeds(step)
@@ -144,25 +123,30 @@ def _confirmed(
         before, after = halves_of[id(step.before)], halves_of[id(best.screen)]
         told = _summary(_held_out(step.before.scene, after) - _held_out(step.before.scene, before))
     score, scene = step.best.score, step.before.scene
-    holds = (
-        told.holds
-        and (not _tells_apart(step.before.fitted) or is_shared(score, scene))
-        and outlasts(score, step.before, earlier)
-    )
-    minutes = is_steady(score, scene, MINUTES_S)
-    pulsed = has_pulses(score, scene)
-    steady = minutes and is_steady(score, scene, SECONDS_S) and not pulsed
-    return replace(
-        told,
-        holds=holds,
-        steady=steady,
-        pulsed=pulsed,
-        in_all_minutes=minutes,
-        lasting=_lasts(best.candidate),
-    )
+    shared = not _tells_apart(step.before.fitted) or is_shared(score, scene)
+    return replace(told, holds=told.holds and shared)
+
+
+def holds(step: Step, *, n_workers: int) -> bool:
+    """Return whether an effect that would be added holds on held-out steps, beside what is there.
+
+    Parameters
+    ----------
+    step
+        The effect, and the model without it.
+    n_workers
+        Fits at the same time; the answer does not depend on it.
+    """
+    (told,), _ = confirm(step.before, [step], n_workers=n_workers)
+    return told.holds
 
 
 def _lasts(candidate: Candidate) -> bool:
+    """Return whether an effect is one that cannot be there at times only.
+
+    Individuals and rests differ between blocks by nature, and effects beyond the list may have
+    their times.
+    """
     return candidate.effect.in_any_steps and not candidate.effect.generic
 
 
@@ -212,8 +196,7 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
     """Return whether the strength of an effect differs between blocks by less than its mean.
 
     The spread of the strength is that of DerSimonian and Laird (1986, Controlled Clinical
-    Trials 7: 177-188). Individuals and rests differ between blocks by nature, and effects
-    beyond the list may have their times.
+    Trials 7: 177-188).
 
     Parameters
     ----------
@@ -233,9 +216,9 @@ def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
 def has_pulses(score: Score, scene: Scene) -> bool:
     """Return whether an effect comes in pulses at regular times.
 
-    Blocks of 10 s miss pulses of 3 s in every minute half of the time. Scores of a steady effect
-    are no white noise where few moments ask for it, and then have a period as well; that its
-    strength spreads by more than its mean over the phases is asked of it in any case.
+    Scores of a steady effect are no white noise where few moments ask for it, and then have a
+    period as well; that its strength spreads by more than its mean over the phases is asked of it
+    in any case.
 
     Parameters
     ----------

@@ -5,23 +5,26 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.beyond import is_featured
 from zfcal.diagnose.candidates import Candidate, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
-from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS, Confirmed, confirm
+from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS
 from zfcal.diagnose.features.gains import Gain
-from zfcal.diagnose.features.naming import Told
+from zfcal.diagnose.features.naming import Hidden, Told
 from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import LEVEL, Best, Step
+from zfcal.diagnose.selection import GENERIC_SHARE, LEAST_SHARE, LEVEL, Best, Step
+from zfcal.diagnose.sides import feigned
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.scene import Scene
 
@@ -33,20 +36,41 @@ _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
 
 
+Of: TypeAlias = tuple[Scene, NDArray[np.int64]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """Effects that are missing, in the order of adding, and what each gains on held-out steps.
+    """Effects that are missing, in the order of adding.
 
-    ``nats`` is what the clearest of them gains by features, whatever its form. ``without_noise``
-    where one explains what noise of positions had seemed to. ``suspicious`` where nothing is named
-    though features gain more than chance: no form of ours bears out what they say.
+    ``nats`` is what the clearest of them on headings gains by features, whatever its form.
+    ``without_noise`` where one explains what noise of positions had seemed to. ``suspicious`` where
+    nothing is named though features gain more than chance: no form of ours bears out what they say.
+    ``hidden`` are names that gain no more than noise of positions may make.
     """
 
-    steps: tuple[Step, ...]
-    confirmed: tuple[Confirmed, ...]
+    steps: tuple[Step, ...] = ()
     nats: float = 0.0
     without_noise: bool = False
     suspicious: bool = False
+    hidden: tuple[Hidden, ...] = ()
+
+    def screen(self, base: Screen) -> Screen:
+        """Return the model with all of them; ``base`` is the one that was given."""
+        return self.steps[-1].choice.best.screen if self.steps else base
+
+    def and_further(self, further: Found) -> Found:
+        """Return these and further ones; what is named in the end is not hidden."""
+        steps = (*self.steps, *further.steps)
+        named = {step.choice.best.name for step in steps}
+        hidden = {each.name: each for each in (*self.hidden, *further.hidden)}
+        return Found(
+            steps=steps,
+            nats=max(self.nats, further.nats),
+            without_noise=self.without_noise or further.without_noise,
+            suspicious=(self.suspicious or further.suspicious) and not steps,
+            hidden=tuple(each for name, each in hidden.items() if name not in named),
+        )
 
 
 def level_of(number: int) -> float:
@@ -68,67 +92,85 @@ def on_headings(step: Step) -> bool:
     return not step.choice.best.candidate.effect.on_speed
 
 
-def with_further(found: Found, n: int, further: Found) -> Found:
-    """Return the first ``n`` effects that were found, and further ones."""
-    return Found(
-        steps=(*found.steps[:n], *further.steps),
-        confirmed=(*found.confirmed[:n], *further.confirmed),
-        nats=max(found.nats, further.nats),
-        without_noise=found.without_noise or further.without_noise,
-    )
-
-
-def with_again(case: Case, found: Found, later: Iterable[tuple[Step, Confirmed]]) -> Found:
-    """Return what was found with effects that had been named after what has changed.
-
-    Parameters
-    ----------
-    case
-        The question.
-    found
-        What is there now.
-    later
-        Effects and what held-out steps said of them; each is put into the model anew.
-    """
-    for step, confirmed in later:
-        name, there = step.choice.best.name, {each.choice.best.name for each in found.steps}
-        if name in there:
-            continue
-        screen = found.steps[-1].choice.best.screen
-        made, score = in_the_model(case, screen, name)
-        again = dataclasses.replace(
-            step,
-            choice=dataclasses.replace(step.choice, best=made),
-            best=dataclasses.replace(step.best, score=score),
-            before=screen,
-        )
-        found = with_further(found, len(found.steps), Found(steps=(again,), confirmed=(confirmed,)))
-    return found
-
-
-def stays(there: Refit, told: Told, scene: Scene, at: NDArray[np.int64]) -> bool:
-    """Return whether what was named is kept beside what features say.
-
-    A listed effect is kept where it gains as much as features of another name do, within the error
-    of the difference; one beyond the list where it gains more, and does not say what that name
-    says in another form.
+def may_guess(there: Sequence[Refit], case: Case) -> bool:
+    """Return whether effects beyond the list are asked: until features, or one of these, named one.
 
     Parameters
     ----------
     there
-        What was named: another name, that can be told from it.
-    told
-        What features name.
-    scene, at
+        What was named.
+    case
+        The question.
+    """
+    arena = case.scene.arena
+    return not any(
+        each.is_generic or is_featured(each.candidate.effect, arena) for each in there
+    )  # fmt: skip
+
+
+def share_of(there: Sequence[Refit]) -> float:
+    """Return the share of the clearest one's nats that a further effect has to gain.
+
+    One beyond the list has no features: its own form is a guess, and leaves more over.
+    """
+    return GENERIC_SHARE if any(each.is_generic for each in there) else LEAST_SHARE
+
+
+def chosen(
+    said: Told | None, named: Step | None, plain: Step | None, guess: Step | None, of: Of
+) -> Step | None:
+    """Return what is added to a model, of all that might be; None where nothing is.
+
+    A listed effect without features has to gain more than the features that were told, and than the
+    form in which they go into the model. One beyond the list has to gain more than any listed one,
+    by more than the error of the difference, and to be no other form of what features name.
+
+    Parameters
+    ----------
+    said
+        What features say.
+    named
+        That as an effect in the model; None where nothing bears it out.
+    plain
+        What is listed, and has no features.
+    guess
+        What is beyond the list.
+    of
         The recording, and the sample in which each step of the features begins.
     """
-    name = told.gain.name
-    if there.is_generic and there.name in find_effect(name).other_forms:
-        return False
-    by = by_sample(scene, at, told.gain.log_p) - there.gain
+    listed = named
+    if plain is not None:
+        by_features = 0.0 if said is None else said.gain.nats
+        most = max(by_features, 0.0 if named is None else named.choice.best.nats)
+        listed = plain if plain.choice.best.nats > most else named
+    if guess is None:
+        return listed
+    is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
+    if said is not None:
+        told = (said.gain, *said.ties)
+        forms = {form for gain in told for form in find_effect(gain.name).other_forms}
+        is_ahead = is_ahead and guess.choice.best.name not in forms
+        is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
+    return guess if is_ahead else listed
+
+
+def outdoes(guess: Step, log_p: Floats, nats: float, of: Of) -> bool:
+    """Return whether an effect gains more than some features, by more than the error of it.
+
+    Parameters
+    ----------
+    guess
+        The effect.
+    log_p : ndarray, shape (step,)
+        Log density that the features add to each step.
+    nats
+        What they gain.
+    of
+        The recording, and the sample in which each step of the features begins.
+    """
+    by = by_sample(*of, log_p) - guess.choice.best.gain
     error = float(by.std()) * float(np.sqrt(len(by)))
-    ahead = float(told.gain.nats - there.nats)
-    return ahead < -SURE * error if there.is_generic else ahead < SURE * error
+    return float(guess.choice.best.nats - nats) > SURE * error
 
 
 def not_yet_there(case: Case, beside: Sequence[Effect]) -> list[Effect]:
@@ -182,10 +224,12 @@ def replicate_nats(
     return list(bound(np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))))
 
 
-def held_out(
-    case: Case, screen: Screen, told: Told, made: tuple[Refit, Score]
-) -> tuple[Step, Confirmed]:
-    """Return a name as an effect that was added to a model, and what it gains on held-out steps.
+def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
+    """Return a name as an effect that is added to a model, in that form which gains most.
+
+    None where no form of ours goes that way: a strength of 0 is no effect. A place that is a
+    direction as well is put aside. A tie that the effect leads by enough, each in its form, is
+    none.
 
     Parameters
     ----------
@@ -195,18 +239,23 @@ def held_out(
         The model without it.
     told
         The name and its ties.
-    made
-        The effect in the model, and its score there.
     """
-    best, score = made
-    ties = tuple(in_the_model(case, screen, gain.name)[0] for gain in told.ties)
-    step = Step(
-        choice=Choice(best=best, ties=ties, considered=(best, *ties)),
+    made = {
+        gain.name: in_the_model(case, screen, gain.name) for gain in (told.gain, *told.ties)
+    }  # fmt: skip
+    aside = {each.name for each in feigned([form for form, _ in made.values()], screen)}
+    left = [pair for name, pair in made.items() if name not in aside]
+    if not left:
+        return None
+    (best, score), *others = left
+    if best.values[best.candidate.effect.strength] == 0.0:
+        return None
+    ties = tuple(tie for tie, _ in others if not best.over(tie) > SURE)
+    return Step(
+        choice=Choice(best=best, ties=ties),
         best=Best(score=score, z=score.clearness, p=told.p, information=score.information),
         before=screen,
     )
-    (confirmed,), _ = confirm(screen, [step], n_workers=case.question.n_workers)
-    return step, dataclasses.replace(confirmed, holds=True, steady=True)
 
 
 def gains_by_itself(form: Refit) -> bool:

@@ -1,16 +1,11 @@
-"""Which of several suspects it is: refits, look-alikes, held-out confirmation.
+"""Effects put into a model with their own mechanisms, and what they gain there.
 
-Scores say that something is missing; many effects that are not there answer to one that
-is. So each of the strongest suspects is put into the model with its own mechanism, and
-what it gains is compared step by step (Vuong 1989, Econometrica 57: 307-333). A suspect
-that has nothing to say once another is in the model falls; one that stands whichever of
-the others is in the model is named. Two that both fall, or both stand and gain alike,
-are a tie.
+Gains are compared sample by sample (Vuong 1989, Econometrica 57: 307-333).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,19 +25,16 @@ _ROUNDS = 10
 _SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Of a strength worth noticing: where the search for the maximum begins."""
 
-HEAT_TURNS = 8000
-"""Steps that a first answer is taken from: twenty minutes of a fish."""
+_FEW = 8000
+"""Steps of which a fit's start is taken: twenty minutes of a fish."""
 
 _BLOCK_S = 10.0
 
 SURE = 2.0
-"""Standard errors by which one suspect must beat another."""
-
-_RICHER = 2
-"""Parameters more, by which a suspect follows whatever form another one has."""
+"""Standard errors by which one effect must beat another."""
 
 _OWN_SHARE = 0.5
-"""Of what a suspect gains alone, it gains so much beside another if both are there."""
+"""Of what an effect gains alone, it gains so much beside another if both are there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,7 +108,7 @@ def free_of(candidate: Candidate) -> Free:
     return tuple((effect.name, name) for name in effect.free(candidate.shape))
 
 
-def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers: int = 1) -> Refit:
+def refit(screen: Screen, score: Score, *, n_workers: int = 1) -> Refit:
     """Return the model with a suspect added, all parameters at their maximum likelihood.
 
     Parameters
@@ -125,8 +117,6 @@ def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers:
         The model so far.
     score
         Of the suspect: its shape, and a strength to start from.
-    near
-        The suspect fitted to some of the steps, if it was.
     n_workers
         Threads; the numbers do not depend on them.
     """
@@ -137,7 +127,7 @@ def refit(screen: Screen, score: Score, near: Refit | None = None, *, n_workers:
     if candidate.effect.by_trait:
         scene = with_traits(scene, score)
     free = free_of(candidate)
-    start = _start(scene, screen.fitted, score) if near is None else near.values
+    start = _start(scene, screen.fitted, score)
     fitted = maximise(
         scene,
         with_effect(screen.fitted.parameters, candidate.name, start),
@@ -174,12 +164,12 @@ def _start(scene: Scene, fitted: Fitted, score: Score) -> dict[str, float]:
     strengths = np.copysign(np.multiply(_SHARES, candidate.notable), score.z)
     tried = [candidate.values(float(value)) for value in np.clip(strengths, low, high)]
     models = [with_effect(fitted.parameters, candidate.name, values) for values in tried]
-    share = max(1, len(scene.turns) // HEAT_TURNS)
-    few = thin(scene, some_of(scene, scene.turns, share), some_of(scene, scene.moves, share))
+    share = max(1, len(scene.turns) // _FEW)
+    few = thin(scene, _some_of(scene, scene.turns, share), _some_of(scene, scene.moves, share))
     return tried[int(np.argmax(nats_at(few, models, fitted.x)))]
 
 
-def some_of(scene: Scene, steps: Moves, share: int) -> NDArray[np.bool_]:
+def _some_of(scene: Scene, steps: Moves, share: int) -> NDArray[np.bool_]:
     """Return which steps lie in every so-many-th block of ten seconds."""
     block = (scene.time_s(steps) // _BLOCK_S).astype(np.int64)
     return np.asarray(block % share == 0)
@@ -240,7 +230,7 @@ def with_traits(scene: Scene, score: Score) -> Scene:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Choice:
-    """The suspect that is named, and those that cannot be told from it.
+    """What is named, and what cannot be told from it.
 
     Parameters
     ----------
@@ -248,38 +238,10 @@ class Choice:
         The one that is worth most.
     ties
         The others.
-    considered
-        All that were refitted, the worthiest first.
     """
 
     best: Refit
-    ties: tuple[Refit, ...]
-    considered: tuple[Refit, ...]
-
-
-def choose(refits: Sequence[Refit], standing: Callable[[Candidate, Refit], bool]) -> Choice:
-    """Return which suspect it is.
-
-    Parameters
-    ----------
-    refits
-        Each in the model by itself.
-    standing
-        Tells whether a suspect still has something to say beside another.
-    """
-    order = sorted(refits, key=lambda each: -each.worth)
-    best, ties = order[0], []
-    for other in order[1:]:
-        if best.over(other) > SURE:
-            continue
-        # It gains as much. If it falls beside the best one, which stands beside it, then
-        # it is a shadow; if both fall they say the same, and if both stand neither does all.
-        # One that follows whatever form the other has stands beside it anyway: that says nothing.
-        follows = best.n_free - other.n_free >= _RICHER or best.looks_like == other.name
-        if not follows and standing(best.candidate, other) and not standing(other.candidate, best):
-            continue
-        ties.append(other)
-    return Choice(best=best, ties=tuple(ties), considered=tuple(order))
+    ties: tuple[Refit, ...] = ()
 
 
 def ties_of(choice: Choice, later: Sequence[Choice]) -> tuple[str, ...]:

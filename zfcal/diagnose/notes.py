@@ -9,6 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.diagnose.case import is_suspicious
 from zfcal.diagnose.controls import ask_controls, control_names
+from zfcal.diagnose.features.naming import Hidden
 from zfcal.diagnose.findings import Note
 from zfcal.diagnose.null import from_replicates, theory
 from zfcal.diagnose.omnibus import Omnibus
@@ -25,7 +26,7 @@ def notes_of(
     omnibus: Omnibus,
     replicates: Sequence[Floats | None],
 ) -> tuple[Note, ...]:
-    """Return the notes of a diagnosis.
+    """Return the notes of a diagnosis but for that of noise.
 
     Parameters
     ----------
@@ -41,7 +42,6 @@ def notes_of(
         Negative controls of each replicate; None where they were not asked.
     """
     return (
-        _noise_note(question),
         halves,
         _controls_note(question, final, replicates),
         _omnibus_note(question, final, omnibus),
@@ -63,13 +63,30 @@ def _omnibus_note(question: Question, final: Screen, omnibus: Omnibus) -> Note:
     return Note(name="omnibus", says=text, values={"z": omnibus.z, "p": omnibus.p})
 
 
-def _noise_note(question: Question) -> Note:
+def noise_note(question: Question, hidden: Sequence[Hidden]) -> Note:
+    """Return the note of noise.
+
+    Parameters
+    ----------
+    question
+        Says by how much positions err, and who says so.
+    hidden
+        Effects that cannot be told from what noise makes.
+    """
     if question.noise_m is None:
         text = "The noise of positions is not known; none was assumed."
         return Note(name="noise", says=text, values={})
-    text = f"Positions err by {1000 * question.noise_m:.2g} mm per coordinate"
-    source = question.noise_source
-    return Note(name="noise", says=f"{text} ({source}).", values={"noise_m": question.noise_m})
+    noise_mm = 1000 * question.noise_m
+    text = f"Positions err by {noise_mm:.2g} mm per coordinate ({question.noise_source})."
+    values = {"noise_m": question.noise_m}
+    for each in hidden:
+        at_mm = each.noise_share * noise_mm
+        text += (
+            f" Untestable at this noise: {each.name}. It gains {each.nats:.0f} nats, and noise may "
+            f"make {each.noise_nats:.0f}; as much would be told at {at_mm:.1g} mm."
+        )
+        values[f"{each.name} testable_at_m"] = at_mm / 1000
+    return Note(name="noise", says=text, values=values)
 
 
 def _controls_note(question: Question, final: Screen, replicates: Sequence[Floats | None]) -> Note:

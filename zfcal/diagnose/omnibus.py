@@ -60,15 +60,12 @@ class Omnibus:
         Its value, in standard deviations of the null.
     statistics
         All of them, likewise.
-    p_in_time
-        As p, of bursts and pulses alone: what comes and goes.
     """
 
     p: float
     worst: str
     z: float
     statistics: dict[str, float] = field(default_factory=dict)
-    p_in_time: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,11 +228,5 @@ def judge(
     if not made:
         return Omnibus(p=1.0, worst="", z=math.nan)
     worst = min(tails, key=lambda name: tails[name])
-    in_time = [tail for name, tail in tails.items() if _BURSTS in name or _PULSES in name]
-    return Omnibus(
-        p=min(1.0, tails[worst] * len(tails)),
-        worst=worst,
-        z=made[worst],
-        statistics=made,
-        p_in_time=min(1.0, min(in_time, default=1.0) * max(len(in_time), 1)),
-    )
+    p = min(1.0, tails[worst] * len(tails))
+    return Omnibus(p=p, worst=worst, z=made[worst], statistics=made)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from zfcal.diagnose.heats import Heat
 from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.screening import Screen
 from zfcal.model.extended import maximise
@@ -69,28 +68,3 @@ def _gained(screen: Screen, direction: str) -> float:
     free = tuple(pair for pair in fitted.free if pair[0] != direction)
     without = maximise(screen.scene, replace(model, effects=rest), free=free, start=fitted.x)
     return fitted.nats - without.nats - (len(fitted.free) - len(free))
-
-
-def directions(refits: Sequence[Refit], without: Sequence[Refit]) -> list[Refit]:
-    """Return the directions among suspects, but for those among some others.
-
-    Where a place is put aside for one, a direction is worth what the place is.
-    """
-    names = {each.looks_like for each in refits}
-    return [each for each in refits if each.name in names and each not in without]
-
-
-def with_direction(kept: Sequence[Heat], heats: Sequence[Heat]) -> list[Heat]:
-    """Return heats, and the direction's whatever it gained if a place on one side is among them.
-
-    Parameters
-    ----------
-    kept
-        Those that may still win.
-    heats
-        All of them.
-    """
-    places = [heat.first for heat in kept if heat.first is not None]
-    sought = {place.looks_like for place in places if one_sided(place) >= _ONE_SIDE}
-    sought -= {heat.score.candidate.name for heat in kept}
-    return [*kept, *(heat for heat in heats if heat.score.candidate.name in sought)]

@@ -24,7 +24,7 @@ from zfcal.arrays import Floats
 AWAY_M = 9.0
 """In place of the distance to one who is not there."""
 
-LAGS = (1, 2, 3, 5)
+LAGS = (1, 2, 3, 4, 5, 8)
 """Steps by which a response may be late."""
 
 _LEAST = -0.98

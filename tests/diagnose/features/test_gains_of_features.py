@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import logit
+from scipy.stats import chi2
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
 from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import best_by_name, tell
+from zfcal.diagnose.features.naming import answer, best_by_name, tell
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import LAPSE, maximise, with_effect
@@ -191,6 +192,27 @@ def test_what_noise_gains_is_taken_off():
 
     told = tell([gain("a", 2 * STEPS), gain("b", STEPS), gain("c", 0 * STEPS)], noise)
     assert (asked, told.gain.name) == (["a", "b"], "b")
+
+
+def test_what_noise_hides_is_said_with_the_noise_at_which_it_would_show():
+    """Of 30 nats of one strength noise may make 40; of a tried one 6.6 are needed at 2 % of ten."""
+    late = Gain(name="reaction-delay", label="x", log_p=np.full(300, 0.1), n_strengths=1)
+    others = [
+        Gain(name=f"name {k}", label="x", log_p=np.zeros(300), n_strengths=1) for k in range(9)
+    ]
+    said = answer([late, *others], lambda clear: [40.0 for _ in clear])
+    assert said.told is None
+    (hidden,) = said.hidden
+    assert (hidden.name, hidden.nats, hidden.noise_nats) == (
+        "reaction-delay",
+        pytest.approx(29),
+        40,
+    )
+    needed = chi2.isf(0.02 / 10, 1) / 2
+    assert hidden.noise_share == pytest.approx((30 - needed) / 40)
+    told = answer([late, *others], lambda clear: [1.0 for _ in clear])
+    assert (told.told.gain.name, told.hidden) == ("reaction-delay", ())
+    assert answer([late, *others]).hidden == ()
 
 
 def test_a_name_is_told_by_what_noise_leaves_of_its_gain():

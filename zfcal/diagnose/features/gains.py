@@ -146,6 +146,11 @@ class Fits:
         _ = (self._null, self._untilted, self._mean_heading)
 
     @property
+    def n_beside(self) -> int:
+        """Strengths of the features that are fitted with the base's parameters."""
+        return len(self._own[1]) - len(self.law.own_parameters[1])
+
+    @property
     def null_log_p(self) -> Floats:
         """Log density of each step by the base alone, its parameters and the lapse refitted."""
         return self._null.log_p

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+
+from scipy.special import chdtri
 
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.naming import SURE
@@ -39,8 +41,57 @@ class Told:
     lead: float = math.inf
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hidden:
+    """A name that gains more than chance, and no more than noise of positions may make.
+
+    Parameters
+    ----------
+    name
+        Of the effect.
+    nats
+        What its best feature gains.
+    noise_nats
+        What noise alone may make it gain.
+    noise_share
+        Share of this noise at which as much would be told, if what noise makes goes by its size.
+    """
+
+    name: str
+    nats: float
+    noise_nats: float
+    noise_share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """What features say, and which names noise of positions hides.
+
+    Parameters
+    ----------
+    told
+        None where chance, or noise, may have made all gains.
+    hidden
+        By name.
+    """
+
+    told: Told | None
+    hidden: tuple[Hidden, ...] = ()
+
+
 def tell(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = LEVEL) -> Told | None:
     """Return which name it is; None where chance may have made all gains.
+
+    Parameters
+    ----------
+    gains, noise, level
+        As of `answer`.
+    """
+    return answer(gains, noise, level=level).told
+
+
+def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = LEVEL) -> Answer:
+    """Return which name it is, and what noise hides.
 
     Parameters
     ----------
@@ -52,29 +103,44 @@ def tell(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = LE
         Of false alarms.
     """
     n_tried = sum(gain.n_tried for gain in once(gains))
-    clear = [gain for gain in gains if gain.p * n_tried < level and gain.nats > 0]
+
+    def beyond_chance(some: Sequence[Gain]) -> list[Gain]:
+        return [gain for gain in some if gain.p * n_tried < level and gain.nats > 0]
+
+    clear = beyond_chance(gains)
+    hidden: tuple[Hidden, ...] = ()
     if noise is not None:
         ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
         doubted = [g for g in clear if g.name in ahead and not g.without_noise]
         known = zip(doubted, noise(doubted) if doubted else (), strict=True)
-        clear = [gain for gain in clear if gain.without_noise and gain.name in ahead]
-        clear += [replace(gain, noise_nats=nats) for gain, nats in known]
-        clear = [gain for gain in clear if gain.p * n_tried < level and gain.nats > 0]
+        held = [gain for gain in clear if gain.without_noise and gain.name in ahead]
+        held += [replace(gain, noise_nats=nats) for gain, nats in known]
+        clear = beyond_chance(held)
+        stand = {gain.name for gain in clear}
+        lost = best_by_name([gain for gain in held if gain.name not in stand])
+        hidden = tuple(_hidden(gain, level / n_tried) for gain in lost)
     best = best_by_name(clear)
     if not best:
-        return None
+        return Answer(told=None, hidden=hidden)
     first, *others = best
     ties = tuple(gain for gain in others if _lead(first, gain) <= SURE)
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
-    return Told(gain=first, p=min(1.0, first.p * n_tried), ties=ties, lead=lead)
+    told = Told(gain=first, p=min(1.0, first.p * n_tried), ties=ties, lead=lead)
+    return Answer(told=told, hidden=hidden)
 
 
-def without_names(told: Told, names: Collection[str]) -> Told:
-    """Return what is told without some of the names that cannot be told from each other."""
-    first, *ties = (gain for gain in (told.gain, *told.ties) if gain.name not in names)
-    return replace(told, gain=first, ties=tuple(ties))
+def _hidden(gain: Gain, level: float) -> Hidden:
+    raw = float(gain.log_p.sum())
+    needed = float(chdtri(gain.n_strengths, level / gain.n_tried)) / 2
+    share = (raw - needed) / gain.noise_nats if gain.noise_nats > 0 else 1.0
+    return Hidden(
+        name=gain.name,
+        nats=raw - gain.n_strengths,
+        noise_nats=gain.noise_nats,
+        noise_share=min(max(share, 0.0), 1.0),
+    )
 
 
 def best_by_name(gains: Sequence[Gain]) -> list[Gain]:

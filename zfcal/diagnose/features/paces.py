@@ -171,6 +171,11 @@ class Paces:
         """Scores less all that is there."""
         return self.scores - self._also @ (self._also.T @ self.scores)
 
+    @property
+    def gained_beside(self) -> tuple[Floats, int]:
+        """What features of what is there add to its model, shape (move,); number of strengths."""
+        return _normal_gain(self.scores, self._left), self._also.shape[1]
+
     def gain(self, name: str, feature: Pace) -> Gain:
         """Return what a feature of an effect adds."""
         change, n = self._changed(feature)

@@ -1,9 +1,8 @@
-"""A second look at headings, by features: names what no form of the listed effects shows.
+"""A look at headings, by features: which listed effects their law lacks.
 
-The efficient scores ask for effects in the forms that they have here. Fish may have them in
-others, so each name's features are asked as well. They name what was not named, and take the place
-of what was where they gain more than it does in its own form, by more than the error of the
-difference. The name goes into the model in that form of ours which gains most.
+Each name's features are asked, whatever form fish have the effect in. The name that is told goes
+into the model in that form of ours which gains most, and all others are asked again beside it. An
+effect beyond the list is added first where it gains clearly more than features of any listed one.
 """
 
 from __future__ import annotations
@@ -14,182 +13,123 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
-from zfcal.diagnose.confirming import Confirmed
+from zfcal.diagnose.confirming import MINUTES_S, has_pulses, is_steady
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.curves import curve_of
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Noise, Told, tell, without_names
+from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
-    form_of,
+    as_step,
+    chosen,
     gains_by_itself,
-    held_out,
     in_all_minutes,
     in_all_phases,
-    in_the_model,
     level_of,
+    may_guess,
     not_yet_there,
     on_headings,
+    outdoes,
     replicate_nats,
-    stays,
-    with_again,
-    with_further,
+    share_of,
     without_idle_ties,
 )
-from zfcal.diagnose.naming import SURE, Choice
+from zfcal.diagnose.naming import SURE, Refit
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import (
-    GENERIC_SHARE,
-    LEAST_SHARE,
-    MOST_EFFECTS,
-    Step,
-)
-from zfcal.diagnose.sides import feigned
-from zfcal.diagnose.speed_look import speed_look
+from zfcal.diagnose.selection import GENERIC_SHARE, MOST_EFFECTS, Step
 from zfcal.model.effects import Effect, find_effect
 
 
-def look_again(case: Case, before: Found) -> Found | None:
-    """Return what is missing once features of speeds were asked, and then those of headings.
+def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
+    """Return what is missing once headings were asked for what their law lacks.
 
-    Parameters
-    ----------
-    case, before
-        As of `second_look`.
-    """
-    paced = speed_look(case, before)
-    return second_look(case, paced or before) or paced
-
-
-def second_look(case: Case, before: Found) -> Found | None:
-    """Return what is missing once features were asked; None where nothing is to be changed.
-
-    Where nothing was named, and features gain more than chance though no form of ours bears them
-    out, what is found is nothing that has a name: see `Found.suspicious`.
+    Where nothing is named though features gain more than chance, what is found is nothing that has
+    a name: see `Found.suspicious`.
 
     Parameters
     ----------
     case
         The question, its scene and what is asked for.
     before
-        What was named without features. Of effects on headings the first is held against them:
-        one beyond the list is kept where it gains more than features do, a listed one where it
-        gains as much. Where it is not kept, what was added after it goes as well; effects on speed
-        are then added anew.
+        What is missing of the law of speeds.
+    unfeatured
+        What has no features.
     """
     given = [each.effect for each in in_model(case.screen.fitted.parameters)]
     known = [effect for effect in given if not effect.on_speed]
-    n = next((k for k, step in enumerate(before.steps) if on_headings(step)), len(before.steps))
-    there = before.steps[n] if n < len(before.steps) else None
-    screen = before.steps[n - 1].choice.best.screen if n else case.screen
-    has_later = any(on_headings(step) for step in before.steps[n + 1 :])
-    looks = _Looks(case=case, screen=screen, beside=tuple(known), has_later=has_later)
-    first = _named(looks, there=there)
-    if first is not None and first.suspicious:
-        if not before.steps and can_suspect(case.question):
-            return first
-        first = None
-    found = before if first is None else with_further(before, n, first)
-    if first is not None:
-        later = zip(before.steps[n:], before.confirmed[n:], strict=False)
-        on_speeds = [pair for pair in later if not on_headings(pair[0])]
-        found = with_again(case, found, on_speeds)
+    found = before
     while True:
-        named = [step for step in found.steps if on_headings(step)]
-        if not named or len(named) >= MOST_EFFECTS:
-            break
+        named = [step.choice.best for step in found.steps[len(before.steps) :]]
+        if len(named) >= MOST_EFFECTS:
+            return found
+        there = [step.choice.best.candidate.effect for step in found.steps if on_headings(step)]
         looks = _Looks(
             case=case,
-            screen=found.steps[-1].choice.best.screen,
-            beside=(*known, *(step.choice.best.candidate.effect for step in named)),
+            screen=found.screen(case.screen),
+            beside=(*known, *there),
             without_noise=found.without_noise,
             number=len(named),
         )
-        most = max(found.nats, *(step.choice.best.nats for step in named))
-        # One beyond the list has no features: its own form is a guess.
-        is_guess = any(step.choice.best.is_generic for step in named)
-        share = GENERIC_SHARE if is_guess else LEAST_SHARE
-        further = _named(looks, least=share * most)
-        if further is None or further.suspicious:
-            break
-        found = with_further(found, len(found.steps), further)
-    return None if found is before else found
+        further = _further(looks, unfeatured, named, found.nats)
+        found = found.and_further(further)
+        if not further.steps:
+            return found
 
 
-def _named(looks: _Looks, *, there: Step | None = None, least: float = 0.0) -> Found | None:
-    """Return what features name in a model, and what it gains on held-out steps.
+def _further(looks: _Looks, unfeatured: Unfeatured, named: Sequence[Refit], nats: float) -> Found:
+    """Return what is added to a model: one effect, or none.
 
     Parameters
     ----------
     looks
         At the model.
-    there
-        What is held against features.
-    least
-        Nats that it has to gain.
+    unfeatured
+        What has no features.
+    named
+        What was added before.
+    nats
+        What the clearest of it gains by features.
     """
-    case, screen, told = looks.case, looks.screen, looks.tell()
-    if told is None or told.gain.nats < least:
-        return None
+    most = max([nats, *(each.nats for each in named)])
+    least = most * share_of(named) if named else 0.0
+    guess = None
+    if may_guess(named, looks.case):
+        guess = unfeatured.beyond(looks.screen, on_speed=False, least=GENERIC_SHARE * most)
+        guess = looks.not_left_over(guess)
+    plain = unfeatured.listed_one(looks.screen, on_speed=False, least=least)
+    said = looks.ask()
+    told = said.told
+    step = None
+    if told is not None and told.gain.nats >= least:
+        step = _borne_out(looks, told)
     law = looks.laws[0]
-    if there is not None:
-        was = there.choice.best
-        if was.name in {told.gain.name, *(tie.name for tie in told.ties)}:
-            return _in_better_form(looks, there, told)
-        if stays(was, told, law.scene, law.turns.at):
-            return None
-    found, score = in_the_model(case, screen, told.gain.name)
-    nothing = Found(steps=(), confirmed=(), nats=told.gain.nats, suspicious=True)
-    step, confirmed = held_out(case, screen, told, (found, score))
-    aside = {each.name for each in feigned([found, *step.choice.ties], screen)}
-    if aside:
-        told = without_names(told, aside)
-        found, score = in_the_model(case, screen, told.gain.name)
-        step, confirmed = held_out(case, screen, told, (found, score))
-    if found.values[found.candidate.effect.strength] == 0.0:
-        # No form of ours goes that way: it is another effect, which the list does not have.
-        return nothing
-    is_borne_out = gains_by_itself(found) and _is_steady(confirmed, found.screen, screen)
-    if not (is_borne_out or told.lead > BY_ITSELF or looks.explains(told)):
-        return nothing
+    added = chosen(told, step, plain, guess, (law.scene, law.turns.at))
+    if added is None:
+        is_doubt = told is not None and can_suspect(looks.case.question)
+        return Found(suspicious=is_doubt, hidden=said.hidden)
+    if told is None or added is not step:
+        return Found(steps=(added,), hidden=said.hidden)
     return Found(
         steps=(step,),
-        confirmed=(confirmed,),
         nats=told.gain.nats,
         without_noise=told.gain.without_noise,
+        hidden=said.hidden,
     )
 
 
-def _in_better_form(looks: _Looks, there: Step, told: Told) -> Found | None:
-    """Return what was named, and what features name or cannot tell from it, in the form it has.
-
-    None where it has that form already. What it leads by enough in this form is no tie any more.
-    """
-    if looks.has_later:
-        return None
-    case, screen, was = looks.case, looks.screen, there.choice.best
-    made = in_the_model(case, screen, was.name)
-    is_new = form_of(made[0].candidate) != form_of(was.candidate)
-    if not (is_new and made[0].worth > was.worth):
-        return None
-    names = [told.gain, *told.ties]
-    own = next(gain for gain in names if gain.name == was.name)
-    ties = tuple(gain for gain in names if gain is not own)
-    step, confirmed = held_out(case, screen, dataclasses.replace(told, gain=own, ties=ties), made)
-    left = tuple(tie for tie in step.choice.ties if not made[0].over(tie) > SURE)
-    choice = Choice(best=made[0], ties=left, considered=step.choice.considered)
-    return Found(
-        steps=(dataclasses.replace(step, choice=choice),),
-        confirmed=(confirmed,),
-        nats=own.nats,
-        without_noise=own.without_noise,
-    )
+def _borne_out(looks: _Looks, told: Told) -> Step | None:
+    """Return what features name as an effect in the model; None where nothing bears it out."""
+    step = as_step(looks.case, looks.screen, told)
+    if step is None or (gains_by_itself(step.choice.best) and _is_steady(step)):
+        return step
+    return step if told.lead > BY_ITSELF or looks.explains(told) else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,9 +147,6 @@ class _Looks:
         named.
     without_noise
         Whether what seemed to be noise is explained.
-    has_later
-        Whether more on headings was named after what is held against features: that was
-        confirmed beside the form that it has.
     number
         How many looks there were before.
     """
@@ -218,7 +155,6 @@ class _Looks:
     screen: Screen
     beside: tuple[Effect, ...]
     without_noise: bool = False
-    has_later: bool = False
     number: int = 0
 
     @cached_property
@@ -253,17 +189,36 @@ class _Looks:
         all_, some = (fits_beside(law, beside).null_log_p for law in (noisy, half))
         return 2 * all_ - some
 
-    def tell(self) -> Told | None:
-        """Return which name it is; None where chance may have made all gains."""
+    def not_left_over(self, guess: Step | None) -> Step | None:
+        """Return an effect beyond the list, unless what is there leaves it over.
+
+        What is there may have another form than in the model: its features, either way, then gain
+        as much as the effect does.
+        """
+        if guess is None or not self.beside:
+            return guess
+        law = self.laws[0]
+        fits = fits_beside(law, self.beside)
+        left = fits.null_log_p - fits_beside(law, ()).null_log_p
+        nats = float(left.sum()) - fits.n_beside
+        return guess if outdoes(guess, left, nats, (law.scene, law.turns.at)) else None
+
+    def ask(self) -> Answer:
+        """Return which name it is, and which ones noise hides."""
         gains = self.gains(self._asked, self.beside)
-        told = tell(gains, self._noise(self.beside), level=level_of(self.number))
-        return None if told is None else without_idle_ties(told, self._stands)
+        said = answer(gains, self._noise(self.beside), level=level_of(self.number))
+        if said.told is None:
+            return said
+        return dataclasses.replace(said, told=without_idle_ties(said.told, self._stands))
 
     def explains(self, told: Told) -> bool:
         """Return whether, with a name's features there, no other name gains more than chance.
 
-        What is no effect of the list answers to features of several names.
+        What is no effect of the list answers to features of several names. So the name leads all
+        others besides, by more than the error of the difference.
         """
+        if not told.lead > SURE:
+            return False
         others = [effect for effect in self._asked if effect.name != told.gain.name]
         beside = (*self.beside, find_effect(told.gain.name))
         return tell(self.gains(others, beside), self._noise(beside)) is None
@@ -316,18 +271,18 @@ def curves_of(
     return made
 
 
-def _is_steady(confirmed: Confirmed, model: Screen, base: Screen) -> bool:
+def _is_steady(step: Step) -> bool:
     """Return whether an effect is there in all minutes, and not in pulses at regular times.
 
     Its scores say so, or what it gains at each step less what it would gain if the fish drew from
     the model all the time: that has mean zero in each minute, and no period. Neither is normal
     where few moments ask for an effect: scores where they are far apart, gains where they are rare.
     """
-    gains, scene = heading_gains(model, base), base.scene
+    score, base = step.best.score, step.before
+    gains, scene = heading_gains(step.choice.best.screen, base), base.scene
     at, apart = gains.gain.at, gains.gain.values - gains.expected.values
-    if not (confirmed.in_all_minutes or in_all_minutes(apart, at, scene)):
-        return False
-    return not confirmed.pulsed or in_all_phases(apart, at, scene)
+    in_time = is_steady(score, scene, MINUTES_S) or in_all_minutes(apart, at, scene)
+    return in_time and (not has_pulses(score, scene) or in_all_phases(apart, at, scene))
 
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:

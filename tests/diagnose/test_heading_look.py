@@ -1,0 +1,485 @@
+"""Features name what the law of headings lacks, one after the other."""
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose import heading_look as looking
+from zfcal.diagnose import looks as common
+from zfcal.diagnose.case import open_case
+from zfcal.diagnose.diagnose import diagnose
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import Answer, Hidden, Told
+from zfcal.diagnose.findings import Verdict
+from zfcal.diagnose.heading_look import _noise_nats, heading_look
+from zfcal.diagnose.looks import Found, bound, level_of, outdoes
+from zfcal.diagnose.naming import Choice
+from zfcal.diagnose.question import Question
+from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import LEVEL, Best, Step
+from zfcal.model.effects import find_effect
+from zfcal.model.extended import maximise
+
+NOTHING = Found()
+
+
+def no_guess(guess=None):
+    """Return what says of each model that there is nothing beyond the list, or this."""
+    return SimpleNamespace(
+        beyond=lambda _screen, **_of: guess, listed_one=lambda _screen, **_of: None
+    )
+
+
+def asked(case, before, guess=None):
+    """Return the effects that are found."""
+    return heading_look(case, before, no_guess(guess))
+
+
+@pytest.fixture(scope="module")
+def question(tank, fish, record):
+    """Return what asks of ten minutes of fish."""
+
+    def of(effects=None, seed=31, **changes):
+        known = {"noise_m": 0.0, "noise_source": "known", "n_null": 5, "quick": True}
+        return Question(
+            samples=record(seed, effects), arena=tank, model=fish, seed=1, n_workers=2,
+            **{**known, **changes},
+        )  # fmt: skip
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def drawn(question, worlds):
+    """Return a case of steps of which 5 % are drawn about a place, from one room and no farther."""
+    case = open_case(question())
+    scene, fitted = case.scene, case.screen.fitted
+    mixture, _, _ = fitted.tables()
+    own = scene.states[scene.turns.at, :, scene.turns.who]
+    way = np.array([0.8, 0.2]) - own[:, :2]
+    bearing, far = np.arctan2(way[:, 1], way[:, 0]), np.hypot(*way.T)
+
+    def factor(angle):
+        law = np.exp(4.0 * (np.cos(angle - bearing[:, None]) - 1))
+        law *= len(angle) / (2 * math.pi) / law.sum(axis=1, keepdims=True)
+        near = ((own[:, 0] > own[:, 1]) & (far < 0.35))[:, None]
+        return 1 + 0.06 * near * law / np.maximum(mixture, 1e-12)
+
+    there = worlds.redrawn(scene, fitted, np.random.default_rng(3), factor)
+    screen = Screen(scene=there, fitted=maximise(there, fitted.parameters))
+    return dataclasses.replace(case, scene=there, screen=screen)
+
+
+@pytest.mark.slow
+def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
+    """A place, of which some headings are drawn, at where it is."""
+    now = asked(drawn, NOTHING)
+    (only,) = now.steps
+    best = only.choice.best
+    assert best.name == "place-preference"
+    assert best.values["drawn"] == 1.0
+    assert best.values["strength"] > 0.005
+    assert math.hypot(best.values["x_m"] - 0.8, best.values["y_m"] - 0.2) < 0.1
+    assert best.nats > 10
+    assert only.best.p < 1e-4
+    assert only.before is drawn.screen
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_nothing_is_missing(question):
+    """Nor where the model has the effect already."""
+    case = open_case(question())
+    assert asked(case, NOTHING).steps == ()
+
+
+def gain(name, values):
+    """Return a gain of one strength at each step."""
+    return Gain(name=name, label="x", log_p=values, n_strengths=1)
+
+
+@pytest.fixture(scope="module")
+def law(base):
+    """Return that of ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Law(scene=scene, fitted=fitted)
+
+
+@pytest.mark.parametrize(("share", "more"), [(1.0, False), (0.5, False), (3.0, True)])
+def test_an_effect_outdoes_features_by_more_than_the_error(law, share, more):
+    """Two forms of one effect differ from step to step."""
+    n = len(law.rows)
+    values = np.random.default_rng(4).normal(0.02, 0.1, n)
+    by = np.bincount(law.turns.at, share * values, minlength=len(law.scene.k))
+    apart = np.random.default_rng(6).normal(0, 0.1, len(by))
+    by += apart - apart.mean()
+    guess = SimpleNamespace(choice=Choice(best=SimpleNamespace(gain=by, nats=by.sum() - 1)))
+    nats = gain("place-preference", values).nats
+    assert outdoes(guess, values, nats, (law.scene, law.turns.at)) is more
+
+
+def test_a_place_that_is_a_direction_is_put_aside_for_it(question, monkeypatch):
+    """Though its form gains more than the direction's; where nothing is left there is no name."""
+    forms = {
+        name: SimpleNamespace(
+            name=name, nats=nats, values={"strength": 1.0}, over=lambda _other: 9.0,
+            candidate=SimpleNamespace(effect=find_effect(name)),
+        )
+        for name, nats in (("place-preference", 120.0), ("directional-drift", 100.0))
+    }  # fmt: skip
+    score = SimpleNamespace(clearness=9.0, information=1.0)
+    monkeypatch.setattr(common, "in_the_model", lambda _case, _screen, name: (forms[name], score))
+    monkeypatch.setattr(
+        common, "feigned", lambda made, _before: [x for x in made if "place" in x.name]
+    )
+    place, drift = (gain(name, np.full(9, 1.0)) for name in forms)
+    both = common.as_step(None, None, Told(gain=place, p=0.0, ties=(drift,)))
+    assert (both.choice.best.name, both.choice.ties) == ("directional-drift", ())
+    assert common.as_step(None, None, Told(gain=place, p=0.0, ties=())) is None
+    forms["directional-drift"].values["strength"] = 0.0
+    assert common.as_step(None, None, Told(gain=drift, p=0.0, ties=())) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("group-cohesion", {"weight": 2.5}),
+        ("directional-drift", {"strength": 1.5, "direction_rad": 2.0}),
+        ("place-preference", {"strength": 3.0, "x_m": 0.3, "y_m": 0.8}),
+    ],
+)
+def test_a_name_gets_the_form_that_the_fish_have(question, name, values):
+    """Fish that turn to something look as if all their headings leaned toward it, or to a place."""
+    given = {**values, "turning": 1.0}
+    (effect,) = diagnose(question({name: given}), lambda *_: None).effects
+    strength = find_effect(name).strength
+    assert (effect.name, effect.strength["turning"]) == (name, 1.0)
+    low, high = effect.interval[strength]
+    assert low < values[strength] < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("direction_rad", [2.0, 2.0 - math.pi])
+def test_of_a_direction_and_its_opposite_the_right_one_is_fitted(question, direction_rad):
+    """Their scores have the same size: only the sign tells which of them fish prefer."""
+    given = {"strength": 0.3, "direction_rad": direction_rad}
+    case = open_case(question({"directional-drift": given}))
+    found, _ = common.in_the_model(case, case.screen, "directional-drift")
+    assert found.values["turning"] == found.values["drawn"] == 0.0
+    assert found.interval["strength"][0] > 0.1
+    assert abs(math.remainder(found.values["direction_rad"] - direction_rad, math.tau)) < 0.5
+
+
+@pytest.mark.slow
+def test_a_place_that_all_fish_have_on_one_side_is_a_direction(question):
+    """Features of places that fish turn to bend to any direction, and gain as much as it."""
+    given = {"strength": 0.8, "direction_rad": 2.0, "turning": 1.0}
+    case = open_case(question({"directional-drift": given}))
+    (named,) = asked(case, NOTHING).steps
+    assert named.choice.best.name == "directional-drift"
+    assert named.choice.ties == ()
+
+
+@pytest.mark.slow
+def test_noise_alone_gains_something(question):
+    """Of a response that is a little late, on replicates with half a millimetre of noise."""
+    case = open_case(question(noise_m=5e-4))
+    late = Gain(name="reaction-delay", label="a tenth of a step", log_p=np.zeros(3), n_strengths=1)
+    (nats,) = _noise_nats(case, [late])
+    assert 0 < nats < 40
+
+
+@pytest.fixture
+def looked(monkeypatch):
+    """Return what is asked of features, look by look, and what they are to say of each."""
+    calls, answers = [], []
+
+    def further(looks, _unfeatured, named, nats):
+        calls.append((looks, [each.name for each in named], nats))
+        return answers.pop(0) if answers else Found()
+
+    monkeypatch.setattr(looking, "_further", further)
+    return calls, answers
+
+
+def step(name, screen, nats=20.0):
+    """Return an effect that was named, in a model of that screen."""
+    effect = SimpleNamespace(effect=find_effect(name))
+    best = SimpleNamespace(
+        candidate=effect, screen=screen, nats=nats, name=name, is_generic=":" in name
+    )
+    return Step(
+        choice=Choice(best=best),
+        best=Best(score="score", z=9.0, p=1e-9, information=1.0),
+        before="before",
+    )
+
+
+def found(*names, nats=20.0, **more):
+    """Return that these were found."""
+    steps = tuple(step(name, f"with {name}", nats) for name in names)
+    return Found(steps=steps, nats=nats, **more)
+
+
+def test_features_are_asked_of_the_model_as_it_is(question, looked):
+    """Where nothing was named."""
+    case = open_case(question())
+    assert asked(case, NOTHING).steps == ()
+    ((looks, named, nats),) = looked[0]
+    assert (looks.case, looks.screen, looks.beside) == (case, case.screen, ())
+    assert (looks.number, named, nats) == (0, [], 0.0)
+
+
+def test_what_no_form_bears_out_is_unexplained_where_nothing_else_was_named(question, looked):
+    """Beside what is named nothing changes; what speeds say stays said."""
+    case = open_case(question())
+    doubt = Found(nats=30.0, suspicious=True)
+    looked[1].append(doubt)
+    assert asked(case, NOTHING).suspicious
+    looked[1].append(doubt)
+    assert asked(case, Found(suspicious=True)).suspicious
+    crowding = found("crowding")
+    assert asked(case, crowding).steps == crowding.steps
+    assert not asked(case, crowding).suspicious
+
+
+@pytest.mark.slow
+def test_a_name_without_a_form_of_ours_is_unexplained(question, monkeypatch):
+    """Features gain, no form does and the name does not lead: the verdict says so."""
+    own = question({"directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0}})
+    (effect,) = diagnose(own, lambda *_: None).effects
+    assert (effect.name, effect.strength["drawn"]) == ("directional-drift", 1.0)
+    assert effect.strength["strength"] == pytest.approx(0.07, abs=0.03)
+    assert effect.gain_nats_per_step > 0
+    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
+    monkeypatch.setattr(looking, "BY_ITSELF", math.inf)
+    monkeypatch.setattr(looking._Looks, "explains", lambda *_: False)
+    assert diagnose(own, lambda *_: None).verdict is Verdict.UNEXPLAINED
+
+
+def test_looks_share_a_level():
+    """The first ones at speeds and at headings have it together, and so have all that follow."""
+    assert 2 * level_of(0) == LEVEL
+    assert 2 * sum(level_of(k) for k in range(1, 30)) == pytest.approx(LEVEL)
+
+
+def test_where_noise_is_not_known_it_is_that_of_the_likeliest_law(question):
+    """Of exact positions that is none; the note says where it is from."""
+    case = open_case(question(noise_m=None, noise_source="unknown"))
+    assert case.noise_is_likely
+    assert case.question.noise_m == 0.0
+    assert case.question.noise_source == "the law of headings"
+    assert not open_case(question(noise_m=0.0)).noise_is_likely
+
+
+def test_likely_noise_is_held_against_none(question):
+    """Since a late response makes a law of noise likelier as well; known noise is not doubted."""
+    case = open_case(question())
+    for is_likely, levels in ((True, [4e-4, 0.0]), (False, [4e-4])):
+        noisy = dataclasses.replace(
+            case,
+            question=dataclasses.replace(case.question, noise_m=4e-4),
+            noise_is_likely=is_likely,
+        )
+        looks = looking._Looks(case=noisy, screen=case.screen, beside=())
+        assert [law.noise_m for law in looks.laws] == levels
+        # Of exact positions the exact law is likelier: then nothing is gained over the noisy one.
+        gains = looks.gains([find_effect("turning-bias")], ())
+        assert {gain.without_noise for gain in gains} == {is_likely}
+        assert len(gains) == len(find_effect("turning-bias").features(case.scene.arena))
+        explained = dataclasses.replace(looks, without_noise=True)
+        assert [law.noise_m for law in explained.laws] == [0.0]
+
+
+def test_effects_that_the_model_came_with_are_there(question, fish, looked):
+    """On headings: of speeds features say nothing."""
+    for name, values, n in (("turning-bias", {"strength": 0.2}, 1), ("crowding", {}, 0)):
+        own = dict(zip(find_effect(name).names, find_effect(name).values(values), strict=True))
+        model = dataclasses.replace(fish, effects={name: own})
+        given = open_case(dataclasses.replace(question(), model=model))
+        assert asked(given, NOTHING).steps == ()
+        assert [effect.name for effect in looked[0].pop()[0].beside] == [name] * n
+
+
+def test_headings_are_asked_beside_what_speeds_lack(question, looked):
+    """In the model that has it. What speeds name may act on headings: it is there, and no look."""
+    case, (calls, answers) = open_case(question()), looked
+    answers.append(found("alignment"))
+    now = asked(case, found("crowding", "speed-turn-coupling"))
+    names = ["crowding", "speed-turn-coupling", "alignment"]
+    assert [each.choice.best.name for each in now.steps] == names
+    assert [looks.screen for looks, *_ in calls] == ["with speed-turn-coupling", "with alignment"]
+    assert [[effect.name for effect in looks.beside] for looks, *_ in calls] == [
+        ["speed-turn-coupling"],
+        ["speed-turn-coupling", "alignment"],
+    ]
+    assert [(looks.number, named) for looks, named, _ in calls] == [(0, []), (1, ["alignment"])]
+
+
+ONE = Told(gain=gain("alignment", np.full(400, 0.1)), p=0.0, ties=())
+LATE = Hidden(name="reaction-delay", nats=25.0, noise_nats=40.0, noise_share=0.3)
+
+
+@pytest.fixture
+def added(question, monkeypatch):
+    """Return what is added to a model, of what features, forms and scores say."""
+
+    def of(*, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, noise_m=0.0):
+        least = {}
+
+        def said(kind, step):
+            def of_kind(_screen, *, on_speed, least: float):
+                assert not on_speed
+                wanted[kind] = least
+                return step
+
+            return of_kind
+
+        wanted = least
+        unfeatured = SimpleNamespace(
+            beyond=said("guess", guess), listed_one=said("plain", plain)
+        )  # fmt: skip
+        law = SimpleNamespace(scene=None, turns=SimpleNamespace(at=None))
+        looks = SimpleNamespace(
+            ask=lambda: Answer(told=told, hidden=(LATE,)), laws=(law,), screen=None,
+            case=dataclasses.replace(case, question=question(noise_m=noise_m)),
+            not_left_over=lambda guess: guess,
+        )  # fmt: skip
+        form = step("alignment", None) if borne_out else None
+        monkeypatch.setattr(looking, "_borne_out", lambda *_: form)
+        monkeypatch.setattr(common, "outdoes", lambda *_: True)
+        best = [step(name, None, 100.0).choice.best for name in named]
+        made = looking._further(looks, unfeatured, best, nats)
+        names = [each.choice.best.name for each in made.steps]
+        return names, made, wanted
+
+    case = open_case(question())
+    return of
+
+
+def test_what_features_name_is_added(added):
+    """With what it gains by features, and what noise hides."""
+    names, made, _ = added()
+    assert names == ["alignment"]
+    assert made.nats == pytest.approx(39.0)
+    assert made.hidden == (LATE,)
+    names, made, _ = added(told=None)
+    assert (names, made.suspicious) == ([], False)
+
+
+def test_what_nothing_bears_out_is_suspicious(added):
+    """And what gains too little beside another is nothing, or what is left over from it."""
+    names, made, _ = added(borne_out=False)
+    assert (names, made.suspicious, made.hidden) == ([], True, (LATE,))
+    _, made, _ = added(borne_out=False, noise_m=1e-3)
+    assert not made.suspicious
+    assert added(named=["turning-bias"], nats=400.0)[0] == []
+
+
+def test_further_effects_gain_a_share_of_the_clearest(added):
+    """15 % of it; half beside one beyond the list, and one beyond the list beside others."""
+    rests = "freezing"
+    for named, least in ((["turning-bias"], 15.0), (["generic:heading:wall"], 50.0)):
+        _, _, wanted = added(named=named)
+        assert wanted == {"plain": pytest.approx(least)}
+    assert added(named=[rests])[2] == {"plain": 15.0, "guess": 50.0}
+    assert added(named=[rests], nats=200.0)[2] == {"plain": 30.0, "guess": 100.0}
+    assert added()[2] == {"plain": 0.0, "guess": 0.0}
+
+
+def lead(name, nats, ahead=9.0):
+    """Return an effect that would be added, and leads any other by so many standard errors."""
+    one = step(name, None, nats)
+    one.choice.best.over = lambda _other: ahead
+    return one
+
+
+@pytest.mark.parametrize(
+    ("told", "borne_out", "plain", "guess", "expected"),
+    [
+        (ONE, True, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (ONE, True, None, ("generic:heading:wall", 90.0, 1.9), "alignment"),
+        (ONE, True, None, ("generic:heading:neighbour-heading", 90.0), "alignment"),
+        (ONE, False, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (ONE, False, None, ("generic:heading:neighbour-heading", 90.0), None),
+        (None, False, None, ("generic:heading:neighbour-heading", 90.0),
+         "generic:heading:neighbour-heading"),
+        (ONE, True, ("freezing", 50.0), None, "freezing"),
+        (ONE, True, ("freezing", 30.0), None, "alignment"),
+        (ONE, False, ("freezing", 30.0), None, None),
+        (None, False, ("freezing", 30.0), None, "freezing"),
+        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0, 1.9), "freezing"),
+    ],
+)  # fmt: skip
+def test_of_all_that_may_be_added_one_is(added, told, borne_out, plain, guess, expected):
+    """Features gain 39 nats, their form 20. What has none gains more than both; a guess clearly."""
+    names, _, _ = added(
+        told=told,
+        borne_out=borne_out,
+        plain=plain and lead(*plain),
+        guess=guess and lead(*guess),
+    )
+    assert names == ([] if expected is None else [expected])
+
+
+def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
+    """What noise seemed to do stays explained."""
+    case, (calls, answers) = open_case(question()), looked
+    answers += [found("reaction-delay", nats=400.0, without_noise=True), found("turning-bias")]
+    now = asked(case, NOTHING)
+    assert [each.choice.best.name for each in now.steps] == ["reaction-delay", "turning-bias"]
+    assert [[effect.name for effect in looks.beside] for looks, *_ in calls] == [
+        [],
+        ["reaction-delay"],
+        ["reaction-delay", "turning-bias"],
+    ]
+    assert [looks.without_noise for looks, *_ in calls] == [False, True, True]
+    assert [nats for *_, nats in calls] == [0.0, 400.0, 400.0]
+
+
+def test_a_name_that_no_form_bears_out_leads_all_others(monkeypatch):
+    """However silent these are beside it: a name by chance leads by next to nothing."""
+    monkeypatch.setattr(looking, "tell", lambda *_args, **_how: None)
+    quiet = SimpleNamespace(
+        _asked=[], beside=(), number=0, gains=lambda *_: [], _noise=lambda _beside: None
+    )
+    told = Told(gain=gain("alignment", np.full(400, 0.1)), p=0.0, ties=(), lead=1.9)
+    assert not looking._Looks.explains(quiet, told)
+    assert looking._Looks.explains(quiet, dataclasses.replace(told, lead=2.1))
+
+
+@pytest.mark.slow
+def test_a_second_effect_is_named_beside_the_first(question):
+    """Of two, each in a form of ours, features name both; a tie needs something to say."""
+    both = {
+        "directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0},
+        "wall-persistence": {"strength": 0.5},
+    }
+    now = asked(open_case(question(both)), NOTHING)
+    assert {each.choice.best.name for each in now.steps} == set(both)
+    assert all(not each.choice.ties for each in now.steps)
+
+
+def test_noise_seldom_gains_more_than_itsbound():
+    """Of three features of which six replicates are known one exceeds it in 2 % of cases."""
+    rng = np.random.default_rng(5)
+    gains = rng.normal(40.0, 6.0, (4000, 7, 3))
+    beyond = [(case[6] > bound(case[:6])).any() for case in gains]
+    assert 0.014 < np.mean(beyond) < 0.026
+
+
+def test_what_is_named_in_the_end_is_not_hidden():
+    """Noise may hide a name at first that stands beside another one."""
+    late, fast = (
+        Hidden(name=name, nats=25.0, noise_nats=40.0, noise_share=0.3)
+        for name in ("reaction-delay", "crowding")
+    )
+    now = Found(hidden=(late, fast)).and_further(found("crowding"))
+    assert now.hidden == (late,)
+    assert Found().and_further(Found(suspicious=True)).suspicious
+    assert not found("crowding").and_further(Found(suspicious=True)).suspicious

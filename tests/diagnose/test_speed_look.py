@@ -1,0 +1,140 @@
+"""Features name what the law of speeds lacks; rests have a law of their own."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose import speed_look as looking
+from zfcal.diagnose.case import open_case
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.naming import Answer, Told
+from zfcal.diagnose.question import Question
+from zfcal.diagnose.speed_look import speed_look
+from zfcal.model.effects import find_effect
+
+LIT = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach_m": 0.35}}
+
+
+@pytest.fixture(scope="module")
+def case(tank, fish, record):
+    """Return the case of fish of which some effects are hidden."""
+
+    def of(effects=None, seed=31):
+        question = Question(
+            samples=record(seed, effects), arena=tank, model=fish, noise_m=0.0,
+            noise_source="known", n_null=5, quick=True, seed=1, n_workers=2,
+        )  # fmt: skip
+        return open_case(question)
+
+    return of
+
+
+def nothing(**said):
+    """Return what has no features: nothing, or these."""
+    return SimpleNamespace(
+        listed_one=lambda _screen, **_of: said.get("rests"),
+        beyond=lambda _screen, **_of: said.get("guess"),
+    )
+
+
+@pytest.mark.slow
+def test_what_speeds_lack_is_named_one_after_the_other(case):
+    """The clearest first; nothing where nothing is missing."""
+    both = {"crowding": {"per_neighbour": 0.3}, "burst-and-coast": {"exponent": 0.4}}
+    steps = speed_look(case(both), nothing()).steps
+    assert {step.choice.best.name for step in steps} == set(both)
+    assert steps[1].before is steps[0].choice.best.screen
+    assert all(step.choice.ties == () for step in steps)
+    assert speed_look(case(), nothing()).steps == ()
+
+
+def test_crowding_in_a_lit_room_is_named(case):
+    """A lamp makes one room fast, and fish gather there: fish are fast in company."""
+    shy = LIT | {"crowding": {"per_neighbour": 0.1, "radius_m": 0.35}}
+    names = [each.choice.best.name for each in speed_look(case(shy, seed=40), nothing()).steps]
+    assert names == ["crowding"]
+
+
+def step(name, nats=20.0):
+    """Return an effect that would be added."""
+    effect = find_effect(name)
+    best = SimpleNamespace(
+        candidate=SimpleNamespace(effect=effect), nats=nats, name=name,
+        is_generic=effect.generic, screen=f"with {name}",
+    )  # fmt: skip
+    return SimpleNamespace(choice=SimpleNamespace(best=best))
+
+
+def test_where_ranks_are_no_law_effects_are_asked_by_scores(case, monkeypatch):
+    """Tracks in short pieces have no past: no features can be asked, and the name is found."""
+    asked = []
+
+    def listed_one(_screen, *, on_speed, least, has_features):
+        asked.append((on_speed, has_features))
+
+    plain = SimpleNamespace(listed_one=listed_one, beyond=lambda _screen, **_of: None)
+    own = case()
+    for has_law in (True, False):
+        monkeypatch.setattr(looking.Paces, "has_law", property(lambda _self, law=has_law: law))
+        speed_look(own, plain)
+    assert asked == [(True, True), (True, False)]
+
+
+def test_further_effects_gain_a_share_of_the_clearest(case, monkeypatch):
+    """15 % of it, half beside a guess; a guess is asked until something has a name."""
+    asked, answers = [], [step("freezing", 100.0), step("crowding", 40.0), None]
+
+    def chosen(_said, _named, _plain, guess, _of):
+        asked[-1]["guess"] = guess
+        return answers.pop(0)
+
+    def listed_one(_screen, *, on_speed, least, has_features):
+        asked.append({"least": least})
+
+    monkeypatch.setattr(looking, "chosen", chosen)
+    unfeatured = SimpleNamespace(listed_one=listed_one, beyond=lambda _screen, **of: of["least"])
+    monkeypatch.setattr(looking._Looks, "not_left_over", lambda _self, guess: guess)
+    monkeypatch.setattr(looking._Looks, "ask", lambda _self: Answer(told=None))
+    monkeypatch.setattr(looking._Looks, "paces", property(lambda _self: PACES))
+    own = case()
+    assert len(speed_look(own, unfeatured).steps) == 2
+    assert asked == [
+        {"least": 0.0, "guess": 0.0},
+        {"least": 15.0, "guess": 50.0},
+        {"least": 15.0, "guess": None},
+    ]
+    asked.clear()
+    answers += [step("generic:speed:own-speed", 100.0), None]
+    speed_look(own, unfeatured)
+    assert asked[1] == {"least": 50.0, "guess": None}
+
+
+PACES = SimpleNamespace(scene=None, turns=SimpleNamespace(at=None), has_law=True)
+
+
+def test_what_no_form_of_speeds_bears_out_is_suspicious(case, monkeypatch):
+    """Features of speeds gain, and nothing is named."""
+    told = Told(
+        gain=Gain(name="crowding", label="number", log_p=np.full(300, 0.1), n_strengths=1),
+        p=0.0, ties=(),
+    )  # fmt: skip
+    monkeypatch.setattr(looking._Looks, "ask", lambda _self: Answer(told=told))
+    monkeypatch.setattr(looking, "_borne_out", lambda *_: None)
+    found = speed_look(case(), nothing())
+    assert (found.steps, found.suspicious) == ((), True)
+
+
+def test_what_is_there_in_another_form_leaves_no_guess(case):
+    """Fish of which the model's crowding is too weak: its features say what is left."""
+    own = case({"crowding": {"per_neighbour": 0.3}})
+    looks = looking._Looks(case=own, screen=own.screen, beside=(find_effect("crowding"),))
+    left, n = looks.paces.gained_beside
+    assert left.sum() - n > 20
+    n_samples = len(own.scene.k)
+    for nats, kept in ((0.1 * left.sum(), False), (10 * left.sum(), True)):
+        best = SimpleNamespace(gain=np.full(n_samples, nats / n_samples), nats=nats)
+        guess = SimpleNamespace(choice=SimpleNamespace(best=best))
+        assert (looks.not_left_over(guess) is guess) is kept
+    alone = looking._Looks(case=own, screen=own.screen, beside=())
+    assert alone.not_left_over("any") == "any"
