@@ -14,7 +14,6 @@ from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import answer, best_by_name, tell
-from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import LAPSE, maximise, with_effect
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
@@ -230,7 +229,7 @@ def test_chance_tells_a_name_as_seldom_as_the_level_says():
     rng = np.random.default_rng(2)
     ratios = rng.chisquare(1, (2000, 40)) / 2
     told = sum(tell([gain(str(k), [r]) for k, r in enumerate(row)]) is not None for row in ratios)
-    assert 0.005 < told / 2000 < LEVEL + 3 * math.sqrt(LEVEL / 2000)
+    assert 0.005 < told / 2000 < 0.02 + 3 * math.sqrt(0.02 / 2000)
 
 
 def test_a_search_ends_where_a_library_ends():
