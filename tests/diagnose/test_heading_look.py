@@ -145,21 +145,33 @@ def test_a_place_that_is_a_direction_is_put_aside_for_it(question, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "values"),
+    ("name", "values", "seed"),
     [
-        ("group-cohesion", {"weight": 2.5}),
-        ("directional-drift", {"strength": 1.5, "direction_rad": 2.0}),
-        ("place-preference", {"strength": 3.0, "x_m": 0.3, "y_m": 0.8}),
+        ("group-cohesion", {"weight": 2.5}, 31),
+        ("directional-drift", {"strength": 1.5, "direction_rad": 2.0}, 31),
+        ("place-preference", {"strength": 3.0, "x_m": 0.3, "y_m": 0.8}, 31),
+        ("turning-bias", {"strength": 0.8}, 32),
     ],
 )
-def test_a_name_gets_the_form_that_the_fish_have(question, name, values):
+def test_a_name_gets_the_form_that_the_fish_have(question, name, values, seed):
     """Fish that turn to something look as if all their headings leaned toward it, or to a place."""
     given = {**values, "turning": 1.0}
-    (effect,) = diagnose(question({name: given}), lambda *_: None).effects
+    (effect,) = diagnose(question({name: given}, seed=seed), lambda *_: None).effects
     strength = find_effect(name).strength
     assert (effect.name, effect.strength["turning"]) == (name, 1.0)
     low, high = effect.interval[strength]
     assert low < values[strength] < high
+
+
+@pytest.mark.slow
+def test_bold_fish_that_swim_into_the_open_have_that_form(question):
+    """In a tank in which none of them leaves rooms more readily."""
+    given = {"spread": 0.7, "heading_share": 0.0, "into_zone": 3.0}
+    (effect,) = diagnose(question({"boldness": given}), lambda *_: None).effects
+    assert (effect.name, effect.strength["into_zone"]) == ("boldness", 3.0)
+    low, high = effect.interval["spread"]
+    assert low < high
+    assert effect.strength["spread"] == pytest.approx(0.7, abs=0.3)
 
 
 @pytest.mark.slow
@@ -440,6 +452,20 @@ def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
     ]
     assert [looks.without_noise for looks, *_ in calls] == [False, True, True]
     assert [nats for *_, nats in calls] == [0.0, 400.0, 400.0]
+
+
+def test_another_form_beyond_the_list_bears_a_name_out(monkeypatch):
+    """Though the listed form gains nothing; nothing does that says something else."""
+    form = step("alignment", None)
+    monkeypatch.setattr(looking, "as_step", lambda *_: form)
+    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
+    monkeypatch.setattr(looking, "_is_steady", lambda _step: True)
+    looks = SimpleNamespace(case=None, screen=None, explains=lambda _told: False)
+    told = dataclasses.replace(ONE, lead=1.0)
+    same, other = (step(f"generic:heading:{cue}", None) for cue in ("neighbour-heading", "wall"))
+    assert looking._borne_out(looks, told, same) is form
+    assert looking._borne_out(looks, told, other) is None
+    assert looking._borne_out(looks, told, None) is None
 
 
 def test_a_name_that_no_form_bears_out_leads_all_others(monkeypatch):

@@ -32,6 +32,7 @@ from zfcal.diagnose.looks import (
     gains_by_itself,
     in_all_minutes,
     in_all_phases,
+    is_other_form,
     level_of,
     may_guess,
     not_yet_there,
@@ -108,7 +109,7 @@ def _further(looks: _Looks, unfeatured: Unfeatured, named: Sequence[Refit], nats
     told = said.told
     step = None
     if told is not None and told.gain.nats >= least:
-        step = _borne_out(looks, told)
+        step = _borne_out(looks, told, guess)
     law = looks.laws[0]
     added = chosen(told, step, plain, guess, (law.scene, law.turns.at))
     if added is None:
@@ -124,10 +125,16 @@ def _further(looks: _Looks, unfeatured: Unfeatured, named: Sequence[Refit], nats
     )
 
 
-def _borne_out(looks: _Looks, told: Told) -> Step | None:
-    """Return what features name as an effect in the model; None where nothing bears it out."""
+def _borne_out(looks: _Looks, told: Told, guess: Step | None) -> Step | None:
+    """Return what features name as an effect in the model; None where nothing bears it out.
+
+    Its form does, or an effect beyond the list that says the same in another form.
+    """
     step = as_step(looks.case, looks.screen, told)
-    if step is None or (gains_by_itself(step.choice.best) and _is_steady(step)):
+    if step is None:
+        return None
+    has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
+    if has_form and _is_steady(step):
         return step
     return step if told.lead > BY_ITSELF or looks.explains(told) else None
 

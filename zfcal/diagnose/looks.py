@@ -147,11 +147,16 @@ def chosen(
         return listed
     is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
     if said is not None:
-        told = (said.gain, *said.ties)
-        forms = {form for gain in told for form in find_effect(gain.name).other_forms}
-        is_ahead = is_ahead and guess.choice.best.name not in forms
+        is_ahead = is_ahead and not is_other_form(guess, said)
         is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
     return guess if is_ahead else listed
+
+
+def is_other_form(guess: Step | None, told: Told) -> bool:
+    """Return whether what is beyond the list says in another form what features name."""
+    names = [gain.name for gain in (told.gain, *told.ties)]
+    forms = {form for name in names for form in find_effect(name).other_forms}
+    return guess is not None and guess.choice.best.name in forms
 
 
 def outdoes(guess: Step, log_p: Floats, nats: float, of: Of) -> bool:

@@ -25,6 +25,7 @@ from zfcal.diagnose.looks import (
     gains_by_itself,
     in_all_minutes,
     in_all_phases,
+    is_other_form,
     level_of,
     may_guess,
     not_yet_there,
@@ -92,7 +93,7 @@ def _further(looks: _Looks, unfeatured: Unfeatured, there: Sequence[Refit]) -> F
     told = said.told
     step = None
     if told is not None and told.gain.nats >= least:
-        step = _borne_out(looks, told)
+        step = _borne_out(looks, told, guess)
     added = chosen(told, step, plain, guess, (paces.scene, paces.turns.at))
     return Found(
         steps=() if added is None else (added,),
@@ -101,14 +102,17 @@ def _further(looks: _Looks, unfeatured: Unfeatured, there: Sequence[Refit]) -> F
     )
 
 
-def _borne_out(looks: _Looks, told: Told) -> Step | None:
-    """Return what features name as an effect in the model; None where nothing bears it out."""
+def _borne_out(looks: _Looks, told: Told, guess: Step | None) -> Step | None:
+    """Return what features name as an effect in the model; None where nothing bears it out.
+
+    Its form does, or an effect beyond the list that says the same in another form.
+    """
     case, screen, paces = looks.case, looks.screen, looks.paces
     apart, at = paces.apart(told.gain), paces.turns.at
     if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
         return None
     step = as_step(case, screen, told)
-    if step is None or gains_by_itself(step.choice.best):
+    if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
         return step
     return step if told.lead > BY_ITSELF else None
 

@@ -255,3 +255,23 @@ def test_speeds_can_go_by_a_speed_evenly(ask, name):
     even = ask(name, {"exponent": 0.4, "evenly": 1.0}, **rows)
     assert even.speed() == pytest.approx(math.exp(0.4))
     assert ask(name, {"exponent": 0.4}, **rows).speed() == pytest.approx((12 / 7) ** 0.4)
+
+
+@pytest.mark.parametrize("follows", [0.0, 1.0])
+@pytest.mark.parametrize("strength", [0.5, -0.5])
+def test_fish_may_turn_to_a_side(ask, strength, follows):
+    """By a tenth of a radian per strength, along a wall too; none lean, and none are drawn."""
+    asked = ask("turning-bias", {"strength": strength, "turning": 1.0}, FOLLOWS=follows)
+    assert asked.rotation() == pytest.approx(0.1 * strength)
+    assert asked.factor(1.0) == asked.factor(-1.0) == 1.0
+    assert asked.component()[0] == 0.0
+    assert ask("turning-bias", {"strength": strength}).rotation() == 0.0
+
+
+def test_the_bold_may_swim_into_a_zone(ask):
+    """Into the third: e^(2 s) for the bold, e^(-2 s) for the shy, wherever they are."""
+    given = {"spread": 0.5, "heading_share": 0.0, "into_zone": 3.0}
+    asked = ask("boldness", given, TRAIT=[1.0, -1.0, 0.0], CLEAR=0.1)
+    for i, power in ((0, 1.0), (1, -1.0), (2, 0.0)):
+        ratio = asked.factor(0.0, i=i, landing=3) / asked.factor(0.0, i=i, landing=2)
+        assert ratio == pytest.approx(math.exp(power))

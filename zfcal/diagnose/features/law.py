@@ -27,7 +27,7 @@ from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.features import Component, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
-from zfcal.model.kernels.rooms import find_rooms
+from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.scene import Scene, Turns
 
 DRAWS = 8
@@ -160,9 +160,7 @@ class Law:
         """Return the id of a zone that fish may leave into, as `Leaving` has it; 0 without one."""
         if into == "between":
             return self.between
-        zones = enumerate(self.scene.arena.zones, start=1)
-        open_ = [k for k, zone in zones if not zone.follows_walls and k != self.between]
-        return open_[-1] if open_ else 0
+        return open_zone(self.scene.arena)
 
     def share_of(self, zone: int) -> Floats:
         """Share of each cell's attraction that is of landing in a zone, shape (step, cell)."""

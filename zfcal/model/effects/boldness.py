@@ -11,14 +11,19 @@ from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.features import Feature, Leaving, Seen, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.rooms import find_rooms
+from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.kernels.state import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the way out of a room; in a tank without rooms, out of the zone."""
+    """Weigh headings by the way out of a room; in a tank without rooms, out of the zone.
+
+    Or by whether they land in a certain zone.
+    """
     own = parameters[0] * state[TRAIT * n + i]
+    if parameters[2] > 0.0:
+        return tilt(own, 1.0 if landing == parameters[2] else -1.0, 1.0)
     if state[EXIT * n + i] > 0.0:
         if not state[ROOM * n + i] > 0.0:
             return 1.0
@@ -35,6 +40,12 @@ _MOST_TRACKS = 12
 def _shapes(arena: Arena) -> Shapes:
     shares = (1.0, 0.0) if find_rooms(arena)[0] else (1.0,)
     return tuple({"heading_share": share} for share in shares)
+
+
+def _open(arena: Arena) -> Shapes:
+    """Return that bold ones swim into the open, if there is such a zone."""
+    zone = open_zone(arena)
+    return ({"heading_share": 0.0, "into_zone": float(zone)},) if zone else ()
 
 
 def _lacks(company: Company) -> str | None:
@@ -78,6 +89,14 @@ EFFECT = Effect(
             default=1.0,
             says="1: headings toward a room's way out, all over the room; 0: steps across it.",
         ),
+        EffectParameter(
+            name="into_zone",
+            low=0.0,
+            high=16.0,
+            default=0.0,
+            says="Number of the arena's zone, from 1 on, that bold fish swim into more readily; 0: "
+            "they leave rooms.",
+        ),
     ),
     strength="spread",
     probe=0.01,
@@ -85,9 +104,10 @@ EFFECT = Effect(
     harmonics=1,
     by_landing=True,
     shapes=_shapes,
+    further_shapes=_open,
     lacks=_lacks,
     identity_s=300.0,
     by_trait=True,
-    fixed=("heading_share",),
+    fixed=("heading_share", "into_zone"),
     features=lambda _arena: _FEATURES,
 )

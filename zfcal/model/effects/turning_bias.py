@@ -6,10 +6,10 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import leftward, tilt
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
 from zfcal.model.features import Component, Feature, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
-from zfcal.model.kernels.hooks import COMPONENT, FACTOR
+from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY
 
 _KAPPA = 4.0
@@ -19,7 +19,7 @@ _PER_STRENGTH = 0.1
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the sine of the turn that they are; left is positive."""
-    if parameters[2] > 0.0:
+    if parameters[2] > 0.0 or parameters[3] > 0.0:
         return 1.0
     return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
 
@@ -27,12 +27,18 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Add a component about the left of the heading, or the right; not along a wall."""
-    if state[FOLLOWS * n + i] > 0.0:
+    if state[FOLLOWS * n + i] > 0.0 or parameters[3] > 0.0:
         return 0.0
     side = 1.0 if parameters[0] > 0.0 else -1.0
     out[0], out[1] = -side * state[HY * n + i], side * state[HX * n + i]
     out[2] = _KAPPA
     return _PER_STRENGTH * abs(parameters[0]) * parameters[2]
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn the base's directions to the left, along walls as well."""
+    return RAD_PER_STRENGTH * parameters[0] if parameters[3] > 0.0 else 0.0
 
 
 def _sides(seen: Seen) -> Floats:
@@ -100,15 +106,24 @@ EFFECT = Effect(
             says="0: all headings lean to the side; 1: some are drawn at right angles to it, as "
             "a component of the weight 0.1 per strength; not along a wall.",
         ),
+        EffectParameter(
+            name="turning",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the base's directions turn to the side, by a tenth of a radian per strength, "
+            "along walls as well.",
+        ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
     harmonics=2,
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
-    further_shapes=lambda _arena: ({"drawn": 1.0},),
-    fixed=("along_walls", "drawn"),
-    needs={"component": ("drawn",)},
+    rotation=rotation,
+    further_shapes=lambda _arena: ({"drawn": 1.0}, {"turning": 1.0}),
+    fixed=("along_walls", "drawn", "turning"),
+    needs={"component": ("drawn",), "rotation": ("turning",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,
 )

@@ -72,6 +72,20 @@ def find_rooms(arena: Arena) -> tuple[int, tuple[shapely.Polygon, ...]]:
     return 0, ()
 
 
+def open_zone(arena: Arena) -> int:
+    """Return the id of the last zone that neither follows walls nor joins rooms; 0 without one.
+
+    Parameters
+    ----------
+    arena
+        Of the tank.
+    """
+    between, _ = find_rooms(arena)
+    zones = enumerate(arena.zones, start=1)
+    open_ = [k for k, zone in zones if not zone.follows_walls and k != between]
+    return open_[-1] if open_ else 0
+
+
 def make_rooms(
     arena: Arena, shape: tuple[int, int], origin_m: tuple[float, float], per_m: float
 ) -> Rooms:
