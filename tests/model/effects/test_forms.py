@@ -275,3 +275,20 @@ def test_the_bold_may_swim_into_a_zone(ask):
     for i, power in ((0, 1.0), (1, -1.0), (2, 0.0)):
         ratio = asked.factor(0.0, i=i, landing=3) / asked.factor(0.0, i=i, landing=2)
         assert ratio == pytest.approx(math.exp(power))
+
+
+@pytest.mark.parametrize(("reach_m", "counts"), [(0.08, False), (0.25, True)])
+def test_the_mean_heading_may_be_of_those_within_another_reach(ask, reach_m, counts):
+    """Of one that swims up, 0.1 m away: leaned or turned toward where it is within reach alone."""
+    rows = {
+        "X": [0.0, 0.1],
+        "Y": [0.0, 0.0],
+        "HX": [1.0, 0.0],
+        "HY": [0.0, 1.0],
+        "ZONE": [3.0, 3.0],
+    }
+    leaning = ask("alignment", {"weight": 20.0, "leaning": 1.0, "reach_m": reach_m}, **rows)
+    ratio = leaning.factor(math.pi / 2) / leaning.factor(-math.pi / 2)
+    assert ratio == pytest.approx(math.exp(1.2) if counts else 1.0)
+    turning = ask("alignment", {"weight": 20.0, "turning": 1.0, "reach_m": reach_m}, **rows)
+    assert turning.rotation() == pytest.approx(0.2 * math.pi / 2 if counts else 0.0)

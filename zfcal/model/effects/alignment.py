@@ -26,6 +26,7 @@ _USUAL_SR = 0.01
 
 
 _NEAR_M = 0.15
+_REACHES_M = (0.08, 0.25, 0.4)
 _PER_WEIGHT = 0.03
 _WAY_PER_WEIGHT = 0.01
 
@@ -65,11 +66,11 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
 
 @inlined
-def near_heading(state: Hooked, n: int, i: int) -> tuple[float, float, float]:
-    """Return the sum of the headings of all that are near, seen or not, and how many."""
+def near_heading(state: Hooked, n: int, i: int, reach_m: float) -> tuple[float, float, float]:
+    """Return the sum of the headings of all within reach, seen or not, and how many."""
     x, y, near = 0.0, 0.0, 0.0
     for j in range(n):
-        if j != i and state[ZONE * n + j] > 0.0 and apart(state, n, i, j) < _NEAR_M:
+        if j != i and state[ZONE * n + j] > 0.0 and apart(state, n, i, j) < reach_m:
             x += state[HX * n + j]
             y += state[HY * n + j]
             near += 1.0
@@ -92,7 +93,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         if k < 0:
             return 1.0
         return tilt(leaning * parameters[0], state[HX * n + k] * ux + state[HY * n + k] * uy, 1.0)
-    x, y, near = near_heading(state, n, i)
+    x, y, near = near_heading(state, n, i, parameters[6])
     if not near > 0.0:
         return 1.0
     most = math.sqrt(x * x + y * y) / near
@@ -104,7 +105,7 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     """Turn a share of the way to the mean heading of all that are near; not along a wall."""
     if not parameters[4] > 0.0 or state[FOLLOWS * n + i] > 0.0:
         return 0.0
-    x, y, near = near_heading(state, n, i)
+    x, y, near = near_heading(state, n, i, parameters[6])
     hx, hy = state[HX * n + i], state[HY * n + i]
     if not near > 0.0:
         return 0.0
@@ -212,14 +213,14 @@ EFFECT = Effect(
             high=1.0,
             default=0.0,
             says="0: some headings are drawn about the mean heading of those that are seen; 1: all "
-            "headings lean toward that of those within 0.15 m, by 0.03 nats per weight.",
+            "headings lean toward that of those within reach, by 0.03 nats per weight.",
         ),
         EffectParameter(
             name="turning",
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: all turn toward the mean heading of those within 0.15 m, by a hundredth of "
+            says="1: all turn toward the mean heading of those within reach, by a hundredth of "
             "the way per weight; along a wall they prefer the sense that is nearer to it.",
         ),
         EffectParameter(
@@ -230,6 +231,14 @@ EFFECT = Effect(
             says="0: the mean heading of those that are seen; 1: the heading of the nearest, seen "
             "or not, as one of 0.01 sr, or leaned toward; 2: a component about the heading of each "
             "that is seen.",
+        ),
+        EffectParameter(
+            name="reach_m",
+            low=0.0,
+            high=1.0,
+            default=_NEAR_M,
+            says="Distance within which the mean heading counts that fish lean or turn toward, in "
+            "metres.",
         ),
     ),
     strength="weight",
@@ -254,9 +263,11 @@ EFFECT = Effect(
             for form in ({"among": 1.0}, {"among": 2.0}, {"among": 2.0, "grading": 0.0})
         ),
         {"leaning": 1.0, "among": 1.0},
+        *({"leaning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
+        *({"turning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
     ),
     lacks=needs_neighbour,
-    fixed=("grading", "leaning", "turning", "among"),
+    fixed=("grading", "leaning", "turning", "among", "reach_m"),
     idle=lambda values: ("kappa",) if values["leaning"] + values["turning"] > 0 else (),
     needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
     other_forms=("generic:heading:neighbour-heading",),
