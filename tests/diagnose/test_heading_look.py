@@ -13,7 +13,7 @@ from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import diagnose
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Answer, Hidden, Told
+from zfcal.diagnose.features.naming import Hidden, Told
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.heading_look import _noise_nats, heading_look
 from zfcal.diagnose.looks import Found, bound, level_of, outdoes
@@ -210,11 +210,11 @@ def looked(monkeypatch):
     """Return what is asked of features, look by look, and what they are to say of each."""
     calls, answers = [], []
 
-    def further(looks, _unfeatured, named, nats):
+    def further(looks, _unfeatured, named, nats=0.0):
         calls.append((looks, [each.name for each in named], nats))
         return answers.pop(0) if answers else Found()
 
-    monkeypatch.setattr(looking, "_further", further)
+    monkeypatch.setattr(looking, "further", further)
     return calls, answers
 
 
@@ -333,110 +333,6 @@ def test_headings_are_asked_beside_what_speeds_lack(question, looked):
 
 
 ONE = Told(gain=gain("alignment", np.full(400, 0.1)), p=0.0, ties=())
-LATE = Hidden(name="reaction-delay", nats=25.0, noise_nats=40.0, noise_share=0.3)
-
-
-@pytest.fixture
-def added(question, monkeypatch):
-    """Return what is added to a model, of what features, forms and scores say."""
-
-    def of(*, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, noise_m=0.0):
-        least = {}
-
-        def said(kind, step):
-            def of_kind(_screen, *, on_speed, least: float):
-                assert not on_speed
-                wanted[kind] = least
-                return step
-
-            return of_kind
-
-        wanted = least
-        unfeatured = SimpleNamespace(
-            beyond=said("guess", guess), listed_one=said("plain", plain)
-        )  # fmt: skip
-        law = SimpleNamespace(scene=None, turns=SimpleNamespace(at=None))
-        looks = SimpleNamespace(
-            ask=lambda: Answer(told=told, hidden=(LATE,)), laws=(law,), screen=None,
-            case=dataclasses.replace(case, question=question(noise_m=noise_m)),
-            not_left_over=lambda guess: guess,
-        )  # fmt: skip
-        form = step("alignment", None) if borne_out else None
-        monkeypatch.setattr(looking, "_borne_out", lambda *_: form)
-        monkeypatch.setattr(common, "outdoes", lambda *_: True)
-        best = [step(name, None, 100.0).choice.best for name in named]
-        made = looking._further(looks, unfeatured, best, nats)
-        names = [each.choice.best.name for each in made.steps]
-        return names, made, wanted
-
-    case = open_case(question())
-    return of
-
-
-def test_what_features_name_is_added(added):
-    """With what it gains by features, and what noise hides."""
-    names, made, _ = added()
-    assert names == ["alignment"]
-    assert made.nats == pytest.approx(39.0)
-    assert made.hidden == (LATE,)
-    names, made, _ = added(told=None)
-    assert (names, made.suspicious) == ([], False)
-
-
-def test_what_nothing_bears_out_is_suspicious(added):
-    """And what gains too little beside another is nothing, or what is left over from it."""
-    names, made, _ = added(borne_out=False)
-    assert (names, made.suspicious, made.hidden) == ([], True, (LATE,))
-    _, made, _ = added(borne_out=False, noise_m=1e-3)
-    assert not made.suspicious
-    assert added(named=["turning-bias"], nats=400.0)[0] == []
-
-
-def test_further_effects_gain_a_share_of_the_clearest(added):
-    """15 % of it; half beside one beyond the list, and one beyond the list beside others."""
-    rests = "freezing"
-    for named, least in ((["turning-bias"], 15.0), (["generic:heading:wall"], 50.0)):
-        _, _, wanted = added(named=named)
-        assert wanted == {"plain": pytest.approx(least)}
-    assert added(named=[rests])[2] == {"plain": 15.0, "guess": 50.0}
-    assert added(named=[rests], nats=200.0)[2] == {"plain": 30.0, "guess": 100.0}
-    assert added()[2] == {"plain": 0.0, "guess": 0.0}
-
-
-def lead(name, nats, ahead=9.0):
-    """Return an effect that would be added, and leads any other by so many standard errors."""
-    one = step(name, None, nats)
-    one.choice.best.over = lambda _other: ahead
-    return one
-
-
-@pytest.mark.parametrize(
-    ("told", "borne_out", "plain", "guess", "expected"),
-    [
-        (ONE, True, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
-        (ONE, True, None, ("generic:heading:wall", 90.0, 1.9), "alignment"),
-        (ONE, True, None, ("generic:heading:neighbour-heading", 90.0), "alignment"),
-        (ONE, False, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
-        (ONE, False, None, ("generic:heading:neighbour-heading", 90.0), None),
-        (None, False, None, ("generic:heading:neighbour-heading", 90.0),
-         "generic:heading:neighbour-heading"),
-        (ONE, True, ("freezing", 50.0), None, "freezing"),
-        (ONE, True, ("freezing", 30.0), None, "alignment"),
-        (ONE, False, ("freezing", 30.0), None, None),
-        (None, False, ("freezing", 30.0), None, "freezing"),
-        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0), "generic:heading:wall"),
-        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0, 1.9), "freezing"),
-    ],
-)  # fmt: skip
-def test_of_all_that_may_be_added_one_is(added, told, borne_out, plain, guess, expected):
-    """Features gain 39 nats, their form 20. What has none gains more than both; a guess clearly."""
-    names, _, _ = added(
-        told=told,
-        borne_out=borne_out,
-        plain=plain and lead(*plain),
-        guess=guess and lead(*guess),
-    )
-    assert names == ([] if expected is None else [expected])
 
 
 def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
@@ -460,12 +356,13 @@ def test_another_form_beyond_the_list_bears_a_name_out(monkeypatch):
     monkeypatch.setattr(looking, "as_step", lambda *_: form)
     monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
     monkeypatch.setattr(looking, "_is_steady", lambda _step: True)
-    looks = SimpleNamespace(case=None, screen=None, explains=lambda _told: False)
+    looks = looking._Looks(case=None, screen=None, beside=())
+    monkeypatch.setattr(looking._Looks, "explains", lambda _self, _told: False)
     told = dataclasses.replace(ONE, lead=1.0)
     same, other = (step(f"generic:heading:{cue}", None) for cue in ("neighbour-heading", "wall"))
-    assert looking._borne_out(looks, told, same) is form
-    assert looking._borne_out(looks, told, other) is None
-    assert looking._borne_out(looks, told, None) is None
+    assert looks.borne_out(told, same) is form
+    assert looks.borne_out(told, other) is None
+    assert looks.borne_out(told, None) is None
 
 
 def test_a_name_that_no_form_bears_out_leads_all_others(monkeypatch):

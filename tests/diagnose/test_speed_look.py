@@ -9,6 +9,7 @@ from zfcal.diagnose import speed_look as looking
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Answer, Told
+from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.speed_look import speed_look
 from zfcal.model.effects import find_effect
@@ -81,36 +82,22 @@ def test_where_ranks_are_no_law_effects_are_asked_by_scores(case, monkeypatch):
     assert asked == [(True, True), (True, False)]
 
 
-def test_further_effects_gain_a_share_of_the_clearest(case, monkeypatch):
-    """15 % of it, half beside a guess; a guess is asked until something has a name."""
+def test_each_effect_is_asked_beside_those_before_it(case, monkeypatch):
+    """In the model that has them, until there is none."""
     asked, answers = [], [step("freezing", 100.0), step("crowding", 40.0), None]
 
-    def chosen(_said, _named, _plain, guess, _of):
-        asked[-1]["guess"] = guess
-        return answers.pop(0)
+    def further(looks, _unfeatured, there):
+        asked.append((looks.number, [e.name for e in looks.beside], [e.name for e in there]))
+        found = answers.pop(0)
+        return Found(steps=() if found is None else (found,), nats=30.0)
 
-    def listed_one(_screen, *, on_speed, least, has_features):
-        asked.append({"least": least})
-
-    monkeypatch.setattr(looking, "chosen", chosen)
-    unfeatured = SimpleNamespace(listed_one=listed_one, beyond=lambda _screen, **of: of["least"])
-    monkeypatch.setattr(looking._Looks, "not_left_over", lambda _self, guess: guess)
-    monkeypatch.setattr(looking._Looks, "ask", lambda _self: Answer(told=None))
-    monkeypatch.setattr(looking._Looks, "paces", property(lambda _self: PACES))
-    own = case()
-    assert len(speed_look(own, unfeatured).steps) == 2
-    assert asked == [
-        {"least": 0.0, "guess": 0.0},
-        {"least": 15.0, "guess": 50.0},
-        {"least": 15.0, "guess": None},
-    ]
-    asked.clear()
-    answers += [step("generic:speed:own-speed", 100.0), None]
-    speed_look(own, unfeatured)
-    assert asked[1] == {"least": 50.0, "guess": None}
-
-
-PACES = SimpleNamespace(scene=None, turns=SimpleNamespace(at=None), has_law=True)
+    monkeypatch.setattr(looking, "further", further)
+    found = speed_look(case(), nothing())
+    assert len(found.steps) == 2
+    # What features of headings gain is another matter.
+    assert found.nats == 0.0
+    names = ["freezing", "crowding"]
+    assert asked == [(n, names[:n], names[:n]) for n in range(3)]
 
 
 def test_what_no_form_of_speeds_bears_out_is_suspicious(case, monkeypatch):
@@ -120,7 +107,7 @@ def test_what_no_form_of_speeds_bears_out_is_suspicious(case, monkeypatch):
         p=0.0, ties=(),
     )  # fmt: skip
     monkeypatch.setattr(looking._Looks, "ask", lambda _self: Answer(told=told))
-    monkeypatch.setattr(looking, "_borne_out", lambda *_: None)
+    monkeypatch.setattr(looking._Looks, "borne_out", lambda *_: None)
     found = speed_look(case(), nothing())
     assert (found.steps, found.suspicious) == ((), True)
 

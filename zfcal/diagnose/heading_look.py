@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.adding import further
 from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
@@ -27,24 +28,22 @@ from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
+    Of,
     as_step,
-    chosen,
     gains_by_itself,
     in_all_minutes,
     in_all_phases,
     is_other_form,
     level_of,
-    may_guess,
     not_yet_there,
     on_headings,
     outdoes,
     replicate_nats,
-    share_of,
     without_idle_ties,
 )
-from zfcal.diagnose.naming import SURE, Refit
+from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import GENERIC_SHARE, MOST_EFFECTS, Step
+from zfcal.diagnose.selection import MOST_EFFECTS, Step
 from zfcal.model.effects import Effect, find_effect
 
 
@@ -78,65 +77,10 @@ def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
             without_noise=found.without_noise,
             number=len(named),
         )
-        further = _further(looks, unfeatured, named, found.nats)
-        found = found.and_further(further)
-        if not further.steps:
+        added = further(looks, unfeatured, named, found.nats)
+        found = found.and_further(added)
+        if not added.steps:
             return found
-
-
-def _further(looks: _Looks, unfeatured: Unfeatured, named: Sequence[Refit], nats: float) -> Found:
-    """Return what is added to a model: one effect, or none.
-
-    Parameters
-    ----------
-    looks
-        At the model.
-    unfeatured
-        What has no features.
-    named
-        What was added before.
-    nats
-        What the clearest of it gains by features.
-    """
-    most = max([nats, *(each.nats for each in named)])
-    least = most * share_of(named) if named else 0.0
-    guess = None
-    if may_guess(named, looks.case):
-        guess = unfeatured.beyond(looks.screen, on_speed=False, least=GENERIC_SHARE * most)
-        guess = looks.not_left_over(guess)
-    plain = unfeatured.listed_one(looks.screen, on_speed=False, least=least)
-    said = looks.ask()
-    told = said.told
-    step = None
-    if told is not None and told.gain.nats >= least:
-        step = _borne_out(looks, told, guess)
-    law = looks.laws[0]
-    added = chosen(told, step, plain, guess, (law.scene, law.turns.at))
-    if added is None:
-        is_doubt = told is not None and can_suspect(looks.case.question)
-        return Found(suspicious=is_doubt, hidden=said.hidden)
-    if told is None or added is not step:
-        return Found(steps=(added,), hidden=said.hidden)
-    return Found(
-        steps=(step,),
-        nats=told.gain.nats,
-        without_noise=told.gain.without_noise,
-        hidden=said.hidden,
-    )
-
-
-def _borne_out(looks: _Looks, told: Told, guess: Step | None) -> Step | None:
-    """Return what features name as an effect in the model; None where nothing bears it out.
-
-    Its form does, or an effect beyond the list that says the same in another form.
-    """
-    step = as_step(looks.case, looks.screen, told)
-    if step is None:
-        return None
-    has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
-    if has_form and _is_steady(step):
-        return step
-    return step if told.lead > BY_ITSELF or looks.explains(told) else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,6 +140,40 @@ class _Looks:
         all_, some = (fits_beside(law, beside).null_log_p for law in (noisy, half))
         return 2 * all_ - some
 
+    @property
+    def on_speed(self) -> bool:
+        """It is at headings."""
+        return False
+
+    @property
+    def has_features(self) -> bool:
+        """Headings have a law in any recording."""
+        return True
+
+    @property
+    def may_doubt(self) -> bool:
+        """Whether what no form bears out is something: of noisy positions ranks are uneven."""
+        return can_suspect(self.case.question)
+
+    @property
+    def of(self) -> Of:
+        """The recording, and the sample in which each step begins."""
+        law = self.laws[0]
+        return law.scene, law.turns.at
+
+    def borne_out(self, told: Told, guess: Step | None) -> Step | None:
+        """Return what features name as an effect in the model; None where nothing bears it out.
+
+        Its form does, or an effect beyond the list that says the same in another form.
+        """
+        step = as_step(self.case, self.screen, told)
+        if step is None:
+            return None
+        has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
+        if has_form and _is_steady(step):
+            return step
+        return step if told.lead > BY_ITSELF or self.explains(told) else None
+
     def not_left_over(self, guess: Step | None) -> Step | None:
         """Return an effect beyond the list, unless what is there leaves it over.
 
@@ -208,7 +186,7 @@ class _Looks:
         fits = fits_beside(law, self.beside)
         left = fits.null_log_p - fits_beside(law, ()).null_log_p
         nats = float(left.sum()) - fits.n_beside
-        return guess if outdoes(guess, left, nats, (law.scene, law.turns.at)) else None
+        return guess if outdoes(guess, left, nats, self.of) else None
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.beyond import is_featured
 from zfcal.diagnose.candidates import Candidate, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
 from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS
@@ -23,7 +22,7 @@ from zfcal.diagnose.null import run_null
 from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import GENERIC_SHARE, LEAST_SHARE, LEVEL, Best, Step
+from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.scene import Scene
@@ -90,66 +89,6 @@ def level_of(number: int) -> float:
 def on_headings(step: Step) -> bool:
     """Return whether an effect that was named acts on headings."""
     return not step.choice.best.candidate.effect.on_speed
-
-
-def may_guess(there: Sequence[Refit], case: Case) -> bool:
-    """Return whether effects beyond the list are asked: until features, or one of these, named one.
-
-    Parameters
-    ----------
-    there
-        What was named.
-    case
-        The question.
-    """
-    arena = case.scene.arena
-    return not any(
-        each.is_generic or is_featured(each.candidate.effect, arena) for each in there
-    )  # fmt: skip
-
-
-def share_of(there: Sequence[Refit]) -> float:
-    """Return the share of the clearest one's nats that a further effect has to gain.
-
-    One beyond the list has no features: its own form is a guess, and leaves more over.
-    """
-    return GENERIC_SHARE if any(each.is_generic for each in there) else LEAST_SHARE
-
-
-def chosen(
-    said: Told | None, named: Step | None, plain: Step | None, guess: Step | None, of: Of
-) -> Step | None:
-    """Return what is added to a model, of all that might be; None where nothing is.
-
-    A listed effect without features has to gain more than the features that were told, and than the
-    form in which they go into the model. One beyond the list has to gain more than any listed one,
-    by more than the error of the difference, and to be no other form of what features name.
-
-    Parameters
-    ----------
-    said
-        What features say.
-    named
-        That as an effect in the model; None where nothing bears it out.
-    plain
-        What is listed, and has no features.
-    guess
-        What is beyond the list.
-    of
-        The recording, and the sample in which each step of the features begins.
-    """
-    listed = named
-    if plain is not None:
-        by_features = 0.0 if said is None else said.gain.nats
-        most = max(by_features, 0.0 if named is None else named.choice.best.nats)
-        listed = plain if plain.choice.best.nats > most else named
-    if guess is None:
-        return listed
-    is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
-    if said is not None:
-        is_ahead = is_ahead and not is_other_form(guess, said)
-        is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
-    return guess if is_ahead else listed
 
 
 def is_other_form(guess: Step | None, told: Told) -> bool:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from zfcal.diagnose.adding import further
 from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, has_noise
@@ -20,23 +21,20 @@ from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
+    Of,
     as_step,
-    chosen,
     gains_by_itself,
     in_all_minutes,
     in_all_phases,
     is_other_form,
     level_of,
-    may_guess,
     not_yet_there,
     outdoes,
     replicate_nats,
-    share_of,
     without_idle_ties,
 )
-from zfcal.diagnose.naming import Refit
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import GENERIC_SHARE, MOST_EFFECTS, Step
+from zfcal.diagnose.selection import MOST_EFFECTS, Step
 from zfcal.model.effects import Effect
 
 
@@ -60,61 +58,11 @@ def speed_look(case: Case, unfeatured: Unfeatured) -> Found:
             beside=(*given, *(each.candidate.effect for each in there)),
             number=len(there),
         )
-        further = _further(looks, unfeatured, there)
-        found = found.and_further(further)
-        if not further.steps:
+        added = further(looks, unfeatured, there)
+        found = found.and_further(dataclasses.replace(added, nats=0.0))
+        if not added.steps:
             break
     return found
-
-
-def _further(looks: _Looks, unfeatured: Unfeatured, there: Sequence[Refit]) -> Found:
-    """Return what is added to a model: one effect, or none.
-
-    Parameters
-    ----------
-    looks
-        At the model.
-    unfeatured
-        What has no features.
-    there
-        What was added before.
-    """
-    most = max((each.nats for each in there), default=0.0)
-    least = most * share_of(there)
-    guess = None
-    if may_guess(there, looks.case):
-        guess = unfeatured.beyond(looks.screen, on_speed=True, least=GENERIC_SHARE * most)
-        guess = looks.not_left_over(guess)
-    paces = looks.paces
-    plain = unfeatured.listed_one(
-        looks.screen, on_speed=True, least=least, has_features=paces.has_law
-    )
-    said = looks.ask()
-    told = said.told
-    step = None
-    if told is not None and told.gain.nats >= least:
-        step = _borne_out(looks, told, guess)
-    added = chosen(told, step, plain, guess, (paces.scene, paces.turns.at))
-    return Found(
-        steps=() if added is None else (added,),
-        suspicious=told is not None,
-        hidden=said.hidden,
-    )
-
-
-def _borne_out(looks: _Looks, told: Told, guess: Step | None) -> Step | None:
-    """Return what features name as an effect in the model; None where nothing bears it out.
-
-    Its form does, or an effect beyond the list that says the same in another form.
-    """
-    case, screen, paces = looks.case, looks.screen, looks.paces
-    apart, at = paces.apart(told.gain), paces.turns.at
-    if not (in_all_minutes(apart, at, paces.scene) and in_all_phases(apart, at, paces.scene)):
-        return None
-    step = as_step(case, screen, told)
-    if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
-        return step
-    return step if told.lead > BY_ITSELF else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,14 +91,47 @@ class _Looks:
         """Fits of features."""
         return Paces(screen=self.screen, beside=self.beside)
 
+    @property
+    def on_speed(self) -> bool:
+        """It is at speeds."""
+        return True
+
+    @property
+    def has_features(self) -> bool:
+        """Whether speeds of this recording have a law."""
+        return self.paces.has_law
+
+    @property
+    def may_doubt(self) -> bool:
+        """What noise makes of speeds was taken off."""
+        return True
+
+    @property
+    def of(self) -> Of:
+        """The recording, and the sample in which each move begins."""
+        return self.paces.scene, self.paces.turns.at
+
+    def borne_out(self, told: Told, guess: Step | None) -> Step | None:
+        """Return what features name as an effect in the model; None where nothing bears it out.
+
+        Its form does, or an effect beyond the list that says the same in another form; and it is
+        there all the time.
+        """
+        scene, at = self.of
+        apart = self.paces.apart(told.gain)
+        if not (in_all_minutes(apart, at, scene) and in_all_phases(apart, at, scene)):
+            return None
+        step = as_step(self.case, self.screen, told)
+        if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
+            return step
+        return step if told.lead > BY_ITSELF else None
+
     def not_left_over(self, guess: Step | None) -> Step | None:
         """Return an effect beyond the list, unless features of what is there gain as much."""
         if guess is None or not self.beside or not self.paces.has_law:
             return guess
-        paces = self.paces
-        left, n = paces.gained_beside
-        ahead = outdoes(guess, left, float(left.sum()) - n, (paces.scene, paces.turns.at))
-        return guess if ahead else None
+        left, n = self.paces.gained_beside
+        return guess if outdoes(guess, left, float(left.sum()) - n, self.of) else None
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""

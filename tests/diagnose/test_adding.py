@@ -1,0 +1,116 @@
+"""Of all that a law may lack one effect is added."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose import adding
+from zfcal.diagnose.adding import further
+from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.naming import Answer, Hidden, Told
+from zfcal.model.effects import find_effect
+
+ONE = Told(
+    gain=Gain(name="alignment", label="x", log_p=np.full(400, 0.1), n_strengths=1), p=0.0, ties=()
+)
+LATE = Hidden(name="reaction-delay", nats=25.0, noise_nats=40.0, noise_share=0.3)
+
+
+def step(name, nats=20.0, ahead=9.0):
+    """Return an effect that would be added, and leads any other by so many standard errors."""
+    effect = find_effect(name)
+    best = SimpleNamespace(
+        name=name, nats=nats, is_generic=effect.generic, over=lambda _other: ahead,
+        candidate=SimpleNamespace(effect=effect),
+    )  # fmt: skip
+    return SimpleNamespace(choice=SimpleNamespace(best=best))
+
+
+@pytest.fixture
+def added(tank, monkeypatch):
+    """Return what is added to a model, of what features, forms and scores say."""
+    monkeypatch.setattr(adding, "outdoes", lambda *_: True)
+
+    def of(
+        *, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, may_doubt=True
+    ):  # fmt: skip
+        wanted = {}
+
+        def said(kind, found):
+            def of_kind(_screen, *, on_speed, least, **_how):
+                assert not on_speed
+                wanted[kind] = least
+                return found
+
+            return of_kind
+
+        look = SimpleNamespace(
+            ask=lambda: Answer(told=told, hidden=(LATE,)),
+            screen=SimpleNamespace(scene=SimpleNamespace(arena=tank)), on_speed=False,
+            has_features=True, may_doubt=may_doubt, of=None, not_left_over=lambda guess: guess,
+            borne_out=lambda _told, _guess: step("alignment") if borne_out else None,
+        )  # fmt: skip
+        unfeatured = SimpleNamespace(beyond=said("guess", guess), listed_one=said("plain", plain))
+        made = further(look, unfeatured, [step(n, 100.0).choice.best for n in named], nats)
+        return [each.choice.best.name for each in made.steps], made, wanted
+
+    return of
+
+
+def test_what_features_name_is_added(added):
+    """With what it gains by features, and what noise hides."""
+    names, made, _ = added()
+    assert names == ["alignment"]
+    assert made.nats == pytest.approx(39.0)
+    assert made.hidden == (LATE,)
+    names, made, _ = added(told=None)
+    assert (names, made.suspicious) == ([], False)
+
+
+def test_what_nothing_bears_out_is_suspicious(added):
+    """And what gains too little beside another is nothing, or what is left over from it."""
+    names, made, _ = added(borne_out=False)
+    assert (names, made.suspicious, made.hidden) == ([], True, (LATE,))
+    assert not added(borne_out=False, may_doubt=False)[1].suspicious
+    assert added(named=["turning-bias"], nats=400.0)[0] == []
+
+
+def test_further_effects_gain_a_share_of_the_clearest(added):
+    """15 % of it; half beside one beyond the list, and one beyond the list beside others."""
+    rests = "freezing"
+    for named, least in ((["turning-bias"], 15.0), (["generic:heading:wall"], 50.0)):
+        _, _, wanted = added(named=named)
+        assert wanted == {"plain": pytest.approx(least)}
+    assert added(named=[rests])[2] == {"plain": 15.0, "guess": 50.0}
+    assert added(named=[rests], nats=200.0)[2] == {"plain": 30.0, "guess": 100.0}
+    assert added()[2] == {"plain": 0.0, "guess": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("told", "borne_out", "plain", "guess", "expected"),
+    [
+        (ONE, True, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (ONE, True, None, ("generic:heading:wall", 90.0, 1.9), "alignment"),
+        (ONE, True, None, ("generic:heading:neighbour-heading", 90.0), "alignment"),
+        (ONE, False, None, ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (ONE, False, None, ("generic:heading:neighbour-heading", 90.0), None),
+        (None, False, None, ("generic:heading:neighbour-heading", 90.0),
+         "generic:heading:neighbour-heading"),
+        (ONE, True, ("freezing", 50.0), None, "freezing"),
+        (ONE, True, ("freezing", 30.0), None, "alignment"),
+        (ONE, False, ("freezing", 30.0), None, None),
+        (None, False, ("freezing", 30.0), None, "freezing"),
+        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0), "generic:heading:wall"),
+        (None, False, ("freezing", 30.0), ("generic:heading:wall", 90.0, 1.9), "freezing"),
+    ],
+)  # fmt: skip
+def test_of_all_that_may_be_added_one_is(added, told, borne_out, plain, guess, expected):
+    """Features gain 39 nats, their form 20. What has none gains more than both; a guess clearly."""
+    names, _, _ = added(
+        told=told,
+        borne_out=borne_out,
+        plain=plain and step(*plain),
+        guess=guess and step(*guess),
+    )
+    assert names == ([] if expected is None else [expected])
