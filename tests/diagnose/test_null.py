@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -179,6 +180,17 @@ def test_replicates_do_not_depend_on_workers(record, chain_of, candidate):
     assert [number for number, _ in one] == [0, 1, 2, 3]
     assert len({z for _, z in one}) == 4
     assert told == [1, 2, 3, 4] * 2
+
+
+def test_a_replicate_that_is_kept_is_made_once_and_keeps_no_tables(record, chain_of, candidate):
+    """Of as many as asked for; what was worked out for one question goes with it."""
+    chain = replace(chain_of(record(5, minutes=2.0)), keeps=1)
+    first, again = chain.screen(0), chain.screen(0)
+    assert first.fitted is again.fitted
+    assert chain.screen(1).fitted is not chain.screen(1).fitted
+    first.ask(candidate("turning-bias"))
+    assert "_tables" in vars(first)
+    assert "_tables" not in {*vars(again), *vars(chain.screen(0))}
 
 
 def test_too_few_steps_are_refused(record, tank):

@@ -251,13 +251,15 @@ class Chain:
         return self.fitted.parameters if self.maker is None else self.maker
 
     def screen(self, number: int) -> Screen:
-        """Return replicate ``number``, fitted and ready to be asked."""
-        if number in self.kept:
-            return self.kept[number]
-        made = self._made(number)
+        """Return replicate ``number``, fitted and ready to be asked.
+
+        What it works out when it is asked goes with it: six of them would hold as much memory as
+        all the rest of a diagnosis.
+        """
+        made = self.kept[number] if number in self.kept else self._made(number)
         if number < self.keeps:
             self.kept[number] = made
-        return made
+        return replace(made)
 
     def _made(self, number: int) -> Screen:
         word = int(np.random.SeedSequence([self.seed, 7, number]).generate_state(1)[0])
