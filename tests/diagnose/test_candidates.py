@@ -40,6 +40,7 @@ def test_a_candidate_has_its_shape_and_a_strength(candidate):
         "leaning": 0.0,
         "turning": 0.0,
         "among": 0.0,
+        "reach_m": 0.15,
     }
     assert own.name == "alignment"
     assert own.notable == 20.0

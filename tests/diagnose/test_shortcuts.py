@@ -35,7 +35,8 @@ def packed_with(own, effect, arena, **given):
     here = own.scene.states[own.scene.turns.at[0], :, own.scene.turns.who[0]]
     # Leaning, where some headings may be drawn or turned instead: that is no factor.
     place = {"x_m": here[X] + 0.05, "y_m": here[Y], "drawn": 0.0}
-    place |= {"turning": 0.0} if effect.name == "turning-memory" else {}
+    place |= {"turning": 0.0} if effect.name in {"turning-memory", "turning-bias"} else {}
+    place |= {"into_zone": 0.0}
     middling |= {name: at for name, at in place.items() if name in middling} | given
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return pack([model], arena)
@@ -67,6 +68,16 @@ def test_a_factor_of_the_landing_zone_is_given_for_each(few, tank):
     np.testing.assert_allclose(waves[:, 1:], 0.0, atol=1e-12)
     assert np.ptp(zones, axis=1).max() == pytest.approx(2 * 0.7)
     np.testing.assert_allclose(np.exp(log_taken), at_taken, rtol=1e-9)
+
+
+def test_a_factor_of_one_zone_is_given_for_it(few, tank):
+    """Of landing in the third, against all others: by 1.4 in its log, wherever a step begins."""
+    own, scene = few
+    effect = find_effect("boldness")
+    packed = packed_with(own, effect, tank, heading_share=0.0, into_zone=3.0)
+    angle_sr = view_of(scene, own.fitted.parameters).angle_sr
+    _, zones, _ = harmonics(scene, packed, angle_sr, polynomial_of([effect]))
+    np.testing.assert_allclose(zones[:, 2:] - zones[:, :2], 1.4)
 
 
 def test_the_factors_differ_between_headings(few, tank):

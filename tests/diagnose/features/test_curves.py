@@ -82,6 +82,7 @@ def test_headings_are_drawn_by_the_law_of_the_model(law, there):
     assert (share[np.arange(len(p)), made.turns.landing - 1] > 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_it_and_effects_of_the_model_are_beside(record, tank, fish):
     """An effect that the model came with has no curve; who is named has one, also on speed none."""
     given = dataclasses.replace(fish, effects={"crowding": {"per_neighbour": 0.01}})
