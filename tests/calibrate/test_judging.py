@@ -207,6 +207,7 @@ def test_no_law_scores_more_than_the_true_one():
     assert own > wrong + 0.02
 
 
+@pytest.mark.slow
 def test_a_model_that_avoids_a_zone_is_not_ahead_for_it(group, models, starts):
     """In the mean over windows of the true model, whether a fish was in the corridor or not.
 

@@ -237,6 +237,7 @@ def test_fish_that_never_move_are_refused(ask, record):
         ask(dataclasses.replace(samples, xy_m=still))
 
 
+@pytest.mark.slow
 def test_a_constant_speed_is_no_trouble(ask, worlds):
     """Two fish on circles, each step 1 cm: every number that is told is one, or is missing."""
     angle = np.arange(1500) * 0.2
