@@ -34,8 +34,8 @@ bears it out and something is left."""
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
 
-
 Of: TypeAlias = tuple[Scene, NDArray[np.int64]]
+"""A recording, and the sample in which each step of features begins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
