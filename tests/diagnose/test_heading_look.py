@@ -365,6 +365,20 @@ def test_another_form_beyond_the_list_bears_a_name_out(monkeypatch):
     assert looks.borne_out(told, None) is None
 
 
+@pytest.mark.parametrize(("beside", "name"), [(True, "turning-bias"), (False, None)])
+def test_of_two_that_are_both_there_the_second_may_be_borne_out_first(monkeypatch, beside, name):
+    """The first is not there all the time; where one says what the other does neither is named."""
+    monkeypatch.setattr(looking, "as_step", lambda _case, _screen, told: step(told.gain.name, None))
+    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: True)
+    monkeypatch.setattr(looking, "_is_steady", lambda made: made.choice.best.name == "turning-bias")
+    monkeypatch.setattr(looking._Looks, "explains", lambda _self, _told: False)
+    monkeypatch.setattr(looking._Looks, "_stands", lambda *_: beside)
+    tie = gain("turning-bias", np.full(400, 0.1))
+    told = dataclasses.replace(ONE, lead=0.5, ties=(tie,))
+    made = looking._Looks(case=None, screen=None, beside=()).borne_out(told, None)
+    assert (made and made.choice.best.name) == name
+
+
 def test_a_name_that_no_form_bears_out_leads_all_others(monkeypatch):
     """However silent these are beside it: a name by chance leads by next to nothing."""
     monkeypatch.setattr(looking, "tell", lambda *_args, **_how: None)

@@ -164,15 +164,31 @@ class _Looks:
     def borne_out(self, told: Told, guess: Step | None) -> Step | None:
         """Return what features name as an effect in the model; None where nothing bears it out.
 
-        Its form does, or an effect beyond the list that says the same in another form.
+        Its form does, or an effect beyond the list that says the same in another form. Of two names
+        that tie both are there where each gains more than chance beside the other: then the second
+        may be borne out where the first is not yet.
         """
         step = as_step(self.case, self.screen, told)
         if step is None:
             return None
-        has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
-        if has_form and _is_steady(step):
+        if self._has_form(step, told, guess):
             return step
-        return step if told.lead > BY_ITSELF or self.explains(told) else None
+        if told.lead > BY_ITSELF or self.explains(told):
+            return step
+        first = find_effect(told.gain.name)
+        for tie in told.ties:
+            other, alone = find_effect(tie.name), dataclasses.replace(told, gain=tie, ties=())
+            if self._stands(other, first) and self._stands(first, other):
+                step = as_step(self.case, self.screen, alone)
+                if step is not None and self._has_form(step, alone, guess):
+                    return step
+        return None
+
+    @staticmethod
+    def _has_form(step: Step, told: Told, guess: Step | None) -> bool:
+        """Return whether a form bears a name out, and it is there all the time."""
+        has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
+        return has_form and _is_steady(step)
 
     def not_left_over(self, guess: Step | None) -> Step | None:
         """Return an effect beyond the list, unless what is there leaves it over.
