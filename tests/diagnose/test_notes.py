@@ -65,9 +65,9 @@ def test_replicates_are_counted_and_noise_is_told(noted):
 
 
 def test_what_noise_hides_is_untestable_at_this_noise(noted):
-    """With the noise at which as much would be told, in metres among the values."""
+    """With the noise at which it would be told, in metres among the values."""
     late = Hidden(name="reaction-delay", nats=25.0, noise_nats=40.0, noise_share=0.3)
     note = noted(noise_m=2e-3, hidden=[late])["noise"]
     assert "Untestable at this noise: reaction-delay. It gains 25 nats" in note.says
-    assert "noise may make 40; as much would be told at 0.6 mm" in note.says
+    assert "noise asks for 40 more than chance; it would be told at 0.6 mm" in note.says
     assert note.values["reaction-delay testable_at_m"] == pytest.approx(6e-4)

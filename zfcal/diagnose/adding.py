@@ -8,10 +8,11 @@ from typing import Protocol
 from zfcal.arena import Arena
 from zfcal.diagnose.beyond import Unfeatured, is_featured
 from zfcal.diagnose.features.naming import Answer, Told
-from zfcal.diagnose.looks import Found, Of, is_other_form, outdoes
+from zfcal.diagnose.looks import Found, is_other_form, outdoes
 from zfcal.diagnose.naming import SURE, Refit
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import GENERIC_SHARE, LEAST_SHARE, Step
+from zfcal.diagnose.steadiness import Of
 
 
 class Look(Protocol):
@@ -80,11 +81,12 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
     added = chosen(told, named, plain, guess, look.of)
     if added is None:
         return Found(suspicious=told is not None and look.may_doubt, hidden=said.hidden)
-    by_features = told is not None and added is named
+    if told is None or added is not named:
+        return Found(steps=(added,), hidden=said.hidden)
     return Found(
         steps=(added,),
-        nats=told.gain.nats if told is not None and by_features else 0.0,
-        without_noise=told is not None and by_features and told.gain.without_noise,
+        nats=told.gain.nats,
+        without_noise=told.gain.without_noise,
         hidden=said.hidden,
     )
 

@@ -15,11 +15,12 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, not_forms_of
 from zfcal.diagnose.case import QUICK_REPLICATES, Case, has_noise
-from zfcal.diagnose.confirming import MINUTES_S, has_pulses, holds, is_steady
+from zfcal.diagnose.confirming import holds
 from zfcal.diagnose.naming import SURE, Choice, Refit, refit
 from zfcal.diagnose.null import from_replicates, run_null, theory
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEAST_NATS, LEVEL, Asked, Best, Step, best_of
+from zfcal.diagnose.steadiness import MINUTES_S, has_pulses, is_steady
 from zfcal.model.effects import Effect
 
 _RIVALS = 3

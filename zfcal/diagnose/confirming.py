@@ -1,9 +1,8 @@
-"""Whether what was found holds on steps that it was not fitted to, and all the time.
+"""Whether what was found holds on steps that it was not fitted to.
 
 Blocks of 60 s alternate between two halves. Both models are fitted to one half and
-judged on the other, and the other way round. A listed effect is there all the time: one
-whose strength differs between minutes, or phases of a period, by more than its mean is another
-one. Beside individuals that differ an effect is there in more than one of them.
+judged on the other, and the other way round. Beside individuals that differ an effect is there in
+more than one of them.
 """
 
 from __future__ import annotations
@@ -14,16 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.findings import Note
-from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score, by_track
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import Step
 from zfcal.diagnose.speeds import held_out_gain
+from zfcal.diagnose.steadiness import judged_by
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import log_p_at, maximise
 from zfcal.model.fitted import MIN_STEPS, Fitted
@@ -38,15 +35,6 @@ _LEAST_VARIANCE = 1e-12
 
 _OF_OTHERS = 2.0
 """Standard errors that are left of an effect without the fish that asks for it most."""
-
-PHASES = 20
-"""Parts of the time from pulse to pulse."""
-
-MINUTES_S = 60.0
-"""Blocks of time in which an effect is to be of one strength."""
-
-WAVERS = 3e-3
-"""Chance at which the scores of blocks are no longer of one strength."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,20 +129,6 @@ def holds(step: Step, *, n_workers: int) -> bool:
     return told.holds
 
 
-def _lasts(candidate: Candidate) -> bool:
-    """Return whether an effect is one that cannot be there at times only.
-
-    Individuals and rests differ between blocks by nature, and effects beyond the list may have
-    their times.
-    """
-    return candidate.effect.in_any_steps and not candidate.effect.generic
-
-
-def _judged_by(score: Score, scene: Scene) -> Moves:
-    """Return the steps that an effect's score is of: all moves, or those with a turn."""
-    return scene.moves if score.candidate.effect.on_speed else scene.turns
-
-
 def _tells_apart(fitted: Fitted) -> bool:
     """Return whether individuals differ in a model."""
     return any(find_effect(name).by_trait for name in fitted.parameters.effects)
@@ -175,7 +149,7 @@ def is_shared(score: Score, scene: Scene) -> bool:
     """
     if not score.candidate.effect.in_any_steps:
         return True
-    track = _judged_by(score, scene).track
+    track = judged_by(score, scene).track
     sums, information = by_track(track, score.steps)
     total = float(sums.sum())
     others = information.sum() - information
@@ -190,66 +164,6 @@ def _of_speeds(step: Step) -> Confirmed:
         own = half_of(scene, scene.moves, which)
         gain[own] = held_out_gain(step.before, best.candidate, best.strength, ~own)[own]
     return _summary(gain)
-
-
-def is_steady(score: Score, scene: Scene, block_s: float) -> bool:
-    """Return whether the strength of an effect differs between blocks by less than its mean.
-
-    The spread of the strength is that of DerSimonian and Laird (1986, Controlled Clinical
-    Trials 7: 177-188).
-
-    Parameters
-    ----------
-    score
-        Of the effect in the model without it.
-    scene
-        Whose steps the score is of.
-    block_s
-        Length of a block.
-    """
-    if not _lasts(score.candidate):
-        return True
-    times_s = scene.time_s(_judged_by(score, scene))
-    return _one_strength(score.steps, times_s // block_s)
-
-
-def has_pulses(score: Score, scene: Scene) -> bool:
-    """Return whether an effect comes in pulses at regular times.
-
-    Scores of a steady effect are no white noise where few moments ask for it, and then have a
-    period as well; that its strength spreads by more than its mean over the phases is asked of it
-    in any case.
-
-    Parameters
-    ----------
-    score
-        Of the effect in the model without it.
-    scene
-        Whose steps the score is of.
-    """
-    if not _lasts(score.candidate):
-        return False
-    moves = _judged_by(score, scene)
-    series = np.bincount(moves.at, score.steps, len(scene.k)).astype(np.float64)
-    found = pulses(series[None], scene.dt_s)
-    if not found.tail <= WAVERS:
-        return False
-    phase = scene.time_s(moves) / found.period_s % 1
-    return not _one_strength(score.steps, phase * PHASES // 1)
-
-
-def _one_strength(steps: Floats, block: Floats) -> bool:
-    """Return whether blocks may have one strength, or spread by less than its mean."""
-    _, place = np.unique(block, return_inverse=True)
-    sums, information = np.bincount(place, weights=steps), np.bincount(place, weights=steps**2)
-    sums, information = sums[information > 0], information[information > 0]
-    if len(sums) < 2:
-        return True
-    total = float(information.sum())
-    mean = float(sums.sum()) / total
-    q, df = float(((sums - mean * information) ** 2 / information).sum()), len(sums) - 1
-    spread2 = (q - df) / (total - float((information**2).sum()) / total)
-    return bool(spread2 <= mean**2 or chdtrc(df, q) > WAVERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,9 +17,9 @@ from zfcal.diagnose.adding import further
 from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
-from zfcal.diagnose.confirming import MINUTES_S, has_pulses, is_steady
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.curves import curve_of
+from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
@@ -28,22 +28,21 @@ from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
-    Of,
     as_step,
     gains_by_itself,
-    in_all_minutes,
-    in_all_phases,
     is_other_form,
     level_of,
+    noise_of_features,
+    noise_of_form,
     not_yet_there,
     on_headings,
     outdoes,
-    replicate_nats,
     without_idle_ties,
 )
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import MOST_EFFECTS, Step
+from zfcal.diagnose.steadiness import MINUTES_S, Course, Of, has_pulses, is_steady
 from zfcal.model.effects import Effect, find_effect
 
 
@@ -184,10 +183,12 @@ class _Looks:
                     return step
         return None
 
-    @staticmethod
-    def _has_form(step: Step, told: Told, guess: Step | None) -> bool:
+    def _has_form(self, step: Step, told: Told, guess: Step | None) -> bool:
         """Return whether a form bears a name out, and it is there all the time."""
-        has_form = gains_by_itself(step.choice.best) or is_other_form(guess, told)
+        form = step.choice.best
+        is_noisy = self.laws[0].noise_m > 0 and not told.gain.without_noise
+        noise = noise_of_form(self.case, form) if is_noisy else NO_NOISE
+        has_form = gains_by_itself(form, noise) or is_other_form(guess, told)
         return has_form and _is_steady(step)
 
     def not_left_over(self, guess: Step | None) -> Step | None:
@@ -238,7 +239,7 @@ class _Looks:
         """Return what tells how much of a gain beside some effects noise of positions makes."""
         if not self.laws[0].noise_m > 0:
             return None
-        return lambda clear: _noise_nats(self.case, clear, beside)
+        return lambda clear: _noise_of(self.case, clear, beside)
 
 
 def curves_of(
@@ -275,25 +276,25 @@ def curves_of(
 def _is_steady(step: Step) -> bool:
     """Return whether an effect is there in all minutes, and not in pulses at regular times.
 
-    Its scores say so, or what it gains at each step less what it would gain if the fish drew from
-    the model all the time: that has mean zero in each minute, and no period. Neither is normal
-    where few moments ask for an effect: scores where they are far apart, gains where they are rare.
+    Its scores say so, or what it gains at each step beside what it would gain if the fish drew from
+    the model all the time. Neither is normal where few moments ask for an effect: scores where they
+    are far apart, gains where they are rare.
     """
     score, base = step.best.score, step.before
     gains, scene = heading_gains(step.choice.best.screen, base), base.scene
-    at, apart = gains.gain.at, gains.gain.values - gains.expected.values
-    in_time = is_steady(score, scene, MINUTES_S) or in_all_minutes(apart, at, scene)
-    return in_time and (not has_pulses(score, scene) or in_all_phases(apart, at, scene))
+    expected = gains.expected.values
+    own = Course(apart=gains.gain.values - expected, expected=expected, of=(scene, gains.gain.at))
+    in_time = is_steady(score, scene, MINUTES_S) or own.in_all_minutes
+    return in_time and (not has_pulses(score, scene) or own.in_all_phases)
 
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
     return Law(scene=screen.scene, fitted=screen.fitted, noise_m=noise_m, seed=case.question.seed)
 
 
-def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()) -> list[float]:
-    """Return what features may gain on one more replicate of the model: a bound by Student's t.
+def _noise_of(case: Case, clear: Sequence[Gain], beside: Sequence[Effect]) -> list[ByNoise]:
+    """Return what noise makes features gain: see `noise_of_features`.
 
-    Of all features that are asked one exceeds its bound by chance in 2 % of cases (Bonferroni).
     The model is that without the effects that were found; their features are fitted as well.
     """
     keys = {gain.key for gain in clear}
@@ -302,4 +303,4 @@ def _noise_nats(case: Case, clear: Sequence[Gain], beside: Sequence[Effect] = ()
         law = _law(case, other, noise_of(case.question))
         return gains_of(law, effects, kinds=keys, beside=beside)
 
-    return replicate_nats(case, clear, gains)
+    return noise_of_features(case, clear, gains)

@@ -5,27 +5,24 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import chdtrc, stdtrit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.candidates import Candidate, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
-from zfcal.diagnose.confirming import MINUTES_S, PHASES, WAVERS
+from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise, by_noise
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Hidden, Told
 from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
-from zfcal.diagnose.pulses import pulses
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
+from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
-from zfcal.model.scene import Scene
+from zfcal.model.extended import maximise
 
 BY_ITSELF = 4.0
 """Standard errors by which features of a name must lead those of all others where no form of ours
@@ -33,9 +30,6 @@ bears it out and something is left."""
 
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
-
-Of: TypeAlias = tuple[Scene, NDArray[np.int64]]
-"""A recording, and the sample in which each step of features begins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -141,10 +135,10 @@ def without_idle_ties(told: Told, stands: Callable[[Effect, Effect], bool]) -> T
     return dataclasses.replace(told, ties=tuple(kept))
 
 
-def replicate_nats(
+def noise_of_features(
     case: Case, clear: Sequence[Gain], gains: Callable[[Screen, list[Effect]], Iterable[Gain]]
-) -> list[float]:
-    """Return what features may gain on one more replicate of the model, at most: see `bound`.
+) -> list[ByNoise]:
+    """Return what noise makes features gain, by replicates of the model.
 
     Parameters
     ----------
@@ -165,7 +159,8 @@ def replicate_nats(
         return [most.get(key, 0.0) for key in keys]
 
     n_workers = case.question.n_workers
-    return list(bound(np.array(run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers))))
+    rows = run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers)
+    return by_noise(np.array(rows), [gain.n_strengths for gain in clear])
 
 
 def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
@@ -202,63 +197,47 @@ def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
     )
 
 
-def gains_by_itself(form: Refit) -> bool:
+def gains_by_itself(form: Refit, noise: ByNoise = NO_NOISE) -> bool:
     """Return whether the form that goes into the model gains more than chance by itself.
 
     What is no effect of the list answers to features of several names a little, and to none of
     their forms. On held-out steps a form is not asked: that would halve the power.
-    """
-    return bool(chdtrc(form.n_free, 2 * max(float(form.gain.sum()), 0.0)) < LEVEL)
-
-
-def in_all_minutes(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:
-    """Return whether something of mean zero in all has mean zero in each minute.
 
     Parameters
     ----------
-    apart : ndarray, shape (step,)
-        What an effect gains at each step, less what it would gain if it were there all the time.
-    at : ndarray of int64, shape (step,)
-        Sample in which each step begins.
-    scene
-        Of the recording.
+    form
+        In the model.
+    noise
+        What noise of positions alone makes it gain.
     """
-    minute = (scene.k[at] * scene.dt_s // MINUTES_S).astype(np.int64)
-    return _alike(apart, minute - minute.min(initial=0))
+    return noise.chance(float(form.gain.sum()), form.n_free) < LEVEL
 
 
-def in_all_phases(apart: Floats, at: NDArray[np.int64], scene: Scene) -> bool:
-    """Return whether it has mean zero over the phases of its period, if it has one.
+def noise_of_form(case: Case, form: Refit) -> ByNoise:
+    """Return what noise makes a form gain, by replicates of the model.
+
+    A form is fitted by the law of the measured positions, which is not that of what was measured
+    where these err: a response that is a little late gains a hundred nats from half a millimetre.
 
     Parameters
     ----------
-    apart, at, scene
-        As of `in_all_minutes`.
+    case
+        The question, whose model makes the replicates.
+    form
+        As it would go into the model.
     """
-    series = np.bincount(at, apart, len(scene.k)).astype(np.float64)
-    found = pulses(series[None], scene.dt_s)
-    if not found.tail <= WAVERS:
-        return True
-    phase = (at * scene.dt_s / found.period_s % 1 * PHASES).astype(np.int64)
-    return _alike(apart, phase)
 
+    def ask(_number: int, other: Screen) -> list[float]:
+        # A replicate's base was fitted a few rounds from the recording's: what is left of the way
+        # would count as the form's.
+        own = other.fitted
+        fitted = maximise(other.scene, own.parameters, free=own.free, start=own.x)
+        settled = Screen(scene=other.scene, fitted=fitted)
+        return [float(refit(settled, settled.ask(form.candidate)).gain.sum())]
 
-def _alike(apart: Floats, part: NDArray[np.int64]) -> bool:
-    """Return whether steps have mean zero in all parts of a recording, by a chi-square."""
-    sums, squares = np.bincount(part, apart), np.bincount(part, apart**2)
-    told = squares > 0
-    ratio = float((sums[told] ** 2 / squares[told]).sum())
-    return bool(chdtrc(int(told.sum()), ratio) > WAVERS)
-
-
-def bound(rows: Floats) -> Floats:
-    """Return what one more row, shape (row, feature), exceeds anywhere in 2 % of cases.
-
-    By Student's t for each feature, and Bonferroni's inequality for all of them.
-    """
-    n, n_features = rows.shape
-    times = stdtrit(n - 1, 1 - LEVEL / n_features) * np.sqrt(1 + 1 / n)
-    return np.maximum(rows.mean(axis=0) + times * rows.std(axis=0, ddof=1), 0.0)
+    n_workers = case.question.n_workers
+    rows = run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers)
+    return by_noise(np.array(rows), [form.n_free])[0]
 
 
 def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:

@@ -82,8 +82,8 @@ def noise_note(question: Question, hidden: Sequence[Hidden]) -> Note:
     for each in hidden:
         at_mm = each.noise_share * noise_mm
         text += (
-            f" Untestable at this noise: {each.name}. It gains {each.nats:.0f} nats, and noise may "
-            f"make {each.noise_nats:.0f}; as much would be told at {at_mm:.1g} mm."
+            f" Untestable at this noise: {each.name}. It gains {each.nats:.0f} nats, and noise "
+            f"asks for {each.noise_nats:.0f} more than chance; it would be told at {at_mm:.1g} mm."
         )
         values[f"{each.name} testable_at_m"] = at_mm / 1000
     return Note(name="noise", says=text, values=values)

@@ -15,26 +15,25 @@ from zfcal.diagnose.adding import further
 from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, has_noise
+from zfcal.diagnose.features.false_gains import ByNoise
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Answer, Told, answer, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
-    Of,
     as_step,
     gains_by_itself,
-    in_all_minutes,
-    in_all_phases,
     is_other_form,
     level_of,
+    noise_of_features,
     not_yet_there,
     outdoes,
-    replicate_nats,
     without_idle_ties,
 )
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import MOST_EFFECTS, Step
+from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect
 
 
@@ -117,9 +116,8 @@ class _Looks:
         Its form does, or an effect beyond the list that says the same in another form; and it is
         there all the time.
         """
-        scene, at = self.of
-        apart = self.paces.apart(told.gain)
-        if not (in_all_minutes(apart, at, scene) and in_all_phases(apart, at, scene)):
+        course = self.paces.course(told.gain)
+        if not (course.in_all_minutes and course.in_all_phases):
             return None
         step = as_step(self.case, self.screen, told)
         if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
@@ -135,7 +133,7 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        noise = self._noise_nats if has_noise(self.case.question) else None
+        noise = self._noise if has_noise(self.case.question) else None
         gains = pace_gains(self.paces, not_yet_there(self.case, self.beside))
         said = answer(gains, noise, level=level_of(self.number))
         if said.told is None:
@@ -145,10 +143,10 @@ class _Looks:
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         return tell(pace_gains(self.paces.and_beside(beside), [effect])) is not None
 
-    def _noise_nats(self, clear: Sequence[Gain]) -> list[float]:
-        """Return what features may gain on one more replicate of the model, at most."""
+    def _noise(self, clear: Sequence[Gain]) -> list[ByNoise]:
+        """Return what noise makes features gain."""
 
         def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
             return pace_gains(Paces(screen=other, beside=self.beside), effects)
 
-        return replicate_nats(self.case, clear, gains)
+        return noise_of_features(self.case, clear, gains)

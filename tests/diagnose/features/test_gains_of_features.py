@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import logit
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
 from zfcal.diagnose.features.climbing import climb
+from zfcal.diagnose.features.false_gains import ByNoise
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import answer, best_by_name, tell
@@ -130,9 +131,9 @@ def test_a_gain_by_hand():
     own = gain("x", [3.0, 2.0], n_strengths=2)
     assert own.nats == pytest.approx(3.0)
     assert own.p == pytest.approx(math.exp(-5))
-    noisy = replace(own, noise_nats=2.0)
-    assert (noisy.nats, noisy.p) == (pytest.approx(1.0), pytest.approx(math.exp(-3)))
-    assert replace(own, noise_nats=9.0).p == 1.0
+    noisy = replace(own, noise=ByNoise(mean_nats=3.0))
+    assert noisy.nats == pytest.approx(1.0)
+    assert noisy.p == pytest.approx(ncx2.sf(10, 2, 4))
 
 
 def test_features_are_asked_by_kind(nothing):
@@ -187,29 +188,27 @@ def test_what_noise_gains_is_taken_off():
 
     def noise(clear):
         asked.extend(each.name for each in clear)
-        return [1e3 if each.name == "a" else 0.0 for each in clear]
+        return [ByNoise(mean_nats=1e3 if each.name == "a" else 0.5) for each in clear]
 
     told = tell([gain("a", 2 * STEPS), gain("b", STEPS), gain("c", 0 * STEPS)], noise)
     assert (asked, told.gain.name) == (["a", "b"], "b")
 
 
 def test_what_noise_hides_is_said_with_the_noise_at_which_it_would_show():
-    """Of 30 nats of one strength noise may make 40; of a tried one 6.6 are needed at 2 % of ten."""
+    """Of 30 nats of one strength noise makes 40; without noise so few are needed at 2 % of ten."""
     late = Gain(name="reaction-delay", label="x", log_p=np.full(300, 0.1), n_strengths=1)
     others = [
         Gain(name=f"name {k}", label="x", log_p=np.zeros(300), n_strengths=1) for k in range(9)
     ]
-    said = answer([late, *others], lambda clear: [40.0 for _ in clear])
+    noise = ByNoise(mean_nats=40.0)
+    said = answer([late, *others], lambda clear: [noise for _ in clear])
     assert said.told is None
     (hidden,) = said.hidden
-    assert (hidden.name, hidden.nats, hidden.noise_nats) == (
-        "reaction-delay",
-        pytest.approx(29),
-        40,
-    )
-    needed = chi2.isf(0.02 / 10, 1) / 2
-    assert hidden.noise_share == pytest.approx((30 - needed) / 40)
-    told = answer([late, *others], lambda clear: [1.0 for _ in clear])
+    needed, with_noise = chi2.isf(0.02 / 10, 1) / 2, noise.most(1, 0.02 / 10)
+    assert (hidden.name, hidden.nats) == ("reaction-delay", pytest.approx(29))
+    assert hidden.noise_nats == pytest.approx(with_noise - needed)
+    assert hidden.noise_share == pytest.approx((30 - needed) / (with_noise - needed))
+    told = answer([late, *others], lambda clear: [ByNoise(mean_nats=1.0) for _ in clear])
     assert (told.told.gain.name, told.hidden) == ("reaction-delay", ())
     assert answer([late, *others]).hidden == ()
 
@@ -218,10 +217,25 @@ def test_a_name_is_told_by_what_noise_leaves_of_its_gain():
     """The one that gains most falls behind, and the chance that is told is that of what is left."""
     told = tell(
         [gain("a", 2 * STEPS), gain("b", 1.5 * STEPS)],
-        lambda clear: [1.5 * STEPS.sum() if each.name == "a" else 1.0 for each in clear],
+        lambda clear: [
+            ByNoise(mean_nats=1.5 * STEPS.sum() if each.name == "a" else 1.0) for each in clear
+        ],
     )
     assert told.gain.name == "b"
-    assert told.p == pytest.approx(2 * replace(gain("b", 1.5 * STEPS), noise_nats=1.0).p)
+    noisy = replace(gain("b", 1.5 * STEPS), noise=ByNoise(mean_nats=1.0))
+    assert told.p == pytest.approx(2 * noisy.p)
+
+
+def test_a_name_is_compared_with_others_by_what_noise_leaves_of_theirs():
+    """One that gained more before noise was taken off is not ahead of it."""
+    told = tell(
+        [gain("a", 2 * STEPS), gain("b", STEPS)],
+        lambda clear: [
+            ByNoise(mean_nats=2 * STEPS.sum() if each.name == "a" else 0.5) for each in clear
+        ],
+    )
+    assert told.gain.name == "b"
+    assert told.lead > 0
 
 
 def test_chance_tells_a_name_as_seldom_as_the_level_says():

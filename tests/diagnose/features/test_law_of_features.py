@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from zfcal.diagnose.features.draws import Steps, _recent_turn, draw_of, turn
+from zfcal.diagnose.features.draws import Steps, _recent_turn, draw_of, errors_of, turn
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
@@ -240,3 +240,15 @@ def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
     by_hand = law.log_here + (leaning * law.turns.taken).sum(axis=1)
     by_hand += leaving * (law.turns.landing == law.between)
     np.testing.assert_allclose(once.log_here, by_hand)
+
+
+def test_errors_of_draws_are_those_of_a_latin_hypercube(screen):
+    """Each coordinate has the same parts of a normal law of unit variance, and no other's order."""
+    scene = screen(5).scene
+    errors = errors_of(8, scene, np.random.default_rng(3))
+    assert errors.shape == (8, len(scene.k), scene.states.shape[2], 2)
+    np.testing.assert_allclose(errors.mean(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose((errors**2).mean(axis=0), 1)
+    parts = np.sort(errors.reshape(8, -1), axis=0)
+    np.testing.assert_allclose(parts, np.repeat(parts[:, :1], parts.shape[1], axis=1))
+    assert abs((errors[..., 0] * errors[..., 1]).mean()) < 0.01

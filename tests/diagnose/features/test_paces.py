@@ -7,7 +7,6 @@ import pytest
 
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
-from zfcal.diagnose.looks import in_all_minutes
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.kernels.state import SPEED
@@ -197,9 +196,9 @@ def test_what_comes_and_goes_is_not_there_in_all_minutes(nothing, changed):
     for paces, steady in ((always, True), (sometimes, False)):
         told = tell(pace_gains(paces, ALL))
         assert told.gain.name == "speed-matching"
-        apart = paces.apart(told.gain)
-        assert abs(apart.sum()) < 0.01 * np.abs(apart).sum()
-        assert in_all_minutes(apart, paces.turns.at, paces.scene) is steady
+        course = paces.course(told.gain)
+        assert abs(course.apart.sum()) < 0.01 * np.abs(course.apart).sum()
+        assert course.in_all_minutes is steady
 
 
 def test_who_is_known_for_a_short_time_has_no_past(nothing):

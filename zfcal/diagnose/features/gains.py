@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc, expit, logit
+from scipy.special import expit, logit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
+from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.law import Columns, Law
 from zfcal.model.extended import LAPSE
@@ -62,7 +63,7 @@ class Gain:
         Features of which this one was the best.
     kind
         What these are called; empty where it is the only one.
-    noise_nats
+    noise
         What noise of positions alone makes it gain.
     without_noise
         Whether it gains that by the law of exact positions.
@@ -74,7 +75,7 @@ class Gain:
     n_strengths: int
     n_tried: int = 1
     kind: str = ""
-    noise_nats: float = 0.0
+    noise: ByNoise = NO_NOISE
     without_noise: bool = False
 
     @property
@@ -85,13 +86,14 @@ class Gain:
     @property
     def nats(self) -> float:
         """Log likelihood gained, less what noise and as many idle strengths would (Akaike 1974)."""
-        return float(self.log_p.sum()) - self.noise_nats - self.n_strengths
+        more = self.noise.more(self.n_strengths)
+        return float(self.log_p.sum()) - more - self.n_strengths
 
     @property
     def p(self) -> float:
-        """Chance of such a gain where nothing is missing (Wilks 1938)."""
-        ratio = 2 * max(float(self.log_p.sum()) - self.noise_nats, 0.0)
-        return float(min(1.0, self.n_tried * chdtrc(self.n_strengths, ratio)))
+        """Chance of such a gain where nothing is missing."""
+        chance = self.noise.chance(float(self.log_p.sum()), self.n_strengths)
+        return min(1.0, self.n_tried * chance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import i0e
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, turn
+from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of, turn
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.features import Component, Turned
@@ -191,8 +191,8 @@ class Law:
         )
         if not self.noise_m > 0:
             return (draw_of(steps, self.scene.states, self.fitted.view),)
-        random = np.random.default_rng([self.seed, 7])
-        return tuple(drawn(steps, self.noise_m, random) for _ in range(self.n_draws))
+        errors = errors_of(self.n_draws, self.scene, np.random.default_rng([self.seed, 7]))
+        return tuple(drawn(steps, self.noise_m * each) for each in errors)
 
     @cached_property
     def _weights(self) -> list[Floats]:

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from scipy.special import chdtri
-
+from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.selection import LEVEL
@@ -15,8 +14,8 @@ from zfcal.diagnose.selection import LEVEL
 _HELD_AGAINST_NOISE = 3
 """Names, those that gain most: the others have no chance to be the best."""
 
-Noise = Callable[[Sequence[Gain]], Sequence[float]]
-"""Of some gains: what noise of positions alone makes each of these features gain, in nats."""
+Noise = Callable[[Sequence[Gain]], Sequence[ByNoise]]
+"""Of some gains: what noise of positions alone makes each of these features gain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,9 +51,9 @@ class Hidden:
     nats
         What its best feature gains.
     noise_nats
-        What noise alone may make it gain.
+        That it has to gain more than by exact positions.
     noise_share
-        Share of this noise at which as much would be told, if what noise makes goes by its size.
+        Share of this noise at which it would be told, if what noise makes goes by its size.
     """
 
     name: str
@@ -114,8 +113,9 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
         doubted = [g for g in clear if g.name in ahead and not g.without_noise]
         known = zip(doubted, noise(doubted) if doubted else (), strict=True)
         held = [gain for gain in clear if gain.without_noise and gain.name in ahead]
-        held += [replace(gain, noise_nats=nats) for gain, nats in known]
+        held += [replace(gain, noise=own) for gain, own in known]
         clear = beyond_chance(held)
+        gains = [*held, *(gain for gain in gains if gain.name not in ahead)]
         stand = {gain.name for gain in clear}
         lost = best_by_name([gain for gain in held if gain.name not in stand])
         hidden = tuple(_hidden(gain, level / n_tried) for gain in lost)
@@ -132,13 +132,13 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
 
 
 def _hidden(gain: Gain, level: float) -> Hidden:
-    raw = float(gain.log_p.sum())
-    needed = float(chdtri(gain.n_strengths, level / gain.n_tried)) / 2
-    share = (raw - needed) / gain.noise_nats if gain.noise_nats > 0 else 1.0
+    raw, n = float(gain.log_p.sum()), gain.n_strengths
+    exact, noisy = (noise.most(n, level / gain.n_tried) for noise in (NO_NOISE, gain.noise))
+    share = (raw - exact) / (noisy - exact) if noisy > exact else 1.0
     return Hidden(
         name=gain.name,
-        nats=raw - gain.n_strengths,
-        noise_nats=gain.noise_nats,
+        nats=raw - n,
+        noise_nats=noisy - exact,
         noise_share=min(max(share, 0.0), 1.0),
     )
 

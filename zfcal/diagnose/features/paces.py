@@ -23,6 +23,7 @@ from scipy.stats import rankdata
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.steadiness import Course
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.features import AWAY_M
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
@@ -182,15 +183,13 @@ class Paces:
         made = _normal_gain(self._left, self._left - change)
         return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
 
-    def apart(self, gain: Gain) -> Floats:
-        """Return what a feature asks for at each step, less what it would if it were all there.
-
-        Of mean zero where it is there all the time, shape (move,).
-        """
+    def course(self, gain: Gain) -> Course:
+        """Return what a feature gains at each move, and what it would if it were there."""
         effect = find_effect(gain.name)
         feature = next(each for each in effect.paces if each.label == gain.label)
         change, _ = self._changed(feature)
-        return change * (self._left - change)
+        apart = change * (self._left - change)
+        return Course(apart=apart, expected=change**2 / 2, of=(self.scene, self.turns.at))
 
     def and_beside(self, effect: Effect) -> Paces:
         """Return fits in which one more effect is there."""
