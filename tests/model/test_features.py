@@ -5,10 +5,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.features import AWAY_M, LAGS, Component, Leaving, OneOf, Seen, Tilt, Turned, hats
+from zfcal.model.features import (
+    AWAY_M,
+    LAGS,
+    Component,
+    Leaving,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    hats,
+    left_of,
+)
 
 N, OTHERS = 6, 3
 
@@ -54,6 +66,7 @@ def seen():
         track=np.arange(N, dtype=np.int32) % 3,
         own_speed_m_s=rng.uniform(0.02, 0.2, N),
         last_turn_rad=rng.normal(0, 0.3, N),
+        ago_heading=np.stack([ways(N) for _ in LAGS]),
         recent_turn_rad=rng.normal(0, 0.3, N),
         time=np.linspace(0, 1, N),
         left_s=rng.uniform(0, 9, N),
@@ -172,17 +185,81 @@ def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
 def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
     """There the base forgets the heading, and a heading before is but the present one."""
     unknown = dataclasses.replace(seen, last_turn_rad=np.array([0.0, 0.2] * (N // 2)))
-    drawn, _, leaning = features_of("turning-memory", arena)[3:]
+    drawn, _, leaning = features_of("turning-memory", arena)[3:6]
     expected = (~seen.follows_walls) & (unknown.last_turn_rad != 0)
     np.testing.assert_array_equal(drawn.weights(unknown)[:, 0, 0], expected)
     np.testing.assert_array_equal(leaning.vectors(unknown)[:, 0].any(axis=1), expected)
+
+
+def labelled(name, label, arena):
+    """Return the feature of an effect that has a label, of several ones as well."""
+    found = find_effect(name).features(arena)
+    flat = [one for each in found for one in (each.features if isinstance(each, OneOf) else [each])]
+    return next(each for each in flat if each.label == label)
+
+
+def test_earlier_headings_are_remembered_by_what_they_have_aside(arena, seen):
+    """Along the present heading there is nothing; along walls only what runs along them counts."""
+    memory = labelled("turning-memory", "leaning to earlier headings", arena).vectors(seen)
+    assert memory.shape == (N, len(LAGS), 2)
+    np.testing.assert_allclose((memory * seen.own_heading[:, None]).sum(axis=-1), 0, atol=1e-12)
+    whole = labelled("turning-memory", "leaning to earlier headings, along walls too", arena)
+    np.testing.assert_array_equal(whole.vectors(seen)[:, 0], seen.ago_heading[1])
+    along = labelled("wall-persistence", "leaning, by earlier headings", arena).vectors(seen)
+    assert not along[~seen.follows_walls].any()
+    across = left_of(seen.along_wall)
+    np.testing.assert_allclose((along * across[:, None]).sum(axis=-1), 0, atol=1e-12)
+    assert np.abs(along[seen.follows_walls]).min() > 0
+
+
+def test_headings_are_drawn_to_an_angle_of_the_own_one(arena, seen):
+    """To the left or the right, everywhere or off the walls."""
+    left = labelled("turning-bias", "drawn to 30 degrees, everywhere", arena)
+    right = labelled("turning-bias", "drawn to -60 degrees, off the walls", arena)
+    cosine = (left.toward(seen)[:, 0] * seen.own_heading).sum(axis=-1)
+    np.testing.assert_allclose(cosine, np.cos(np.pi / 6))
+    sine = (right.toward(seen)[:, 0] * left_of(seen.own_heading)).sum(axis=-1)
+    np.testing.assert_allclose(sine, -np.sin(np.pi / 3))
+    np.testing.assert_array_equal(left.weights(seen), 1)
+    np.testing.assert_array_equal(right.weights(seen)[:, 0, 0], ~seen.follows_walls)
+
+
+def test_a_drift_may_be_there_off_the_walls_alone(arena, seen):
+    """In a direction, and as a leaning."""
+    north = labelled("directional-drift", "drawn to 90 degrees, off the walls", arena)
+    np.testing.assert_allclose(north.toward(seen)[:, 0], [[0.0, 1.0]] * N, atol=1e-12)
+    np.testing.assert_array_equal(north.weights(seen)[:, 0, 0], ~seen.follows_walls)
+    leaning = labelled("directional-drift", "leaning, off the walls", arena)
+    assert not leaning.vectors(seen)[seen.follows_walls].any()
+
+
+def test_each_fish_is_drawn_to_the_way_out_near_to_it(arena, seen):
+    """Between the rooms, and far from there, no fish is."""
+    drawn = labelled("boldness", "drawn to the way out, by who", arena)
+    (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
+    away_m = shapely.distance(between, shapely.points(seen.xy_m))
+    weights = drawn.weights(seen)[:, 0]
+    assert weights.shape == (N, len(np.unique(seen.track)))
+    np.testing.assert_allclose(weights.sum(axis=1), np.clip(1 - away_m / 0.2, 0, 1))
+    inside = dataclasses.replace(seen, way_out=np.zeros((N, 2)))
+    assert not drawn.weights(inside).any()
+
+
+def test_responses_are_late_by_a_share_of_their_own_at_each_distance(arena, seen):
+    """As much is taken from the present response as is put to where the other was."""
+    late = labelled("reaction-delay", "3 steps, by distance", arena)
+    np.testing.assert_array_equal(late.toward(seen), seen.ago_toward[LAGS.index(3)])
+    weights = late.weights(seen)
+    np.testing.assert_allclose(weights.sum(axis=-1), seen.attention)
+    np.testing.assert_array_equal(late.instead(seen), weights)
 
 
 def test_a_late_response_takes_from_the_present_one(arena, seen):
     """At a strength of one all attention goes to where the others were, or the fish itself too."""
     late = features_of("reaction-delay", arena)
     for each in late:
-        assert each.instead
+        taken = each.instead(seen)
+        np.testing.assert_allclose(taken.sum(axis=-1), seen.attention)
         assert each.low == 0.0
         # Three tenths of a step are three times one.
         assert each.high == (3.0 if each.label == "a tenth of a step" else 1.0)

@@ -71,6 +71,8 @@ class Seen:
         Of the step itself, which is given.
     last_turn_rad : ndarray, shape (step,)
         To the left; 0 where it is not known.
+    ago_heading : ndarray, shape (lag, step, 2)
+        Own headings `LAGS` steps before; zeros where it is not known.
     recent_turn_rad : ndarray, shape (step,)
         Mean of the last turns, the later the more it counts; wide ones count as 1.2.
     time : ndarray, shape (step,)
@@ -110,6 +112,7 @@ class Seen:
     track: NDArray[np.int32]
     own_speed_m_s: Floats
     last_turn_rad: Floats
+    ago_heading: Floats
     recent_turn_rad: Floats
     time: Floats
     left_s: Floats
@@ -171,7 +174,7 @@ class Component:
     kappa
         Concentration about a source; ``own`` or ``neighbours``: as the base law has it there.
     instead
-        Whether it takes the place of as large a share of what the others' present places draw.
+        Weights of what it takes the place of: of the directions to where the others are now.
     low, high
         Bounds of the strengths.
     along
@@ -182,7 +185,7 @@ class Component:
     toward: Weights | Literal["toward", "bearing", "heading"]
     weights: Weights
     kappa: float | Literal["own", "neighbours"] = "neighbours"
-    instead: bool = False
+    instead: Weights | None = None
     low: float = 0.0
     high: float | None = None
     along: Along | None = None
@@ -318,6 +321,17 @@ def aside_of(seen: Seen, toward: Floats) -> Floats:
     own = seen.own_heading[:, None]
     sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
     return np.where(seen.follows_walls[:, None], 0.0, sine)
+
+
+def left_of(ways: Floats) -> Floats:
+    """Return unit vectors turned to the left by a right angle, shape (..., 2)."""
+    return np.stack([-ways[..., 1], ways[..., 0]], axis=-1)
+
+
+def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
+    """Return unit vectors turned to the left by an angle, shape (..., 2)."""
+    c, s = np.cos(angle_rad)[..., None], np.sin(angle_rad)[..., None]
+    return np.asarray(c * ways + s * left_of(ways))
 
 
 def only(weights: Floats) -> Floats:

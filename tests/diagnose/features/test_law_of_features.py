@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
-from zfcal.diagnose.features.draws import Steps, _recent_turn, draw_of, errors_of, turn
+from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.features import Component, Turned
+from zfcal.model.features import LAGS, Component, Turned, turned_by
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -175,9 +175,9 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     angle, scene = 0.7, law.scene
     states = scene.states.copy()
     for x, y in ((X, Y), (HX, HY), (PAST_HX, PAST_HY), (TAU_X, TAU_Y)):
-        way = turn(np.stack([scene.states[:, x], scene.states[:, y]], axis=-1), angle)
+        way = turned_by(np.stack([scene.states[:, x], scene.states[:, y]], axis=-1), angle)
         states[:, x], states[:, y] = way[..., 0], way[..., 1]
-    view = dataclasses.replace(law.fitted.view, toward=turn(law.fitted.view.toward, angle))
+    view = dataclasses.replace(law.fitted.view, toward=turned_by(law.fitted.view.toward, angle))
     steps = Steps(
         scene=scene, parameters=law.fitted.parameters, rows=law.rows, turns=law.turns,
         follows=law.follows, alpha=law.alpha,
@@ -252,3 +252,20 @@ def test_errors_of_draws_are_those_of_a_latin_hypercube(screen):
     parts = np.sort(errors.reshape(8, -1), axis=0)
     np.testing.assert_allclose(parts, np.repeat(parts[:, :1], parts.shape[1], axis=1))
     assert abs((errors[..., 0] * errors[..., 1]).mean()) < 0.01
+
+
+def test_headings_of_steps_before_are_known_up_to_a_gap(base):
+    """The last step's is the heading before; before a gap, and before the first sample, none is."""
+    scene, fitted = base
+    law = Law(scene=scene, fitted=fitted)
+    seen, at, who = law.draws[0].seen, law.turns.at, law.turns.who
+    then = scene.states[np.maximum(at - 1, 0), :, who][:, [HX, HY]]
+    known = at >= 1
+    np.testing.assert_array_equal(seen.ago_heading[0][known], np.nan_to_num(then[known]))
+    gone = scene.states.copy()
+    gone[20, ZONE] = 0
+    found = _ago_heading(gone, np.array([22, 22, 25]), np.array([0, 1, 0]))
+    assert found[LAGS.index(1)].any(axis=1).all()
+    assert not found[LAGS.index(2), :2].any()
+    assert found[LAGS.index(4), 2].any()
+    assert not found[LAGS.index(5), 2].any()

@@ -12,7 +12,7 @@ from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
 from zfcal.model.extended import without_effects
-from zfcal.model.features import AWAY_M, LAGS, Seen
+from zfcal.model.features import AWAY_M, LAGS, Seen, turned_by
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
@@ -100,13 +100,6 @@ class Draw:
     angle_sr: Floats
 
 
-def turn(vectors: Floats, angle: Floats | float) -> Floats:
-    """Return vectors turned to the left, shape (step, source, 2)."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
-
-
 def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
     """Return errors of all positions, of unit variance, shape (draw, sample, agent, 2).
 
@@ -186,14 +179,14 @@ def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
     base = np.where(steps.follows[:, None, None], modes, single)
     if len(view.spin):
         spin = view.spin[steps.rows]
-        base = turn(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
+        base = turned_by(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
     toward, angle = view.toward[steps.rows], view.angle_sr[steps.rows]
     if not back.any():
         return Draw(seen=seen, base=base, toward=toward, angle_sr=angle)
     return Draw(
         seen=_turned_back(seen, back),
-        base=turn(base, back[:, None]),
-        toward=turn(toward, back[:, None]),
+        base=turned_by(base, back[:, None]),
+        toward=turned_by(toward, back[:, None]),
         angle_sr=angle,
     )
 
@@ -274,11 +267,25 @@ def _seen(
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
         last_turn_rad=turned,
+        ago_heading=_ago_heading(states, at, turns.who),
         recent_turn_rad=_recent_turn(states, at, turns.who),
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
     )
+
+
+def _ago_heading(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
+    """Return own headings so many steps before, shape (lag, step, 2); zeros before a gap."""
+    made = np.zeros((len(LAGS), len(at), 2))
+    is_known = np.ones(len(at), dtype=bool)
+    for ago in range(1, max(LAGS) + 1):
+        then = at - ago
+        is_known &= (then >= 0) & (states[np.maximum(then, 0), ZONE, who] > 0)
+        if ago in LAGS:
+            ways = states[np.maximum(then, 0), :, who][:, [HX, HY]]
+            made[LAGS.index(ago)] = np.where(is_known[:, None], np.nan_to_num(ways), 0.0)
+    return made
 
 
 def _recent_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
@@ -300,17 +307,18 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
     b = back[:, None]
     return replace(
         seen,
-        toward=turn(seen.toward, b),
-        soon_toward=turn(seen.soon_toward, b),
-        half_toward=turn(seen.half_toward, b),
-        late_toward=turn(seen.late_toward, b),
-        older_toward=turn(seen.older_toward, b),
-        ago_toward=turn(seen.ago_toward, b),
-        then_toward=turn(seen.then_toward, b),
-        bearing=turn(seen.bearing, b),
-        heading=turn(seen.heading, b),
-        own_heading=turn(seen.own_heading, back),
-        along_wall=turn(seen.along_wall, back),
-        way_out=turn(seen.way_out, back),
-        x_axis=turn(seen.x_axis, back),
+        toward=turned_by(seen.toward, b),
+        soon_toward=turned_by(seen.soon_toward, b),
+        half_toward=turned_by(seen.half_toward, b),
+        late_toward=turned_by(seen.late_toward, b),
+        older_toward=turned_by(seen.older_toward, b),
+        ago_toward=turned_by(seen.ago_toward, b),
+        then_toward=turned_by(seen.then_toward, b),
+        bearing=turned_by(seen.bearing, b),
+        heading=turned_by(seen.heading, b),
+        own_heading=turned_by(seen.own_heading, back),
+        ago_heading=turned_by(seen.ago_heading, back),
+        along_wall=turned_by(seen.along_wall, back),
+        way_out=turned_by(seen.way_out, back),
+        x_axis=turned_by(seen.x_axis, back),
     )

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from scipy.special import i0e
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of, turn
+from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.waves import series_of, waves_of
-from zfcal.model.features import Component, Turned
+from zfcal.model.features import Component, Turned, turned_by
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -230,10 +230,10 @@ class Law:
         def of(draw: Draw) -> Columns:
             weights = feature.weights(draw.seen)
             made = _weighed(self._bells_of(feature, draw), weights)
-            if not feature.instead:
+            if feature.instead is None:
                 return made
             present = self._kept_bells(draw, "toward", feature.kappa)
-            return _less(made, _weighed(present, draw.seen.attention[..., None]))
+            return _less(made, _weighed(present, feature.instead(draw.seen)))
 
         if first:
             return of(self.draws[0])
@@ -282,9 +282,9 @@ class Law:
         return self._kept[key]
 
     def _mixture(self, draw: Draw, angle: float, *, neighbours: bool) -> Columns:
-        parts = [self._own(turn(draw.base, angle))]
+        parts = [self._own(turned_by(draw.base, angle))]
         if neighbours:
-            parts.append(self._social(turn(draw.toward, angle), draw.angle_sr))
+            parts.append(self._social(turned_by(draw.toward, angle), draw.angle_sr))
         return sum(p[0] for p in parts), sum(p[1] for p in parts)  # type: ignore[return-value]
 
     def _own(self, base: Floats, more: float = 1.0) -> Columns:

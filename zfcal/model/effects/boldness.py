@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.features import Feature, Leaving, Seen, Tilt
+from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -32,6 +33,9 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         return 1.0
     return tilt(own, 1.0 if landing != state[ZONE * n + i] else -1.0, 1.0)
 
+
+_KAPPA = 4.0
+_NEAR_M = 0.2
 
 _MOST_TRACKS = 12
 """Of so many fish each is held apart; short pieces of tracks count as the others."""
@@ -63,11 +67,33 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(_who(seen)[..., None] * seen.way_out[:, None])
 
 
-_FEATURES: tuple[Feature, ...] = (
-    Leaving(label="who", weights=_who),
-    Leaving(label="who, into the open", weights=_who, into="open"),
-    Tilt(label="leaning to the way out", vectors=_leaning),
-)
+def _drawn(between: shapely.Geometry) -> Component:
+    """Return that each fish is drawn to the way out in a measure of its own, near to it."""
+
+    def weights(seen: Seen) -> Floats:
+        away_m = shapely.distance(between, shapely.points(seen.xy_m))
+        near = np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * (seen.way_out != 0).any(axis=1)
+        rest = 1.0 - _who(seen).sum(axis=1, keepdims=True)
+        return only(np.concatenate([_who(seen), rest], axis=1) * near[:, None])
+
+    return Component(
+        label="drawn to the way out, by who", toward=lambda seen: only(seen.way_out),
+        weights=weights, kappa=_KAPPA,
+    )  # fmt: skip
+
+
+def _features(arena: Arena) -> tuple[Feature, ...]:
+    """Return features of leaving, and of headings toward the way out where there is one."""
+    made: list[Feature] = [
+        Leaving(label="who", weights=_who),
+        Leaving(label="who, into the open", weights=_who, into="open"),
+        Tilt(label="leaning to the way out", vectors=_leaning),
+    ]
+    number = find_rooms(arena)[0]
+    between = arena.zones[number - 1].polygon if number else None
+    if between is not None:
+        made.append(_drawn(between))
+    return tuple(made)
 
 
 EFFECT = Effect(
@@ -109,5 +135,5 @@ EFFECT = Effect(
     identity_s=300.0,
     by_trait=True,
     fixed=("heading_share", "into_zone"),
-    features=lambda _arena: _FEATURES,
+    features=_features,
 )

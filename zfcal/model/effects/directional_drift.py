@@ -9,7 +9,18 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, SLOWEST_M_S, SPEED_M_S, cut, tilt, turn_to
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, of_tank
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    of_tank,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS
@@ -78,6 +89,20 @@ def _carried(seen: Seen) -> Floats:
     return np.asarray((by / by.mean())[:, None, None] * _axes(seen))
 
 
+def _off_the_walls(angle_rad: float) -> Component:
+    way = np.array([[[math.cos(angle_rad), math.sin(angle_rad)]]])
+    return Component(
+        label=f"drawn to {math.degrees(angle_rad):.0f} degrees, off the walls",
+        toward=lambda seen: np.broadcast_to(of_tank(seen, way), (len(seen.zone), 1, 2)),
+        weights=lambda seen: only((~seen.follows_walls).astype(np.float64)[:, None]),
+        kappa=3.0,
+    )
+
+
+def _axes_off_the_walls(seen: Seen) -> Floats:
+    return np.asarray((~seen.follows_walls)[:, None, None] * _axes(seen))
+
+
 _BY_DIRECTION = Along(cue="direction (rad)", knots=_DIRECTIONS)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -85,7 +110,12 @@ _FEATURES: tuple[Feature, ...] = (
         label="drawn, widely", toward=_compass, weights=_each, kappa=1.0, along=_BY_DIRECTION
     ),
     Component(label="drawn", toward=_compass, weights=_each, kappa=3.0, along=_BY_DIRECTION),
+    OneOf(
+        kind="drawn, off the walls",
+        features=tuple(_off_the_walls(k * math.pi / 6) for k in range(12)),
+    ),
     Tilt(label="leaning", vectors=_axes),
+    Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),
     Turned(label="turning", by=_aside, neighbours=False),
     Tilt(label="carried", vectors=_carried),
 )

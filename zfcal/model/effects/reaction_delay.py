@@ -10,6 +10,10 @@ from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen
 
 
+def _attended(seen: Seen) -> Floats:
+    return seen.attention[..., None]
+
+
 def _late(
     label: str,
     toward: Callable[[Seen], Floats],
@@ -21,7 +25,7 @@ def _late(
         label=label,
         toward=toward,
         weights=lambda seen: attention(seen)[..., None],
-        instead=True,
+        instead=_attended,
         high=high,
     )
 
@@ -40,6 +44,24 @@ def _then(k: int) -> Component:
     )
 
 
+_NEAR_M = (0.05, 0.15, 0.3)
+
+
+def _by_distance(k: int) -> Component:
+    """Return a response that is late by a share of its own for each distance."""
+
+    def weights(seen: Seen) -> Floats:
+        return seen.attention[..., None] * seen.by_distance(_NEAR_M)
+
+    return Component(
+        label=f"{LAGS[k]} steps, by distance",
+        toward=lambda seen: seen.ago_toward[k],
+        weights=weights,
+        instead=weights,
+        high=1.0,
+    )
+
+
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
     _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
@@ -47,6 +69,7 @@ _FEATURES: tuple[Feature, ...] = (
     _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
     *(_ago(k) for k in range(len(LAGS))),
     *(_then(k) for k in range(len(LAGS))),
+    *(_by_distance(k) for k in range(len(LAGS))),
 )
 
 

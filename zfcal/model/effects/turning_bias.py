@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, Turned
+from zfcal.model.features import (
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    left_of,
+    only,
+    turned_by,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY
 
 _KAPPA = 4.0
 _PER_STRENGTH = 0.1
+_ASIDE_DEGREES = (30, 60, 90, 135)
 
 
 @hook(FACTOR)
@@ -41,18 +54,23 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     return RAD_PER_STRENGTH * parameters[0] if parameters[3] > 0.0 else 0.0
 
 
-def _sides(seen: Seen) -> Floats:
-    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
-    return np.stack([left, -left], axis=1)
+def _drawn(angle_rad: float, where: str) -> Component:
+    def toward(seen: Seen) -> Floats:
+        return only(turned_by(seen.own_heading, angle_rad))
 
+    def weights(seen: Seen) -> Floats:
+        here = ~seen.follows_walls if where == "off the walls" else np.ones(len(seen.zone))
+        return only(here.astype(np.float64)[:, None])
 
-def _one_side(seen: Seen) -> Floats:
-    return np.where(seen.follows_walls, 0.0, 1.0)[:, None, None] * np.eye(2)
+    return Component(
+        label=f"drawn to {math.degrees(angle_rad):.0f} degrees, {where}", toward=toward,
+        weights=weights, kappa=_KAPPA,
+    )  # fmt: skip
 
 
 def _left(seen: Seen) -> Floats:
     """Return the left of each heading, for each zone apart, shape (step, zone, 2)."""
-    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
+    left = left_of(seen.own_heading)
     zones = np.unique(seen.zone)
     return np.asarray((seen.zone[:, None] == zones)[..., None] * left[:, None])
 
@@ -68,7 +86,15 @@ def _half(seen: Seen) -> Floats:
 
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
-    Component(label="drawn to a side", toward=_sides, weights=_one_side, kappa=_KAPPA),
+    OneOf(
+        kind="drawn to a side",
+        features=tuple(
+            _drawn(side * math.radians(degrees), where)
+            for degrees in _ASIDE_DEGREES
+            for side in (1, -1)
+            for where in ("everywhere", "off the walls")
+        ),
+    ),
     Tilt(label="leaning", vectors=_left),
     Component(
         label="along the wall", toward=_both_ways, weights=_half, kappa="own", low=-0.98, high=0.98

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
+from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, left_of, only, turned_by
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
@@ -89,25 +89,29 @@ def _one(seen: Seen) -> Floats:
 
 
 def _heading_before(seen: Seen) -> Floats:
-    return turned(seen.own_heading, -seen.last_turn_rad)
-
-
-def turned(ways: Floats, angle_rad: Floats) -> Floats:
-    """Return unit vectors turned to the left, shape (step, 2)."""
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    x, y = ways[:, 0], ways[:, 1]
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return turned_by(seen.own_heading, -seen.last_turn_rad)
 
 
 def _on(seen: Seen) -> Floats:
-    return only(turned(seen.own_heading, seen.last_turn_rad))
+    return only(turned_by(seen.own_heading, seen.last_turn_rad))
 
 
 def _leaning(seen: Seen) -> Floats:
     """Return what of the heading before is aside of the present one: that is the memory."""
-    left = np.stack([-seen.own_heading[:, 1], seen.own_heading[:, 0]], axis=-1)
+    left = left_of(seen.own_heading)
     aside = _remembers(seen) * np.sin(seen.last_turn_rad)
     return np.asarray((aside[:, None] * left)[:, None])
+
+
+def _earlier(seen: Seen) -> Floats:
+    """Return what earlier headings have aside of the present one, shape (step, lag, 2)."""
+    left = left_of(seen.own_heading)
+    return np.moveaxis((seen.ago_heading * left).sum(axis=-1, keepdims=True) * left, 0, 1)
+
+
+def _before_the_last(seen: Seen) -> Floats:
+    """Return the headings before the last one, along walls too, shape (step, lag, 2)."""
+    return np.moveaxis(seen.ago_heading[1:], 0, 1)
 
 
 _FEATURES: tuple[Feature, ...] = (
@@ -117,6 +121,8 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
     Component(label="drawn on as it turned", toward=_on, weights=_one, kappa=_KAPPA),
     Tilt(label="leaning to the heading before", vectors=_leaning),
+    Tilt(label="leaning to earlier headings", vectors=_earlier),
+    Tilt(label="leaning to earlier headings, along walls too", vectors=_before_the_last),
 )
 
 

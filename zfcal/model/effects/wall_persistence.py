@@ -47,9 +47,16 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray((seen.follows_walls[:, None] * seen.own_heading)[:, None])
 
 
+def _earlier(seen: Seen) -> Floats:
+    """Return the headings of earlier steps along a wall, shape (step, lag, 2)."""
+    along = (seen.ago_heading * seen.along_wall).sum(axis=-1, keepdims=True) * seen.along_wall
+    return np.moveaxis(np.where(seen.follows_walls[:, None], along, 0.0), 0, 1)
+
+
 _FEATURES: tuple[Feature, ...] = (
     Component(label="share", toward=_both_ways, weights=_share, kappa="own", low=-0.98, high=0.98),
     Tilt(label="leaning", vectors=_leaning),
+    Tilt(label="leaning, by earlier headings", vectors=_earlier),
 )
 
 
