@@ -325,6 +325,19 @@ def test_places_of_a_room_pull_those_in_it_alone(arena, seen):
     assert 0 < sum(total == 0 for total in sums) < len(sums)
 
 
+def test_places_between_are_looked_at_as_well(arena):
+    """Nine about each: the place itself, and those a third of the way to the next ones."""
+    drawn, *_ = find_effect("place-preference").features(arena)
+    near = drawn.near(0)
+    assert len(near) == drawn.n_near == 9
+    assert near[4].label == drawn.features[0].label
+    assert len({each.label for each in near}) == 9
+    assert drawn.n_tried == 9 * len(drawn.features)
+    x, y = zip(*(each.label.removeprefix("drawn to ").split(", ") for each in near), strict=True)
+    assert max(map(float, x)) - min(map(float, x)) == pytest.approx(2 / 3 * 0.1125 * 1.0, abs=0.03)
+    assert max(map(float, y)) - min(map(float, y)) == pytest.approx(2 / 3 * 0.1125 * 1.0, abs=0.03)
+
+
 def test_the_fastest_in_view_is_one_fish(arena, seen):
     """Of those that are seen: one that is fast and not seen is none."""
     weights = find_effect("leader-following").features(arena)[1].weights(

@@ -272,10 +272,22 @@ class OneOf:
         What they are called together.
     features
         Of one sort.
+    near
+        Features near to one of them, itself among them, of which the most promising is fitted: so
+        that many are looked at where a few say that something is there.
+    n_near
+        How many these are.
     """
 
     kind: str
-    features: tuple[Component, ...] | tuple[Tilt, ...] | tuple[Turned, ...]
+    features: Sequence[Component | Tilt | Turned]
+    near: Callable[[int], Sequence[Component | Tilt | Turned]] | None = None
+    n_near: int = 1
+
+    @property
+    def n_tried(self) -> int:
+        """Of so many features the best is taken."""
+        return len(self.features) * self.n_near
 
 
 Single: TypeAlias = Component | Tilt | Turned | Leaving

@@ -14,7 +14,7 @@ from zfcal.diagnose.features.climbing import climb
 from zfcal.diagnose.features.false_gains import ByNoise
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import answer, best_by_name, tell
+from zfcal.diagnose.features.naming import answer, best_by_name, tell, tried
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import LAPSE, maximise, with_effect
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
@@ -120,7 +120,7 @@ def test_of_places_a_few_are_fitted_and_all_are_counted(nothing):
     drawn = place.features(nothing.law.scene.arena)[0]
     found = gains_of(nothing.law, [place], kinds={("place-preference", "drawn")})
     assert 0 < len(found) <= 2
-    assert {each.n_tried for each in found} == {len(drawn.features)}
+    assert {each.n_tried for each in found} == {len(drawn.features) * drawn.n_near}
     assert {each.key for each in found} == {("place-preference", "drawn")}
     one = gain("x", [9.0], n_strengths=2)
     many = gain("x", [9.0], n_strengths=2, n_tried=50)
@@ -169,11 +169,19 @@ STEPS = np.random.default_rng(8).normal(0.02, 0.1, 4000)
 
 
 def test_the_name_that_gains_most_is_told():
-    """By its best feature, with its chance over all features."""
+    """By its best feature, with its chance over the features of the name, and over all names."""
     gains = [gain("a", STEPS), gain("a", STEPS / 2, label="two"), gain("b", 0 * STEPS)]
     told = tell(gains)
     assert (told.gain.name, told.gain.label, told.ties) == ("a", "one", ())
-    assert told.p == pytest.approx(3 * gains[0].p)
+    assert told.p == pytest.approx(2 * 2 * gains[0].p)
+
+
+def test_a_name_with_many_features_takes_nothing_from_another():
+    """Its own chance is that of so many; the other's is as if it had one."""
+    few = [gain("a", STEPS), gain("b", 0 * STEPS)]
+    many = [gain("b", 0 * STEPS, label=str(k)) for k in range(50)]
+    assert tell(few).p == pytest.approx(tell([*few, *many]).p)
+    assert tried([*few, *many]) == {"a": 2, "b": 102}
 
 
 def test_names_that_gain_alike_are_tied():

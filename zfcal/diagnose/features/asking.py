@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import best_by_name, once
+from zfcal.diagnose.features.naming import best_by_name, tried
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
 from zfcal.model.features import Component, Feature, Leaving, OneOf, Single, Tilt, Turned
@@ -65,10 +65,14 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
 
 def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
     """Return the best feature of each name that may turn out to gain most."""
-    n_tried = sum(gain.n_tried for gain in once(gains))
+    n_tried = tried(gains)
     best = best_by_name(gains)
     most = max((gain.nats for gain in best), default=0.0)
-    return [gain for gain in best if gain.p * n_tried < LEVEL and gain.nats > _IN_REACH * most]
+    return [
+        gain
+        for gain in best
+        if gain.p * n_tried[gain.name] < LEVEL and gain.nats > _IN_REACH * most
+    ]
 
 
 def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -> Gain:
@@ -156,8 +160,7 @@ def _gains(fits: Fits, name: str, feature: Feature) -> list[tuple[Single, Gain]]
     """Return a feature, or the most promising of several, with what they add."""
     if not isinstance(feature, OneOf):
         return [(feature, fits.gain(name, feature))]
-    n = len(feature.features)
     return [
-        (each, replace(fits.gain(name, each), n_tried=n, kind=feature.kind))
+        (each, replace(fits.gain(name, each), n_tried=feature.n_tried, kind=feature.kind))
         for each in fits.most_promising(feature)
     ]

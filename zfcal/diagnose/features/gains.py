@@ -188,25 +188,27 @@ class Fits:
     def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Component | Tilt | Turned]:
         """Return the features that a first look says most of."""
         promise = [self._promise(feature) for feature in choice.features]
-        order = np.argsort(promise)[::-1][:n]
-        return [choice.features[k] for k in order if promise[k] > 0]
+        order = [int(k) for k in np.argsort(promise)[::-1][:n] if promise[k] > 0]
+        if choice.near is None:
+            return [choice.features[k] for k in order]
+        return [max(choice.near(k), key=self._promise) for k in order]
 
     def _promise(self, feature: Component | Tilt | Turned) -> float:
-        """Return how clear a feature is with all its weights alike: a score, or a gain in nats.
+        """Return how clear a feature is: by the scores of its weights, or a gain in nats.
 
         The score of a component has no variance where the density is next to nothing, so it is
-        asked for by what a few strengths of it gain, the lapse as it is.
+        asked for by what a few strengths of it gain, all its weights alike, the lapse as it is.
         """
         if isinstance(feature, Component):
             return self._promise_of(self.law.component(feature, first=True))
         if isinstance(feature, Turned):
             (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
-            score = self._no_lapse * (at / base_at - over / base_over).sum(axis=1)
+            scores = self._no_lapse[:, None] * (at / base_at - over / base_over)
         else:
-            vector = feature.vectors(self.law.draws[0].seen).sum(axis=1)
-            score = (vector * (self.law.turns.taken - self._mean_heading)).sum(axis=1)
-        squares = float((score * score).sum())
-        return float(score.sum()) ** 2 / squares if squares > 0 else 0.0
+            apart = self.law.turns.taken - self._mean_heading
+            scores = np.einsum("sbd,sd->sb", feature.vectors(self.law.draws[0].seen), apart)
+        total = scores.sum(axis=0)
+        return float(total @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ total)
 
     def _promise_of(self, columns: Columns) -> float:
         (at, over), lapse = columns, self._lapse

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -101,10 +102,10 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
     level
         Of false alarms.
     """
-    n_tried = sum(gain.n_tried for gain in once(gains))
+    n_tried = tried(gains)
 
     def beyond_chance(some: Sequence[Gain]) -> list[Gain]:
-        return [gain for gain in some if gain.p * n_tried < level and gain.nats > 0]
+        return [gain for gain in some if gain.p * n_tried[gain.name] < level and gain.nats > 0]
 
     clear = beyond_chance(gains)
     hidden: tuple[Hidden, ...] = ()
@@ -118,7 +119,7 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
         gains = [*held, *(gain for gain in gains if gain.name not in ahead)]
         stand = {gain.name for gain in clear}
         lost = best_by_name([gain for gain in held if gain.name not in stand])
-        hidden = tuple(_hidden(gain, level / n_tried) for gain in lost)
+        hidden = tuple(_hidden(gain, level / n_tried[gain.name]) for gain in lost)
     best = best_by_name(clear)
     if not best:
         return Answer(told=None, hidden=hidden)
@@ -127,7 +128,7 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
-    told = Told(gain=first, p=min(1.0, first.p * n_tried), ties=ties, lead=lead)
+    told = Told(gain=first, p=min(1.0, first.p * n_tried[first.name]), ties=ties, lead=lead)
     return Answer(told=told, hidden=hidden)
 
 
@@ -152,9 +153,15 @@ def best_by_name(gains: Sequence[Gain]) -> list[Gain]:
     return sorted(found.values(), key=lambda gain: -gain.nats)
 
 
-def once(gains: Sequence[Gain]) -> list[Gain]:
-    """Return gains with one of those that are the best of the same features by the same law."""
-    return list({(gain.key, gain.without_noise): gain for gain in gains}.values())
+def tried(gains: Sequence[Gain]) -> dict[str, int]:
+    """Return by how much the chance of a gain counts, by its name.
+
+    Each name has the same share of the level, and each kind of feature the same share of its
+    name's (a weighted inequality of Bonferroni): a name with many features takes from no other.
+    """
+    kinds = {(gain.name, gain.key, gain.without_noise) for gain in gains}
+    n_kinds = Counter(name for name, *_ in kinds)
+    return {name: n * len(n_kinds) for name, n in n_kinds.items()}
 
 
 def _lead(one: Gain, other: Gain) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -83,28 +84,52 @@ def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
     return float(np.hypot(*mean))
 
 
-_KNOTS_M = (0.0, 0.15, 0.3, 0.6)
+_KNOTS_M = (0.0, 0.07, 0.15, 0.3, 0.6)
 _BY_DISTANCE = Along(cue="distance to the place (m)", knots=_KNOTS_M)
-_PER_SIDE = 7
+_UP_TO = np.linspace(0.05, 0.95, 9)
+"""Of the tank's width and height: corners as well, which fish like and keep away from."""
+
+_BETWEEN = (-1 / 3, 0.0, 1 / 3)
+"""Of the way to the next of these places."""
+
 _KAPPA = 3.0
 
 
+_Asked: TypeAlias = tuple[Floats, shapely.Polygon | None]
+"""A place, and the room in which it is felt; None where it is everywhere."""
+
+
 def _features(arena: Arena) -> tuple[Feature, ...]:
-    """Return features of places all over the tank, seen from everywhere or from their own room."""
+    """Return features of places all over the tank, felt everywhere or in their own room."""
     x_min, y_min, x_max, y_max = arena.outline.bounds
     spots = [
         np.array([x, y])
-        for x in np.linspace(x_min, x_max, _PER_SIDE + 2)[1:-1]
-        for y in np.linspace(y_min, y_max, _PER_SIDE + 2)[1:-1]
+        for x in x_min + _UP_TO * (x_max - x_min)
+        for y in y_min + _UP_TO * (y_max - y_min)
         if arena.outline.covers(shapely.Point(x, y))
     ]
     _, rooms = find_rooms(arena)
-    asked: list[tuple[Floats, shapely.Polygon | None]] = [(spot, None) for spot in spots]
+    asked: list[_Asked] = [(spot, None) for spot in spots]
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
-    return (
-        OneOf(kind="drawn", features=tuple(_drawn(spot, room) for spot, room in asked)),
-        OneOf(kind="leaning", features=tuple(_leaning(spot, room) for spot, room in asked)),
-        OneOf(kind="turning", features=tuple(_turning(spot, room) for spot, room in asked)),
+    apart = np.array([x_max - x_min, y_max - y_min]) * (_UP_TO[1] - _UP_TO[0])
+    sorts = (("drawn", _drawn), ("leaning", _leaning), ("turning", _turning))
+    return tuple(_of_sort(kind, sort, asked, apart) for kind, sort in sorts)
+
+
+def _of_sort(
+    kind: str,
+    sort: Callable[..., Component | Tilt | Turned],
+    asked: Sequence[_Asked],
+    apart: Floats,
+) -> OneOf:
+    """Return features of one sort of the places, and of those between them."""
+
+    def near(k: int) -> list[Component | Tilt | Turned]:
+        spot, room = asked[k]
+        return [sort(spot + apart * (x, y), room) for x in _BETWEEN for y in _BETWEEN]
+
+    return OneOf(
+        kind=kind, features=[sort(*each) for each in asked], near=near, n_near=len(_BETWEEN) ** 2
     )
 
 
