@@ -120,7 +120,7 @@ def test_features_have_a_number_for_each_step_and_weight(name, arena, seen):
         elif isinstance(each, Tilt):
             values = (each.vectors(seen),)
             assert values[0].shape[::2] == (N, 2)
-        elif isinstance(each, Turned):
+        elif isinstance(each, Turned | Sharper):
             values = (each.by(seen),)
             assert values[0].shape[0] == N
         else:
@@ -237,12 +237,65 @@ def test_each_fish_is_drawn_to_the_way_out_near_to_it(arena, seen):
     """Between the rooms, and far from there, no fish is."""
     drawn = labelled("boldness", "drawn to the way out, by who", arena)
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
+    near = np.array(between.centroid.coords[0]) + np.linspace(0, 0.4, N)[:, None] * [0.0, 1.0]
+    seen = dataclasses.replace(seen, xy_m=near)
     away_m = shapely.distance(between, shapely.points(seen.xy_m))
+    assert away_m[0] == 0 < away_m[-1]
     weights = drawn.weights(seen)[:, 0]
     assert weights.shape == (N, len(np.unique(seen.track)))
     np.testing.assert_allclose(weights.sum(axis=1), np.clip(1 - away_m / 0.2, 0, 1))
     inside = dataclasses.replace(seen, way_out=np.zeros((N, 2)))
     assert not drawn.weights(inside).any()
+
+
+def test_turns_of_the_whole_law_count_along_walls_too(arena, seen):
+    """Where those of the base's direction alone have none."""
+    for name, label in (
+        ("group-cohesion", "turning"), ("robot-avoidance", "turning"),
+        ("directional-drift", "turning"),
+    ):  # fmt: skip
+        part, whole = (labelled(name, f"{label}{end}", arena) for end in ("", " as a whole"))
+        assert (part.neighbours, whole.neighbours) == (False, True)
+        off = ~seen.follows_walls
+        assert not part.by(seen)[~off].any()
+        assert whole.by(seen)[~off].any()
+        np.testing.assert_array_equal(part.by(seen)[off], whole.by(seen)[off])
+
+
+def test_each_fish_turns_to_the_way_out_in_a_measure_of_its_own(arena, seen):
+    """To the left where the way out is there."""
+    turning = labelled("boldness", "turning to the way out, by who", arena)
+    (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
+    seen = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
+    sine = (seen.way_out * left_of(seen.own_heading)).sum(axis=1)
+    by = turning.by(seen).sum(axis=1)
+    assert by.any()
+    assert (by * sine >= 0).all()
+
+
+def test_a_drift_may_begin(arena, seen):
+    """Before it there is nothing."""
+    later = labelled("directional-drift", "leaning, from 50% of the time on", arena)
+    vectors = later.vectors(seen)
+    assert not vectors[seen.time <= 0.5].any()
+    np.testing.assert_array_equal(vectors[seen.time > 0.5], [np.eye(2)] * (seen.time > 0.5).sum())
+
+
+def test_the_fast_draw_by_their_speeds(arena, seen):
+    """Those within 20 cm, and none that stands still."""
+    fast = labelled("leader-following", "leaning to the fast", arena)
+    assert fast.vectors(seen).any()
+    for changed in (
+        {"speed_m_s": np.zeros((N, OTHERS))}, {"distance_m": np.full((N, OTHERS), 0.3)}
+    ):  # fmt: skip
+        assert not fast.vectors(dataclasses.replace(seen, **changed)).any()
+
+
+def test_steps_are_sharper_by_their_speed(arena, seen):
+    """In the mean as sharp as they are."""
+    sharper = labelled("speed-turn-coupling", "sharper by speed", arena)
+    np.testing.assert_allclose(sharper.by(seen).mean(axis=0), 0, atol=1e-12)
+    assert sharper.by(seen).shape == (N, 4)
 
 
 def test_responses_are_late_by_a_share_of_their_own_at_each_distance(arena, seen):

@@ -239,6 +239,25 @@ class Turned:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sharper:
+    """The base's own headings more concentrated, or less, in some steps.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    by
+        Shape (step, weight): about a tenth of the concentration at a strength of one.
+    along
+        What its weights go by, where that is one number: they are a curve then.
+    """
+
+    label: str
+    by: Weights
+    along: Along | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Leaving:
     """A factor on steps that end in another zone: between the rooms, or away from the walls.
 
@@ -290,8 +309,11 @@ class OneOf:
         return len(self.features) * self.n_near
 
 
-Single: TypeAlias = Component | Tilt | Turned | Leaving
-Feature: TypeAlias = Component | Tilt | Turned | Leaving | OneOf
+Mixed: TypeAlias = Component | Turned | Sharper
+"""What adds to the mixture: it is fitted with the base's parameters."""
+
+Single: TypeAlias = Mixed | Tilt | Leaving
+Feature: TypeAlias = Single | OneOf
 
 
 def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
@@ -325,14 +347,15 @@ def of_tank(seen: Seen, ways: Floats) -> Floats:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def aside_of(seen: Seen, toward: Floats) -> Floats:
-    """Return the sines of the angles from the own heading to unit vectors; none along walls.
+def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:
+    """Return the sines of the angles from the own heading to unit vectors.
 
-    Shape (step, vector), of vectors of shape (step, vector, 2).
+    Shape (step, vector), of vectors of shape (step, vector, 2). None along walls, if not asked for:
+    there the base law forgets the heading.
     """
     own = seen.own_heading[:, None]
     sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
-    return np.where(seen.follows_walls[:, None], 0.0, sine)
+    return sine if along_walls else np.where(seen.follows_walls[:, None], 0.0, sine)
 
 
 def left_of(ways: Floats) -> Floats:

@@ -13,7 +13,7 @@ from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.features import LAGS, Component, Turned, turned_by
+from zfcal.model.features import LAGS, Component, Sharper, Turned, turned_by
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -148,6 +148,17 @@ def test_a_turn_of_the_directions_is_a_derivative(law):
     even = (share.argmax(axis=2) == share.argmax(axis=2)[:, :1]).all(axis=1)
     even &= (share.sum(axis=2) == share.sum(axis=2).max()).all(axis=1)
     assert np.abs(over[even]).max() < 1e-4 * law.base[1][even].max()
+
+
+def test_sharper_steps_have_a_larger_concentration(law):
+    """A tenth of it at a strength of one, as in the law of such a model."""
+    columns = law.sharper(Sharper(label="x", by=lambda seen: np.ones((len(seen.zone), 1))))
+    more = dataclasses.replace(law)
+    more.__dict__.update(law.__dict__, kappa_own=1.1 * law.kappa_own)
+    for one in ("own", "base", "_own_sharper"):
+        more.__dict__.pop(one, None)
+    for made, own, expected in zip(columns, law.own, more.own, strict=True):
+        np.testing.assert_allclose(made, expected - own, atol=1e-12)
 
 
 def test_exact_positions_have_one_draw_and_noisy_ones_several(base):

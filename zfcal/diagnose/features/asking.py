@@ -14,7 +14,16 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
-from zfcal.model.features import Component, Feature, Leaving, OneOf, Single, Tilt, Turned
+from zfcal.model.features import (
+    Feature,
+    Leaving,
+    Mixed,
+    OneOf,
+    Sharper,
+    Single,
+    Tilt,
+    Turned,
+)
 
 _IN_REACH = 0.5
 """Share of the nats of the best one below which a feature is not fitted anew."""
@@ -114,12 +123,12 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
         Those without features are left out.
     """
     fits = Fits(law=law)
-    also: list[Component | Turned] = []
+    also: list[Mixed] = []
     for effect in effects:
         for feature in effect.features(law.scene.arena):
             chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
             for each in chosen:
-                if isinstance(each, Component | Turned):
+                if isinstance(each, Mixed):
                     also.append(_either_way(each))
                 elif isinstance(each, Tilt) or law.zone_into(each.into):
                     law = _absorbed(law, each)
@@ -127,12 +136,14 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
     return Fits(law=law, also=tuple(also))
 
 
-def _either_way(feature: Component | Turned) -> Component | Turned:
+def _either_way(feature: Mixed) -> Mixed:
     """Return a feature that may go either way: a model's form of its effect may have too much.
 
     Of a component there cannot be less than none. A model that has too much of one has less of
     its own (`Law.own_parameters`).
     """
+    if isinstance(feature, Sharper):
+        return feature
     if isinstance(feature, Turned):
         return replace(feature, low=None)
     return replace(feature, high=feature.high or None)

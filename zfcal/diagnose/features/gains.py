@@ -21,9 +21,9 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
-from zfcal.diagnose.features.law import Columns, Law
+from zfcal.diagnose.features.law import MOST_SHARPER, Columns, Law
 from zfcal.model.extended import LAPSE
-from zfcal.model.features import Component, Leaving, OneOf, Single, Tilt, Turned
+from zfcal.model.features import Component, Leaving, Mixed, OneOf, Sharper, Single, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES
 
 _UNIFORM = 1 / (2 * math.pi)
@@ -112,7 +112,7 @@ class Fits:
     """
 
     law: Law
-    also: tuple[Component | Turned, ...] = ()
+    also: tuple[Mixed, ...] = ()
     beyond: Floats | None = None
 
     @cached_property
@@ -125,11 +125,14 @@ class Fits:
             [*bounds, *(pair for _, pairs in added for pair in pairs)],
         )
 
-    def _columns(self, feature: Component | Turned) -> tuple[Columns, list[Bounds]]:
+    def _columns(self, feature: Mixed) -> tuple[Columns, list[Bounds]]:
         """Return the columns of a feature, and the bounds of its strengths."""
         if isinstance(feature, Turned):
             columns = self.law.turned(feature)
             return columns, [(_low(feature, _MOST_TURN), _MOST_TURN)] * columns[0].shape[1]
+        if isinstance(feature, Sharper):
+            columns = self.law.sharper(feature)
+            return columns, [MOST_SHARPER] * columns[0].shape[1]
         columns = self.law.component(feature)
         return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 

@@ -24,7 +24,7 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.waves import series_of, waves_of
-from zfcal.model.features import Component, Turned, turned_by
+from zfcal.model.features import Component, Sharper, Turned, turned_by
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -34,6 +34,9 @@ DRAWS = 8
 
 _TURN_RAD = 0.02
 """Half of the angle between the two laws whose difference stands for the derivative."""
+
+MOST_SHARPER = (-3.0, 3.0)
+"""Bounds of what is added to a concentration, in tenths of it."""
 
 _WEIGHT = (-0.98, 6.0)
 """Bounds of what is added to the weight of the model's components, as a share of it."""
@@ -259,6 +262,17 @@ class Law:
             return self.kappa_own if kappa == "own" else self.kappa_f
         return kappa
 
+    def sharper(self, feature: Sharper) -> Columns:
+        """Return what a tenth more of the own concentration adds, shape (step, weight)."""
+        at, over = self._own_sharper
+        by = feature.by(self.draws[0].seen)
+        return by * at, by * over
+
+    @cached_property
+    def _own_sharper(self) -> Columns:
+        own_more = self.mean([self._own(draw.base, _MORE) for draw in self.draws])
+        return _less(own_more, self.own)
+
     def turned(self, feature: Turned) -> Columns:
         """Return the derivative of the law by a turn of its directions, shape (step, weight)."""
 
@@ -337,13 +351,11 @@ class Law:
         Those of the base in each zone; and of all components of its effects together, how heavy
         they are.
         """
-        own = self.own
-        own_more = self.mean([self._own(d.base, _MORE) for d in self.draws])
         social, social_more = self._neighbours(), self._neighbours(_MORE)
         changes = (
-            (_less(own_more, own), (-3.0, 3.0)),
+            (self._own_sharper, MOST_SHARPER),
             (social, (-0.9, 6.0)),
-            (_less(social_more, social), (-3.0, 3.0)),
+            (_less(social_more, social), MOST_SHARPER),
         )
         columns, bounds = [], []
         for zone in np.unique(self.turns.zone):

@@ -9,7 +9,17 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, only
+from zfcal.model.features import (
+    Component,
+    Feature,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+    Weights,
+    aside_of,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -67,18 +77,31 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(_who(seen)[..., None] * seen.way_out[:, None])
 
 
-def _drawn(between: shapely.Geometry) -> Component:
-    """Return that each fish is drawn to the way out in a measure of its own, near to it."""
+def _near_way_out(between: shapely.Geometry) -> Weights:
+    """Return one for each fish near the way out, shape (step, fish)."""
 
     def weights(seen: Seen) -> Floats:
         away_m = shapely.distance(between, shapely.points(seen.xy_m))
         near = np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * (seen.way_out != 0).any(axis=1)
         rest = 1.0 - _who(seen).sum(axis=1, keepdims=True)
-        return only(np.concatenate([_who(seen), rest], axis=1) * near[:, None])
+        return np.asarray(np.concatenate([_who(seen), rest], axis=1) * near[:, None])
 
-    return Component(
-        label="drawn to the way out, by who", toward=lambda seen: only(seen.way_out),
-        weights=weights, kappa=_KAPPA,
+    return weights
+
+
+def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
+    """Return that each fish is drawn, or turns, to the way out in a measure of its own."""
+    near = _near_way_out(between)
+
+    def turning(seen: Seen) -> Floats:
+        return near(seen) * aside_of(seen, seen.way_out[:, None], along_walls=True)
+
+    return (
+        Component(
+            label="drawn to the way out, by who", toward=lambda seen: only(seen.way_out),
+            weights=lambda seen: only(near(seen)), kappa=_KAPPA,
+        ),
+        Turned(label="turning to the way out, by who", by=turning, neighbours=True),
     )  # fmt: skip
 
 
@@ -92,7 +115,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:
-        made.append(_drawn(between))
+        made += _by_who(between)
     return tuple(made)
 
 

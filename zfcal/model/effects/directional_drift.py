@@ -64,6 +64,7 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
 
 _DIRECTIONS = tuple(float(angle) for angle in np.arange(6) * np.pi / 3)
 _SLOW_M_S = 0.01
+_BEGINS = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 
 def _compass(seen: Seen) -> Floats:
@@ -81,6 +82,17 @@ def _axes(seen: Seen) -> Floats:
 
 def _aside(seen: Seen) -> Floats:
     return aside_of(seen, _axes(seen))
+
+
+def _aside_anywhere(seen: Seen) -> Floats:
+    return aside_of(seen, _axes(seen), along_walls=True)
+
+
+def _from(begin: float) -> Tilt:
+    return Tilt(
+        label=f"leaning, from {begin:.0%} of the time on",
+        vectors=lambda seen: (seen.time > begin)[:, None, None] * _axes(seen),
+    )
 
 
 def _carried(seen: Seen) -> Floats:
@@ -116,7 +128,9 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     Tilt(label="leaning", vectors=_axes),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),
+    OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
+    Turned(label="turning as a whole", by=_aside_anywhere, neighbours=True),
     Tilt(label="carried", vectors=_carried),
 )
 

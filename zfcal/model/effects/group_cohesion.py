@@ -153,6 +153,11 @@ def _turning(seen: Seen) -> Floats:
     return np.asarray(aside_of(seen, toward[:, None]) * weights)
 
 
+def _turning_anywhere(seen: Seen) -> Floats:
+    toward, weights = _middle(seen)
+    return np.asarray(aside_of(seen, toward[:, None], along_walls=True) * weights)
+
+
 def _turning_to_nearest(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sj->sb", _of_nearest(seen), aside_of(seen, seen.bearing)))
 
@@ -189,6 +194,10 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0, along=_TO_EACH),
     Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0, along=_TO_NEAREST),
     Turned(label="turning", by=_turning, neighbours=False, low=0.0, along=_TO_MIDDLE),
+    Turned(
+        label="turning as a whole", by=_turning_anywhere, neighbours=True, low=0.0,
+        along=_TO_MIDDLE,
+    ),
     Turned(
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
         along=_TO_NEAREST,

@@ -136,6 +136,13 @@ def _leaning_within(reach_m: float) -> Weights:
 _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
 _REACH_M = (0.1, 0.2, 9.0)
 
+
+def _leaning_to_the_fast(seen: Seen) -> Floats:
+    """Return the bearings of those near by their speeds, shape (step, speed, 2)."""
+    near = seen.here & (seen.distance_m < _REACH_M[1])
+    return np.einsum("sjb,sjd->sbd", _attention(seen) * near[..., None], seen.bearing)
+
+
 _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(
         _attention,
@@ -158,6 +165,7 @@ _FEATURES: tuple[Feature, ...] = (
             for reach_m in _REACH_M
         ),
     ),
+    Tilt(label="leaning to the fast", vectors=_leaning_to_the_fast, low=0.0),
     # One of them: a pull to each alike would be cohesion.
     OneOf(
         kind="drawn to one",

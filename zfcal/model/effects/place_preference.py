@@ -112,7 +112,12 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     asked: list[_Asked] = [(spot, None) for spot in spots]
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
     apart = np.array([x_max - x_min, y_max - y_min]) * (_UP_TO[1] - _UP_TO[0])
-    sorts = (("drawn", _drawn), ("leaning", _leaning), ("turning", _turning))
+    sorts = (
+        ("drawn", _drawn),
+        ("leaning", _leaning),
+        ("turning", _turning),
+        ("turning as a whole", _turning_as_a_whole),
+    )
     return tuple(_of_sort(kind, sort, asked, apart) for kind, sort in sorts)
 
 
@@ -167,13 +172,24 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
 
 
 def _turning(spot: Floats, room: shapely.Polygon | None) -> Turned:
+    return _turned(spot, room, as_a_whole=False)
+
+
+def _turning_as_a_whole(spot: Floats, room: shapely.Polygon | None) -> Turned:
+    return _turned(spot, room, as_a_whole=True)
+
+
+def _turned(spot: Floats, room: shapely.Polygon | None, *, as_a_whole: bool) -> Turned:
+    """Return turns to a place: of the base's direction, or of all, along walls too."""
+
     def by(seen: Seen) -> Floats:
         toward, weights = _toward(seen, spot)
-        here = aside_of(seen, toward[:, None]) * _within(seen, room)[:, None]
-        return np.asarray(weights * here)
+        aside = aside_of(seen, toward[:, None], along_walls=as_a_whole)
+        return np.asarray(weights * aside * _within(seen, room)[:, None])
 
+    what = "turning as a whole" if as_a_whole else "turning"
     return Turned(
-        label=f"turning to {spot[0]:.2f}, {spot[1]:.2f}", by=by, neighbours=False,
+        label=f"{what} to {spot[0]:.2f}, {spot[1]:.2f}", by=by, neighbours=as_a_whole,
         along=_BY_DISTANCE,
     )  # fmt: skip
 

@@ -121,6 +121,11 @@ def _turning(seen: Seen) -> Floats:
     return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside_of(seen, seen.bearing)))
 
 
+def _turning_anywhere(seen: Seen) -> Floats:
+    aside = aside_of(seen, seen.bearing, along_walls=True)
+    return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside))
+
+
 _TO_ROBOT = Along(cue="distance to the robot (m)", knots=_KNOTS_M)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -139,6 +144,7 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     Tilt(label="leaning", vectors=_leaning, along=_TO_ROBOT),
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
+    Turned(label="turning as a whole", by=_turning_anywhere, neighbours=True, along=_TO_ROBOT),
 )  # fmt: skip
 
 

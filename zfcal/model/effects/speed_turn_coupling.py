@@ -11,7 +11,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.features import Feature, Seen, Tilt, hats
+from zfcal.model.features import Feature, Seen, Sharper, Tilt, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY
@@ -29,11 +29,14 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 _KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
 
 
+def _quicker(seen: Seen) -> Floats:
+    weights = hats(seen.own_speed_m_s, _KNOTS_M_S)
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:])
+
+
 def _by_speed(seen: Seen) -> Floats:
     """Return the own heading, weighed by what the step's speed has beside the mean of all steps."""
-    weights = hats(seen.own_speed_m_s, _KNOTS_M_S)
-    weights = (weights - weights.mean(axis=0))[:, 1:]
-    return np.asarray(weights[..., None] * seen.own_heading[:, None])
+    return np.asarray(_quicker(seen)[..., None] * seen.own_heading[:, None])
 
 
 _KNOTS_RAD = (0.0, 0.5, 1.0, 2.0, 3.2)
@@ -43,7 +46,10 @@ def _by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, _KNOTS_RAD)[:, 1:]
 
 
-_FEATURES: tuple[Feature, ...] = (Tilt(label="by speed", vectors=_by_speed),)
+_FEATURES: tuple[Feature, ...] = (
+    Tilt(label="by speed", vectors=_by_speed),
+    Sharper(label="sharper by speed", by=_quicker),
+)
 
 
 EFFECT = Effect(
