@@ -16,6 +16,7 @@ from zfcal.model.features import (
     Leaving,
     OneOf,
     Seen,
+    Sharper,
     Tilt,
     Turned,
     hats,
