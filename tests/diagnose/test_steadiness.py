@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.scores import summed
-from zfcal.diagnose.steadiness import MINUTES_S, Course, _lasts, has_pulses, is_steady
+from zfcal.diagnose.steadiness import (
+    MINUTES_S,
+    Course,
+    _has_one_strength,
+    _lasts,
+    has_pulses,
+    is_steady,
+)
 
 
 def scores_at(screen, candidate, when, strength=0.25, seed=5):
@@ -115,3 +122,12 @@ def test_minutes_may_differ_by_less_than_the_mean(screen, spread, steady, gain):
     rng = np.random.default_rng(5)
     own = course(scene, strength - strength.mean() + 1, gain, rng)
     assert own.in_all_minutes is steady
+
+
+def test_one_block_alone_tells_of_no_spread():
+    """However the others are: they weigh nothing beside it."""
+    one = np.ones(3)
+    assert _has_one_strength(np.array([1.0, 1, 2]), one, np.array([1e-20, 1, 1]))
+    assert _has_one_strength(np.array([1e-170, 2e-170]), np.full(2, 1e-170), np.full(2, 1e-30))
+    assert _has_one_strength(one[:1], one[:1], one[:1])
+    assert not _has_one_strength(np.array([900.0, 0, 0]), 300 * one, 300 * one)

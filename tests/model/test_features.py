@@ -274,6 +274,28 @@ def test_each_fish_turns_to_the_way_out_in_a_measure_of_its_own(arena, seen):
     assert (by * sine >= 0).all()
 
 
+def test_what_all_do_alike_is_gained_over(arena, seen):
+    """Features of how fish differ, and of how much the fast draw, count from that."""
+    for name, label in (
+        ("boldness", "drawn to the way out, by who"),
+        ("boldness", "turning to the way out, by who"),
+        ("leader-following", "leaning to the fast"),
+    ):  # fmt: skip
+        own = labelled(name, label, arena)
+        assert type(own.over) is type(own)
+    (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
+    near = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
+    drawn = labelled("boldness", "drawn to the way out, by who", arena)
+    np.testing.assert_allclose(
+        drawn.weights(near).sum(axis=-1, keepdims=True), drawn.over.weights(near)
+    )
+    fast = labelled("leader-following", "leaning to the fast", arena)
+    alike = dataclasses.replace(seen, speed_m_s=np.full((N, OTHERS), 0.1))
+    np.testing.assert_allclose(
+        fast.vectors(alike).sum(axis=1), fast.over.vectors(alike)[:, 0], atol=1e-12
+    )
+
+
 def test_a_drift_may_begin(arena, seen):
     """Before it there is nothing."""
     later = labelled("directional-drift", "leaning, from 50% of the time on", arena)
@@ -312,8 +334,9 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     """At a strength of one all attention goes to where the others were, or the fish itself too."""
     late = features_of("reaction-delay", arena)
     for each in late:
-        taken = each.instead(seen)
-        np.testing.assert_allclose(taken.sum(axis=-1), seen.attention)
+        assert each.instead is True or each.instead(seen).sum() == pytest.approx(
+            seen.attention.sum()
+        )
         assert each.low == 0.0
         # Three tenths of a step are three times one.
         assert each.high == (3.0 if each.label == "a tenth of a step" else 1.0)
@@ -380,16 +403,18 @@ def test_places_of_a_room_pull_those_in_it_alone(arena, seen):
 
 
 def test_places_between_are_looked_at_as_well(arena):
-    """Nine about each: the place itself, and those a third of the way to the next ones."""
+    """Up to nine about each: the place itself, and those a third of the way to the next ones."""
     drawn, *_ = find_effect("place-preference").features(arena)
-    near = drawn.near(0)
-    assert len(near) == drawn.n_near == 9
-    assert near[4].label == drawn.features[0].label
-    assert len({each.label for each in near}) == 9
-    assert drawn.n_tried == 9 * len(drawn.features)
-    x, y = zip(*(each.label.removeprefix("drawn to ").split(", ") for each in near), strict=True)
-    assert max(map(float, x)) - min(map(float, x)) == pytest.approx(2 / 3 * 0.1125 * 1.0, abs=0.03)
-    assert max(map(float, y)) - min(map(float, y)) == pytest.approx(2 / 3 * 0.1125 * 1.0, abs=0.03)
+    near = [drawn.near(k) for k in range(len(drawn.features))]
+    assert max(map(len, near)) == 9
+    assert drawn.n_tried == sum(map(len, near))
+    for each, some in zip(drawn.features, near, strict=True):
+        labels = [one.label for one in some]
+        assert each.label in labels
+        assert len(set(labels)) == len(labels)
+        for label in labels:
+            spot = [float(part) for part in label.removeprefix("drawn to ").split(", ")]
+            assert arena.outline.distance(shapely.Point(spot)) < 0.01
 
 
 def test_the_fastest_in_view_is_one_fish(arena, seen):

@@ -160,7 +160,8 @@ def noise_of_features(
 
     n_workers = case.question.n_workers
     rows = run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers)
-    return by_noise(np.array(rows), [gain.n_strengths for gain in clear])
+    n_strengths, n_tried = [gain.n_strengths for gain in clear], [gain.n_tried for gain in clear]
+    return by_noise(np.array(rows), n_strengths, n_tried)
 
 
 def as_step(case: Case, screen: Screen, told: Told) -> Step | None:

@@ -29,6 +29,9 @@ WAVERS = 3e-3
 """Chance at which the scores of blocks are no longer of one strength."""
 
 
+_LEAST_BESIDE = 1e-9
+"""Share of all weight that is not that of one block alone."""
+
 Of: TypeAlias = tuple[Scene, NDArray[np.int64]]
 """A recording, and the sample in which each step of what is asked begins."""
 
@@ -170,12 +173,14 @@ def _has_one_strength(asked: Floats, information: Floats, variance: Floats) -> b
         Of what is asked for.
     """
     tells = (information > 0) & (variance > 0)
-    if tells.sum() < 2:
-        return True
     strength = asked[tells] / information[tells]
-    weight = information[tells] ** 2 / variance[tells]
+    weight = (information[tells] / np.sqrt(variance[tells])) ** 2
     total = float(weight.sum())
+    beside = total - float((weight**2).sum()) / total if total > 0 else 0.0
+    # One block alone tells of no spread.
+    if not beside > _LEAST_BESIDE * total:
+        return True
     mean = float((weight * strength).sum()) / total
     q, df = float((weight * (strength - mean) ** 2).sum()), len(strength) - 1
-    spread2 = (q - df) / (total - float((weight**2).sum()) / total)
+    spread2 = (q - df) / beside
     return bool(spread2 <= mean**2 or chdtrc(df, q) > WAVERS)

@@ -174,21 +174,26 @@ class Component:
     kappa
         Concentration about a source; ``own`` or ``neighbours``: as the base law has it there.
     instead
-        Weights of what it takes the place of: of the directions to where the others are now.
+        Weights of what it takes the place of, of the directions to where the others are now: True
+        for all of the attention to them.
     low, high
         Bounds of the strengths.
     along
         What its weights go by, where that is one number: they are a curve then.
+    over
+        What it has to gain more than, where that is no case of the effect: what all fish do alike,
+        of a feature of how they differ.
     """
 
     label: str
     toward: Weights | Literal["toward", "bearing", "heading"]
     weights: Weights
     kappa: float | Literal["own", "neighbours"] = "neighbours"
-    instead: Weights | None = None
+    instead: Weights | bool = False
     low: float = 0.0
     high: float | None = None
     along: Along | None = None
+    over: Component | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,12 +210,15 @@ class Tilt:
         Lower bound of the strengths, where the opposite is no form of the effect.
     along
         What its weights go by, where that is one number: they are a curve then.
+    over
+        As of a `Component`.
     """
 
     label: str
     vectors: Weights
     low: float | None = None
     along: Along | None = None
+    over: Tilt | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -229,6 +237,8 @@ class Turned:
         Lower bound of the strengths, where the opposite is no form of the effect.
     along
         What its weights go by, where that is one number: they are a curve then.
+    over
+        As of a `Component`.
     """
 
     label: str
@@ -236,6 +246,7 @@ class Turned:
     neighbours: bool
     low: float | None = None
     along: Along | None = None
+    over: Turned | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -294,19 +305,17 @@ class OneOf:
     near
         Features near to one of them, itself among them, of which the most promising is fitted: so
         that many are looked at where a few say that something is there.
-    n_near
-        How many these are.
     """
 
     kind: str
     features: Sequence[Component | Tilt | Turned]
     near: Callable[[int], Sequence[Component | Tilt | Turned]] | None = None
-    n_near: int = 1
 
     @property
     def n_tried(self) -> int:
         """Of so many features the best is taken."""
-        return len(self.features) * self.n_near
+        n = len(self.features)
+        return n if self.near is None else sum(len(self.near(k)) for k in range(n))
 
 
 Mixed: TypeAlias = Component | Turned | Sharper

@@ -49,10 +49,40 @@ def test_noise_seldom_gains_more_than_its_chance_says(apart, n):
 
 
 def test_replicates_that_spread_by_more_say_so():
-    """Of normal laws with three times the spread: the stretch is about that."""
+    """Of normal laws with three times the spread: many show it, and six half of it."""
     rng = np.random.default_rng(6)
     wide = 3 * np.sqrt(2 * (1 + 2 * 79)) / 2
     (own,) = by_noise(rng.normal(40.0, wide, (400, 1)), [1])
     assert own.stretch == pytest.approx(3.0, rel=0.1)
+    few = [by_noise(rng.normal(40.0, wide, (6, 1)), [1])[0].stretch for _ in range(200)]
+    assert 2.0 < np.mean(few) < 2.8
     (calm,) = by_noise(np.full((6, 1), 40.0), [1])
     assert calm.stretch == pytest.approx(np.sqrt(7 / 6))
+
+
+def test_a_feature_that_spreads_widely_changes_no_other():
+    """Nor is what gains no more than chance stretched."""
+    rows = np.array([[0.0, 0.2], [0.0, 0.6], [60.0, 0.1], [0.0, 0.9], [0.0, 0.3], [60.0, 0.4]])
+    wide, calm = by_noise(rows, [1, 1])
+    assert wide.stretch > 3
+    assert calm == ByNoise(mean_nats=pytest.approx(0.416, abs=0.01), stretch=1.0)
+    assert calm.chance(5.0, 1) == pytest.approx(chi2.sf(10, 1))
+
+
+def test_the_price_of_a_search_is_no_noise():
+    """The best of 500 gains six nats by chance: nothing is taken off, its chance is counted."""
+    rng = np.random.default_rng(7)
+    best = (rng.chisquare(5, (6, 500, 1)) / 2).max(axis=1)
+    (own,) = by_noise(best, [5], [500])
+    assert own.more(5) < 2.5
+    (charged,) = by_noise(best, [5])
+    assert charged.more(5) > 4
+
+
+def test_what_is_gained_may_be_immense():
+    """Chances keep their size far out, and what is needed stays finite."""
+    assert NO_NOISE.chance(50.0, 1) == pytest.approx(chi2.sf(100, 1))
+    own = ByNoise(mean_nats=80.0)
+    assert 0 < own.chance(200.0, 5) < 1e-10
+    assert own.most(5, 1e-17) > own.most(5, 1e-12)
+    assert np.isfinite(own.most(5, 1e-17))

@@ -120,7 +120,7 @@ def test_of_places_a_few_are_fitted_and_all_are_counted(nothing):
     drawn = place.features(nothing.law.scene.arena)[0]
     found = gains_of(nothing.law, [place], kinds={("place-preference", "drawn")})
     assert 0 < len(found) <= 2
-    assert {each.n_tried for each in found} == {len(drawn.features) * drawn.n_near}
+    assert {each.n_tried for each in found} == {drawn.n_tried}
     assert {each.key for each in found} == {("place-preference", "drawn")}
     one = gain("x", [9.0], n_strengths=2)
     many = gain("x", [9.0], n_strengths=2, n_tried=50)
@@ -245,6 +245,42 @@ def test_a_name_is_compared_with_others_by_what_noise_leaves_of_theirs():
     )
     assert told.gain.name == "b"
     assert told.lead > 0
+
+
+def test_names_that_noise_hides_do_not_stand_before_others():
+    """Three that gain most are hidden; the fourth is asked then, and told."""
+    asked = []
+
+    def noise(clear):
+        asked.append([each.name for each in clear])
+        return [ByNoise(mean_nats=0.5 if each.name == "d" else 4 * STEPS.sum()) for each in clear]
+
+    gains = [gain(name, by * STEPS) for name, by in zip("abcd", (4, 3.5, 3, 1), strict=True)]
+    said = answer(gains, noise)
+    assert asked == [["a", "b", "c"], ["d"]]
+    assert said.told.gain.name == "d"
+    assert {each.name for each in said.hidden} == {"a", "b", "c"}
+
+
+def test_what_noise_hides_and_gains_more_is_a_tie():
+    """Of 80 nats noise makes 25 that spread widely: it is not told, and not beaten either."""
+    wide = ByNoise(mean_nats=0.3 * STEPS.sum(), stretch=9.0)
+    calm = ByNoise(mean_nats=0.5)
+    told = tell(
+        [gain("a", STEPS), gain("b", STEPS / 2)],
+        lambda clear: [wide if each.name == "a" else calm for each in clear],
+    )
+    assert told.gain.name == "b"
+    assert [each.name for each in told.ties] == ["a"]
+
+
+def test_a_feature_may_have_to_gain_more_than_another(nothing):
+    """Of what both say nothing is left, and the other's strengths are not its own."""
+    weights = lambda seen: seen.attention[..., None] * np.ones((1, 1, 1))  # noqa: E731
+    alone = Component(label="alone", toward="toward", weights=weights, low=-0.5)
+    same = replace(alone, label="over itself", over=alone)
+    assert nothing.gain("x", same).log_p == pytest.approx(0.0, abs=1e-9)
+    assert (nothing.gain("x", alone).n_strengths, nothing.gain("x", same).n_strengths) == (1, 0)
 
 
 def test_chance_tells_a_name_as_seldom_as_the_level_says():

@@ -86,7 +86,8 @@ def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
 
 def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -> Gain:
     feature, gain = asked
-    if isinstance(feature, Tilt) and any(gain is each for each in hopeful):
+    is_hopeful = any(gain is each for each in hopeful)
+    if isinstance(feature, Tilt) and feature.over is None and is_hopeful:
         return fits.refitted(feature, gain)
     return gain
 

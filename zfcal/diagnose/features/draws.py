@@ -101,7 +101,7 @@ class Draw:
 
 
 def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
-    """Return errors of all positions, of unit variance, shape (draw, sample, agent, 2).
+    """Return errors of all positions, standard normal, shape (draw, sample, agent, 2).
 
     Each coordinate has every part of the normal law once, in an order of its own: a Latin hypercube
     (McKay, Beckman and Conover 1979, Technometrics 21: 239-245). Averages over so few draws then
@@ -117,10 +117,8 @@ def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
         Source of the orders.
     """
     samples, _, agents = scene.states.shape
-    latin = LatinHypercube(samples * agents * 2, scramble=False, rng=random)
-    errors = ndtri(latin.random(n))
-    whole = max(float((errors[:, 0] ** 2).mean()), np.finfo(float).tiny)
-    return np.asarray(errors / np.sqrt(whole)).reshape(n, samples, agents, 2)
+    latin = LatinHypercube(samples * agents * 2, rng=random)
+    return np.asarray(ndtri(latin.random(n))).reshape(n, samples, agents, 2)
 
 
 def drawn(steps: Steps, errors_m: Floats) -> Draw:

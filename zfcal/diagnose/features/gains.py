@@ -164,6 +164,10 @@ class Fits:
         """Return what a feature of an effect adds."""
         fit = self.fit(feature)
         made, n = fit.log_p, len(fit.strengths)
+        over = getattr(feature, "over", None)
+        if over is not None and n:
+            common = self.fit(over)
+            made, n = made - common.log_p, max(n - len(common.strengths), 0)
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
@@ -211,6 +215,8 @@ class Fits:
             apart = self.law.turns.taken - self._mean_heading
             scores = np.einsum("sbd,sd->sb", feature.vectors(self.law.draws[0].seen), apart)
         total = scores.sum(axis=0)
+        if not np.isfinite(total).all():
+            return 0.0
         return float(total @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ total)
 
     def _promise_of(self, columns: Columns) -> float:

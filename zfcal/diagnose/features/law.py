@@ -233,10 +233,12 @@ class Law:
         def of(draw: Draw) -> Columns:
             weights = feature.weights(draw.seen)
             made = _weighed(self._bells_of(feature, draw), weights)
-            if feature.instead is None:
+            if not feature.instead:
                 return made
             present = self._kept_bells(draw, "toward", feature.kappa)
-            return _less(made, _weighed(present, feature.instead(draw.seen)))
+            attention = draw.seen.attention[..., None]
+            taken = attention if feature.instead is True else feature.instead(draw.seen)
+            return _less(made, _weighed(present, taken))
 
         if first:
             return of(self.draws[0])

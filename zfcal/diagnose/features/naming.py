@@ -13,7 +13,7 @@ from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.selection import LEVEL
 
 _HELD_AGAINST_NOISE = 3
-"""Names, those that gain most: the others have no chance to be the best."""
+"""Names that are held against noise at a time, those that gain most first."""
 
 Noise = Callable[[Sequence[Gain]], Sequence[ByNoise]]
 """Of some gains: what noise of positions alone makes each of these features gain."""
@@ -108,28 +108,41 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
         return [gain for gain in some if gain.p * n_tried[gain.name] < level and gain.nats > 0]
 
     clear = beyond_chance(gains)
-    hidden: tuple[Hidden, ...] = ()
+    lost: list[Gain] = []
     if noise is not None:
-        ahead = {gain.name for gain in best_by_name(clear)[:_HELD_AGAINST_NOISE]}
-        doubted = [g for g in clear if g.name in ahead and not g.without_noise]
-        known = zip(doubted, noise(doubted) if doubted else (), strict=True)
-        held = [gain for gain in clear if gain.without_noise and gain.name in ahead]
-        held += [replace(gain, noise=own) for gain, own in known]
-        clear = beyond_chance(held)
-        gains = [*held, *(gain for gain in gains if gain.name not in ahead)]
+        held: list[Gain] = []
+        waiting = best_by_name(clear)
+        clear = []
+        # Noise may hide those that gain most: then the next ones are asked.
+        while waiting and not clear:
+            ahead = {gain.name for gain in waiting[:_HELD_AGAINST_NOISE]}
+            waiting = waiting[_HELD_AGAINST_NOISE:]
+            held += _held([gain for gain in beyond_chance(gains) if gain.name in ahead], noise)
+            clear = beyond_chance(held)
+        known = {gain.name for gain in held}
         stand = {gain.name for gain in clear}
         lost = best_by_name([gain for gain in held if gain.name not in stand])
-        hidden = tuple(_hidden(gain, level / n_tried[gain.name]) for gain in lost)
+        gains = [*held, *(gain for gain in gains if gain.name not in known)]
+    hidden = tuple(_hidden(gain, level / n_tried[gain.name]) for gain in lost)
     best = best_by_name(clear)
     if not best:
         return Answer(told=None, hidden=hidden)
     first, *others = best
+    others += [gain for gain in lost if gain.nats > first.nats]
     ties = tuple(gain for gain in others if _lead(first, gain) <= SURE)
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
     told = Told(gain=first, p=min(1.0, first.p * n_tried[first.name]), ties=ties, lead=lead)
     return Answer(told=told, hidden=hidden)
+
+
+def _held(gains: Sequence[Gain], noise: Noise) -> list[Gain]:
+    """Return gains with what noise makes of them, but for those by the law of exact positions."""
+    doubted = [gain for gain in gains if not gain.without_noise]
+    known = zip(doubted, noise(doubted) if doubted else (), strict=True)
+    exact = [gain for gain in gains if gain.without_noise]
+    return exact + [replace(gain, noise=own) for gain, own in known]
 
 
 def _hidden(gain: Gain, level: float) -> Hidden:

@@ -93,16 +93,28 @@ def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
     """Return that each fish is drawn, or turns, to the way out in a measure of its own."""
     near = _near_way_out(between)
 
-    def turning(seen: Seen) -> Floats:
-        return near(seen) * aside_of(seen, seen.way_out[:, None], along_walls=True)
+    def all_near(seen: Seen) -> Floats:
+        return near(seen).sum(axis=1, keepdims=True)
 
+    def drawn(label: str, weights: Weights, over: Component | None = None) -> Component:
+        return Component(
+            label=label, toward=lambda seen: only(seen.way_out),
+            weights=lambda seen: only(weights(seen)), kappa=_KAPPA, over=over,
+        )  # fmt: skip
+
+    def turning(label: str, weights: Weights, over: Turned | None = None) -> Turned:
+        def by(seen: Seen) -> Floats:
+            return weights(seen) * aside_of(seen, seen.way_out[:, None], along_walls=True)
+
+        return Turned(label=label, by=by, neighbours=True, over=over)
+
+    # More than what all do alike, by which no fish is bolder than another.
     return (
-        Component(
-            label="drawn to the way out, by who", toward=lambda seen: only(seen.way_out),
-            weights=lambda seen: only(near(seen)), kappa=_KAPPA,
+        drawn("drawn to the way out, by who", near, drawn("drawn to the way out", all_near)),
+        turning(
+            "turning to the way out, by who", near, turning("turning to the way out", all_near)
         ),
-        Turned(label="turning to the way out, by who", by=turning, neighbours=True),
-    )  # fmt: skip
+    )
 
 
 def _features(arena: Arena) -> tuple[Feature, ...]:

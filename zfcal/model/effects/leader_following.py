@@ -143,6 +143,11 @@ def _leaning_to_the_fast(seen: Seen) -> Floats:
     return np.einsum("sjb,sjd->sbd", _attention(seen) * near[..., None], seen.bearing)
 
 
+def _leaning_to_each_near(seen: Seen) -> Floats:
+    near = seen.here & (seen.distance_m < _REACH_M[1])
+    return np.einsum("sj,sjd->sd", near.astype(np.float64), seen.bearing)[:, None]
+
+
 _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(
         _attention,
@@ -165,7 +170,11 @@ _FEATURES: tuple[Feature, ...] = (
             for reach_m in _REACH_M
         ),
     ),
-    Tilt(label="leaning to the fast", vectors=_leaning_to_the_fast, low=0.0),
+    # More than to each alike, which would be cohesion.
+    Tilt(
+        label="leaning to the fast", vectors=_leaning_to_the_fast, low=0.0,
+        over=Tilt(label="leaning to each near", vectors=_leaning_to_each_near, low=0.0),
+    ),
     # One of them: a pull to each alike would be cohesion.
     OneOf(
         kind="drawn to one",

@@ -112,29 +112,33 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     asked: list[_Asked] = [(spot, None) for spot in spots]
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
     apart = np.array([x_max - x_min, y_max - y_min]) * (_UP_TO[1] - _UP_TO[0])
+
+    def near(asked_: _Asked) -> list[_Asked]:
+        spot, room = asked_
+        inside = arena.outline if room is None else room
+        spots = [spot + apart * (x, y) for x in _BETWEEN for y in _BETWEEN]
+        return [(each, room) for each in spots if inside.covers(shapely.Point(each))]
+
+    places = [(each, near(each)) for each in asked]
     sorts = (
         ("drawn", _drawn),
         ("leaning", _leaning),
         ("turning", _turning),
         ("turning as a whole", _turning_as_a_whole),
     )
-    return tuple(_of_sort(kind, sort, asked, apart) for kind, sort in sorts)
+    return tuple(_of_sort(kind, sort, places) for kind, sort in sorts)
 
 
 def _of_sort(
     kind: str,
     sort: Callable[..., Component | Tilt | Turned],
-    asked: Sequence[_Asked],
-    apart: Floats,
+    places: Sequence[tuple[_Asked, Sequence[_Asked]]],
 ) -> OneOf:
     """Return features of one sort of the places, and of those between them."""
-
-    def near(k: int) -> list[Component | Tilt | Turned]:
-        spot, room = asked[k]
-        return [sort(spot + apart * (x, y), room) for x in _BETWEEN for y in _BETWEEN]
-
     return OneOf(
-        kind=kind, features=[sort(*each) for each in asked], near=near, n_near=len(_BETWEEN) ** 2
+        kind=kind,
+        features=[sort(*each) for each, _ in places],
+        near=lambda k: [sort(*each) for each in places[k][1]],
     )
 
 

@@ -10,10 +10,6 @@ from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen
 
 
-def _attended(seen: Seen) -> Floats:
-    return seen.attention[..., None]
-
-
 def _late(
     label: str,
     toward: Callable[[Seen], Floats],
@@ -25,7 +21,7 @@ def _late(
         label=label,
         toward=toward,
         weights=lambda seen: attention(seen)[..., None],
-        instead=_attended,
+        instead=True,
         high=high,
     )
 
