@@ -18,7 +18,7 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Hidden, Told
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.heading_look import _noise_of, heading_look
-from zfcal.diagnose.looks import Found, level_of, outdoes
+from zfcal.diagnose.looks import Found, clearest_first, level_of, outdoes
 from zfcal.diagnose.naming import Choice
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
@@ -450,3 +450,16 @@ def test_what_is_named_in_the_end_is_not_hidden():
     assert now.hidden == (late,)
     assert Found().and_further(Found(suspicious=True)).suspicious
     assert not found("crowding").and_further(Found(suspicious=True)).suspicious
+
+
+def test_effects_of_the_law_with_the_clearest_one_are_told_first():
+    """Those of one law stay in the order of adding, however much the later ones gain."""
+    steps = [
+        step("crowding", None, 30.0),
+        step("speed-matching", None, 40.0),
+        step("alignment", None, 20.0),
+        step("turning-bias", None, 50.0),
+    ]
+    assert clearest_first(steps) == [2, 3, 0, 1]
+    assert clearest_first(steps[:3]) == [0, 1, 2]
+    assert clearest_first([]) == []

@@ -26,7 +26,7 @@ from zfcal.diagnose.controls import ask_controls
 from zfcal.diagnose.findings import Diagnosis, Located
 from zfcal.diagnose.heading_look import curves_of, heading_look
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
-from zfcal.diagnose.looks import Found
+from zfcal.diagnose.looks import Found, clearest_first
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.notes import noise_note, notes_of
 from zfcal.diagnose.null import Null, from_replicates, run_null, theory
@@ -181,10 +181,11 @@ def _diagnosis(
     )
     omnibus = _omnibus(question, own, rows)
     curves = curves_of(case, steps, without_noise=found.without_noise)
-    effects = tuple(
+    made = [
         effect_found(step, held, ties_of(step.choice, [each.choice for each in steps[n:]]), curve)
         for n, (step, held, curve) in enumerate(zip(steps, confirmed, curves, strict=True), start=1)
-    )
+    ]
+    effects = tuple(made[n] for n in clearest_first(steps))
     # What stands out beside effects that the model has, and has no name, is theirs.
     is_left_over = unfeatured.stands_out and bool(in_model(case.screen.fitted.parameters))
     suspicious = found.suspicious or is_left_over or is_suspicious(question, omnibus)

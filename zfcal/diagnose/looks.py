@@ -85,6 +85,18 @@ def on_headings(step: Step) -> bool:
     return not step.choice.best.candidate.effect.on_speed
 
 
+def clearest_first(steps: Sequence[Step]) -> list[int]:
+    """Return the order in which effects are told: those of the law with the clearest one first.
+
+    Within each law they stay in the order of adding, since each was asked beside those before it.
+    """
+    laws = [
+        [n for n, step in enumerate(steps) if on_headings(step) is own] for own in (True, False)
+    ]
+    laws.sort(key=lambda law: -max((steps[n].choice.best.nats for n in law), default=0.0))
+    return [n for law in laws for n in law]
+
+
 def is_other_form(guess: Step | None, told: Told) -> bool:
     """Return whether what is beyond the list says in another form what features name."""
     names = [gain.name for gain in (told.gain, *told.ties)]
