@@ -14,16 +14,7 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
-from zfcal.model.features import (
-    Feature,
-    Leaving,
-    Mixed,
-    OneOf,
-    Sharper,
-    Single,
-    Tilt,
-    Turned,
-)
+from zfcal.model.features import Feature, Leaving, Mixed, OneOf, Sharper, Single, Tilt, Turned
 
 _IN_REACH = 0.5
 """Share of the nats of the best one below which a feature is not fitted anew."""

@@ -12,7 +12,6 @@ from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
 from zfcal.model.extended import without_effects
-from zfcal.model.features import AWAY_M, LAGS, Seen, turned_by
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
@@ -37,6 +36,7 @@ from zfcal.model.kernels.state import (
 )
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, Turns
+from zfcal.model.seen import AWAY_M, LAGS, Seen, turned_by
 from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters

@@ -19,9 +19,10 @@ from scipy.special import expit, logit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
+from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
-from zfcal.diagnose.features.law import MOST_SHARPER, Columns, Law
+from zfcal.diagnose.features.law import MOST_SHARPER, Law
 from zfcal.model.extended import LAPSE
 from zfcal.model.features import Component, Leaving, Mixed, OneOf, Sharper, Single, Tilt, Turned
 from zfcal.model.kernels.landing import ANGLES

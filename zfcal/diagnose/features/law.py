@@ -21,14 +21,16 @@ from numpy.typing import NDArray
 from scipy.special import i0e
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.features.columns import Columns, less, weighed
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.waves import series_of, waves_of
-from zfcal.model.features import Component, Sharper, Turned, turned_by
+from zfcal.model.features import Component, Sharper, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.scene import Scene, Turns
+from zfcal.model.seen import turned_by
 
 DRAWS = 8
 
@@ -43,9 +45,6 @@ _WEIGHT = (-0.98, 6.0)
 
 _MORE = 1.1
 """By this factor a concentration is changed for the law's derivative."""
-
-Columns = tuple[Floats, Floats]
-"""Numbers of each step and weight: at the heading taken, and integrated."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -232,13 +231,13 @@ class Law:
 
         def of(draw: Draw) -> Columns:
             weights = feature.weights(draw.seen)
-            made = _weighed(self._bells_of(feature, draw), weights)
+            made = weighed(self._bells_of(feature, draw), weights)
             if not feature.instead:
                 return made
             present = self._kept_bells(draw, "toward", feature.kappa)
             attention = draw.seen.attention[..., None]
             taken = attention if feature.instead is True else feature.instead(draw.seen)
-            return _less(made, _weighed(present, taken))
+            return less(made, weighed(present, taken))
 
         if first:
             return of(self.draws[0])
@@ -273,7 +272,7 @@ class Law:
     @cached_property
     def _own_sharper(self) -> Columns:
         own_more = self.mean([self._own(draw.base, _MORE) for draw in self.draws])
-        return _less(own_more, self.own)
+        return less(own_more, self.own)
 
     def turned(self, feature: Turned) -> Columns:
         """Return the derivative of the law by a turn of its directions, shape (step, weight)."""
@@ -293,7 +292,7 @@ class Law:
                 self._mixture(draw, angle, neighbours=neighbours)
                 for angle in (_TURN_RAD, -_TURN_RAD)
             )
-            at, over = _less(left, right)
+            at, over = less(left, right)
             self._kept[key] = at / (2 * _TURN_RAD), over / (2 * _TURN_RAD)
         return self._kept[key]
 
@@ -357,7 +356,7 @@ class Law:
         changes = (
             (self._own_sharper, MOST_SHARPER),
             (social, (-0.9, 6.0)),
-            (_less(social_more, social), MOST_SHARPER),
+            (less(social_more, social), MOST_SHARPER),
         )
         columns, bounds = [], []
         for zone in np.unique(self.turns.zone):
@@ -400,13 +399,3 @@ def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
     if one is None or other is None:
         return other if one is None else one
     return one + other
-
-
-def _weighed(columns: Columns, weights: Floats) -> Columns:
-    """Return columns of sources, weighed and added up, shape (step, weight)."""
-    at, over = (np.asarray(np.einsum("sj,sjb->sb", each, weights)) for each in columns)
-    return at, over
-
-
-def _less(one: Columns, other: Columns) -> Columns:
-    return one[0] - other[0], one[1] - other[1]

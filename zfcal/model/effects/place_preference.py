@@ -14,23 +14,12 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, tilt, turn_to
 from zfcal.model.effects.places import places
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    OneOf,
-    Seen,
-    Tilt,
-    Turned,
-    aside_of,
-    hats,
-    of_tank,
-    only,
-)
+from zfcal.model.features import Along, Component, Feature, OneOf, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import FOLLOWS, X, Y
+from zfcal.model.seen import Seen, aside_of, hats, of_tank, only
 
 _AT_IT_M = 0.02
 
