@@ -271,8 +271,7 @@ class Law:
 
     @cached_property
     def _own_sharper(self) -> Columns:
-        own_more = self.mean([self._own(draw.base, _MORE) for draw in self.draws])
-        return less(own_more, self.own)
+        return less(self.mean([self._own(draw.base, _MORE) for draw in self.draws]), self.own)
 
     def turned(self, feature: Turned) -> Columns:
         """Return the derivative of the law by a turn of its directions, shape (step, weight)."""

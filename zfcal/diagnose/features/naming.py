@@ -111,13 +111,12 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
     lost: list[Gain] = []
     if noise is not None:
         held: list[Gain] = []
-        waiting = best_by_name(clear)
-        clear = []
+        doubtful, waiting, clear = clear, best_by_name(clear), []
         # Noise may hide those that gain most: then the next ones are asked.
         while waiting and not clear:
             ahead = {gain.name for gain in waiting[:_HELD_AGAINST_NOISE]}
             waiting = waiting[_HELD_AGAINST_NOISE:]
-            held += _held([gain for gain in beyond_chance(gains) if gain.name in ahead], noise)
+            held += _held([gain for gain in doubtful if gain.name in ahead], noise)
             clear = beyond_chance(held)
         known = {gain.name for gain in held}
         stand = {gain.name for gain in clear}
@@ -172,7 +171,7 @@ def tried(gains: Sequence[Gain]) -> dict[str, int]:
     Each name has the same share of the level, and each kind of feature the same share of its
     name's (a weighted inequality of Bonferroni): a name with many features takes from no other.
     """
-    kinds = {(gain.name, gain.key, gain.without_noise) for gain in gains}
+    kinds = {(*gain.key, gain.without_noise) for gain in gains}
     n_kinds = Counter(name for name, *_ in kinds)
     return {name: n * len(n_kinds) for name, n in n_kinds.items()}
 

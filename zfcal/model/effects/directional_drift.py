@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -70,12 +71,8 @@ def _axes(seen: Seen) -> Floats:
     return of_tank(seen, np.eye(2)[None])
 
 
-def _aside(seen: Seen) -> Floats:
-    return aside_of(seen, _axes(seen))
-
-
-def _aside_anywhere(seen: Seen) -> Floats:
-    return aside_of(seen, _axes(seen), along_walls=True)
+def _aside(seen: Seen, *, along_walls: bool = False) -> Floats:
+    return aside_of(seen, _axes(seen), along_walls=along_walls)
 
 
 def _from(begin: float) -> Tilt:
@@ -120,7 +117,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),
     OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
-    Turned(label="turning as a whole", by=_aside_anywhere, neighbours=True),
+    Turned(label="turning as a whole", by=partial(_aside, along_walls=True), neighbours=True),
     Tilt(label="carried", vectors=_carried),
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -149,14 +150,9 @@ def _of_nearest(seen: Seen) -> Floats:
     return _of_each(seen) * seen.nearest
 
 
-def _turning(seen: Seen) -> Floats:
+def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
     toward, weights = _middle(seen)
-    return np.asarray(aside_of(seen, toward[:, None]) * weights)
-
-
-def _turning_anywhere(seen: Seen) -> Floats:
-    toward, weights = _middle(seen)
-    return np.asarray(aside_of(seen, toward[:, None], along_walls=True) * weights)
+    return np.asarray(aside_of(seen, toward[:, None], along_walls=along_walls) * weights)
 
 
 def _turning_to_nearest(seen: Seen) -> Floats:
@@ -196,8 +192,8 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0, along=_TO_NEAREST),
     Turned(label="turning", by=_turning, neighbours=False, low=0.0, along=_TO_MIDDLE),
     Turned(
-        label="turning as a whole", by=_turning_anywhere, neighbours=True, low=0.0,
-        along=_TO_MIDDLE,
+        label="turning as a whole", by=partial(_turning, along_walls=True), neighbours=True,
+        low=0.0, along=_TO_MIDDLE,
     ),
     Turned(
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,

@@ -136,15 +136,17 @@ _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
 _REACH_M = (0.1, 0.2, 9.0)
 
 
-def _leaning_to_the_fast(seen: Seen) -> Floats:
-    """Return the bearings of those near by their speeds, shape (step, speed, 2)."""
-    near = seen.here & (seen.distance_m < _REACH_M[1])
-    return np.einsum("sjb,sjd->sbd", _attention(seen) * near[..., None], seen.bearing)
+def _near(seen: Seen) -> Floats:
+    return np.asarray(seen.here & (seen.distance_m < _REACH_M[1]), float)[..., None]
 
 
 def _leaning_to_each_near(seen: Seen) -> Floats:
-    near = seen.here & (seen.distance_m < _REACH_M[1])
-    return np.einsum("sj,sjd->sd", near.astype(np.float64), seen.bearing)[:, None]
+    return np.einsum("sjb,sjd->sbd", _near(seen), seen.bearing)
+
+
+def _leaning_to_the_fast(seen: Seen) -> Floats:
+    """Return the bearings of those near by their speeds, shape (step, speed, 2)."""
+    return np.einsum("sjb,sjd->sbd", _attention(seen) * _near(seen), seen.bearing)
 
 
 _FEATURES: tuple[Feature, ...] = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -108,12 +109,8 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
 
 
-def _turning(seen: Seen) -> Floats:
-    return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside_of(seen, seen.bearing)))
-
-
-def _turning_anywhere(seen: Seen) -> Floats:
-    aside = aside_of(seen, seen.bearing, along_walls=True)
+def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
+    aside = aside_of(seen, seen.bearing, along_walls=along_walls)
     return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside))
 
 
@@ -135,7 +132,10 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     Tilt(label="leaning", vectors=_leaning, along=_TO_ROBOT),
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
-    Turned(label="turning as a whole", by=_turning_anywhere, neighbours=True, along=_TO_ROBOT),
+    Turned(
+        label="turning as a whole", by=partial(_turning, along_walls=True), neighbours=True,
+        along=_TO_ROBOT,
+    ),
 )  # fmt: skip
 
 
