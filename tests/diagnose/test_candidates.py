@@ -15,9 +15,9 @@ from zfcal.diagnose.candidates import (
 )
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.generic import generic_effects
+from zfcal.model.features import LAGS
 from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import make_scene
-from zfcal.model.seen import LAGS
 
 
 @pytest.fixture(scope="module")

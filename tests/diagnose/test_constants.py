@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
-ROW = re.compile(r"^\| `([a-z.]+)\.(_?[A-Z_]+)` \| ([0-9.]+) \|", re.MULTILINE)
+ROW = re.compile(r"^\| `([a-z_.]+)\.(_?[A-Z_]+)` \| ([0-9.]+) \|", re.MULTILINE)
 MODULES = {"law": "features.law", "paces": "features.paces"}
 
 

@@ -8,9 +8,20 @@ import pytest
 import shapely
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.model.directions import left_of
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.features import Component, Leaving, OneOf, Sharper, Tilt, Turned
-from zfcal.model.seen import AWAY_M, LAGS, Seen, hats, left_of
+from zfcal.model.features import (
+    AWAY_M,
+    LAGS,
+    Component,
+    Leaving,
+    OneOf,
+    Seen,
+    Sharper,
+    Tilt,
+    Turned,
+    hats,
+)
 
 N, OTHERS = 6, 3
 

@@ -10,10 +10,10 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
+from zfcal.model.features import LAGS
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import Scene
-from zfcal.model.seen import LAGS
 from zfcal.parameters import Parameters
 
 _FAINT = 0.25

@@ -11,11 +11,11 @@ from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, dra
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
+from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.features import Component, Sharper, Turned
+from zfcal.model.features import LAGS, Component, Sharper, Turned
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
-from zfcal.model.seen import LAGS, turned_by
 
 
 @pytest.fixture(scope="module")

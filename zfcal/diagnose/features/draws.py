@@ -11,7 +11,9 @@ from scipy.special import ndtri
 from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import turned_by
 from zfcal.model.extended import without_effects
+from zfcal.model.features import AWAY_M, LAGS, Seen
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
@@ -36,7 +38,6 @@ from zfcal.model.kernels.state import (
 )
 from zfcal.model.packing import pack
 from zfcal.model.scene import Scene, Turns
-from zfcal.model.seen import AWAY_M, LAGS, Seen, turned_by
 from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters

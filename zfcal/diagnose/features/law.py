@@ -25,12 +25,12 @@ from zfcal.diagnose.features.columns import Columns, less, weighed
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.waves import series_of, waves_of
+from zfcal.model.directions import turned_by
 from zfcal.model.features import Component, Sharper, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.scene import Scene, Turns
-from zfcal.model.seen import turned_by
 
 DRAWS = 8
 

@@ -25,10 +25,10 @@ from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.steadiness import Course
 from zfcal.model.effects import Effect, find_effect
+from zfcal.model.features import AWAY_M
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
 from zfcal.model.paces import Pace, Swum
 from zfcal.model.scene import Moves, Scene
-from zfcal.model.seen import AWAY_M
 
 _LEAST_MOVES = 50
 """Of a track that has a mean of its own; shorter ones have one together."""

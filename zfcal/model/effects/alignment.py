@@ -16,11 +16,10 @@ from zfcal.model.effects.forms import (
     seen_by_rank,
     tilt,
 )
-from zfcal.model.features import Along, Component, Feature, Tilt, Turned, attended, evenly
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, attended, evenly
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
-from zfcal.model.seen import Seen
 
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""

@@ -9,12 +9,21 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.features import Component, Feature, Leaving, Tilt, Turned, Weights
+from zfcal.model.features import (
+    Component,
+    Feature,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+    Weights,
+    aside_of,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.kernels.state import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE
-from zfcal.model.seen import Seen, aside_of, only
 
 
 @hook(FACTOR)

@@ -15,7 +15,18 @@ from zfcal.model.effects.forms import (
     turn_to,
     way_out,
 )
-from zfcal.model.features import Along, Component, Feature, Leaving, Tilt, Turned
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    hats,
+    only,
+)
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import (
@@ -30,7 +41,6 @@ from zfcal.model.kernels.state import (
     TIME,
     ZONE,
 )
-from zfcal.model.seen import Seen, aside_of, hats, only
 
 _KAPPA = 3.0
 _PER_STRENGTH = 0.1

@@ -8,13 +8,23 @@ from functools import partial
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, SLOWEST_M_S, SPEED_M_S, cut, tilt, turn_to
-from zfcal.model.features import Along, Component, Feature, OneOf, Tilt, Turned
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS
-from zfcal.model.seen import Seen, aside_of, of_tank, only
 
 _MOST = 4.0
 
@@ -60,7 +70,7 @@ _BEGINS = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 def _compass(seen: Seen) -> Floats:
     """Return six directions of the tank, shape (step, 6, 2)."""
-    return of_tank(seen, np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=-1)[None])
+    return of_tank(seen.x_axis, np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=-1)[None])
 
 
 def _each(seen: Seen) -> Floats:
@@ -68,7 +78,7 @@ def _each(seen: Seen) -> Floats:
 
 
 def _axes(seen: Seen) -> Floats:
-    return of_tank(seen, np.eye(2)[None])
+    return of_tank(seen.x_axis, np.eye(2)[None])
 
 
 def _aside(seen: Seen, *, along_walls: bool = False) -> Floats:
@@ -92,7 +102,7 @@ def _off_the_walls(angle_rad: float) -> Component:
     way = np.array([[[math.cos(angle_rad), math.sin(angle_rad)]]])
     return Component(
         label=f"drawn to {math.degrees(angle_rad):.0f} degrees, off the walls",
-        toward=lambda seen: np.broadcast_to(of_tank(seen, way), (len(seen.zone), 1, 2)),
+        toward=lambda seen: np.broadcast_to(of_tank(seen.x_axis, way), (len(seen.zone), 1, 2)),
         weights=lambda seen: only((~seen.follows_walls).astype(np.float64)[:, None]),
         kappa=3.0,
     )

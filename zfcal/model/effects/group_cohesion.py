@@ -18,11 +18,10 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.features import Along, Component, Feature, Tilt, Turned
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, hats, only
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, ZONE, X, Y
-from zfcal.model.seen import Seen, aside_of, hats, only
 
 
 @inlined

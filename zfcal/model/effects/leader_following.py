@@ -14,14 +14,15 @@ from zfcal.model.features import (
     Component,
     Feature,
     OneOf,
+    Seen,
     Tilt,
     Weights,
     factor_on_attention,
+    hats,
 )
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import SPEED, ZONE, X, Y
-from zfcal.model.seen import Seen, hats
 
 _PER_STRENGTH = 0.1
 

@@ -11,15 +11,26 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
+from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, tilt, turn_to
 from zfcal.model.effects.places import places
-from zfcal.model.features import Along, Component, Feature, OneOf, Tilt, Turned
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    hats,
+    only,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import FOLLOWS, X, Y
-from zfcal.model.seen import Seen, aside_of, hats, of_tank, only
 
 _AT_IT_M = 0.02
 
@@ -134,7 +145,7 @@ def _of_sort(
 def _toward(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
     way = spot - seen.xy_m
     far = np.linalg.norm(way, axis=1)
-    toward = of_tank(seen, (way / np.maximum(far, 1e-9)[:, None])[:, None])
+    toward = of_tank(seen.x_axis, (way / np.maximum(far, 1e-9)[:, None])[:, None])
     return toward[:, 0], hats(far, _KNOTS_M)
 
 

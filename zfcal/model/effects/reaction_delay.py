@@ -7,8 +7,7 @@ from collections.abc import Callable
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import Component, Feature
-from zfcal.model.seen import LAGS, Seen
+from zfcal.model.features import LAGS, Component, Feature, Seen
 
 
 def _late(

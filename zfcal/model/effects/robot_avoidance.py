@@ -10,11 +10,20 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, Hooked, apart, beyond, tilt, turn_to
-from zfcal.model.features import Along, Component, Feature, Tilt, Turned, factor_on_attention
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Seen,
+    Tilt,
+    Turned,
+    aside_of,
+    factor_on_attention,
+    hats,
+)
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
 from zfcal.model.kernels.state import FOLLOWS, KIND, X, Y
-from zfcal.model.seen import Seen, aside_of, hats
 
 _NEAR_M = 0.1
 _PER_STRENGTH = 0.1

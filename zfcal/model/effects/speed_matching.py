@@ -14,11 +14,11 @@ from zfcal.model.effects.forms import (
     quickness,
     times_faster,
 )
+from zfcal.model.features import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED, ZONE
 from zfcal.model.paces import Pace, Swum
-from zfcal.model.seen import hats
 
 _LEAST_M = 0.01
 

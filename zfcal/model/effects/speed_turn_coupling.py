@@ -11,12 +11,11 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.features import Feature, Sharper, Tilt
+from zfcal.model.features import Feature, Seen, Sharper, Tilt, hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY
 from zfcal.model.paces import Pace, Swum
-from zfcal.model.seen import Seen, hats
 
 
 @hook(FACTOR)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.features import Component, Feature, OneOf, Tilt, Turned
+from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY
-from zfcal.model.seen import Seen, left_of, only, turned_by
 
 _KAPPA = 4.0
 _PER_STRENGTH = 0.1

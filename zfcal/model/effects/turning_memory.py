@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.features import Component, Feature, Tilt, Turned
+from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
-from zfcal.model.seen import Seen, left_of, only, turned_by
 
 _PER_STRENGTH = 0.1
 _KAPPA = 9.0

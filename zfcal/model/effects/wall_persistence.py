@@ -10,11 +10,10 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import sense_along, tilt
-from zfcal.model.features import Component, Feature, Tilt
+from zfcal.model.features import Component, Feature, Seen, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, TAU_X, TAU_Y
-from zfcal.model.seen import Seen
 
 
 @hook(FACTOR)

@@ -1,0 +1,45 @@
+"""Unit vectors, turned."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zfcal.arrays import Floats
+
+
+def left_of(ways: Floats) -> Floats:
+    """Return vectors turned to the left by a right angle.
+
+    Parameters
+    ----------
+    ways : ndarray, shape (..., 2)
+    """
+    return np.stack([-ways[..., 1], ways[..., 0]], axis=-1)
+
+
+def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
+    """Return vectors turned to the left, shape (..., 2).
+
+    Parameters
+    ----------
+    ways : ndarray, shape (..., 2)
+    angle_rad : array_like
+        For each of them, or for all.
+    """
+    c, s = np.cos(angle_rad)[..., None], np.sin(angle_rad)[..., None]
+    return np.asarray(c * ways + s * left_of(ways))
+
+
+def of_tank(x_axis: Floats, ways: Floats) -> Floats:
+    """Return directions of the tank as they are seen, shape (step, way, 2).
+
+    Parameters
+    ----------
+    x_axis : ndarray, shape (step, 2)
+        Where that of the tank is seen.
+    ways : ndarray, shape (step or 1, way, 2)
+        In the tank.
+    """
+    c, s = x_axis[:, None, :1], x_axis[:, None, 1:]
+    return np.asarray(c * ways + s * left_of(ways))
