@@ -20,8 +20,8 @@ from zfcal.model.features import (
     Sharper,
     Tilt,
     Turned,
-    hats,
 )
+from zfcal.model.hats import hats
 
 N, OTHERS = 6, 3
 

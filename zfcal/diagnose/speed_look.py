@@ -17,7 +17,7 @@ from zfcal.diagnose.candidates import in_model
 from zfcal.diagnose.case import Case, has_noise
 from zfcal.diagnose.features.false_gains import ByNoise
 from zfcal.diagnose.features.gains import Gain
-from zfcal.diagnose.features.naming import Answer, Told, answer, tell
+from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
@@ -31,10 +31,11 @@ from zfcal.diagnose.looks import (
     outdoes,
     without_idle_ties,
 )
+from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import MOST_EFFECTS, Step
 from zfcal.diagnose.steadiness import Of
-from zfcal.model.effects import Effect
+from zfcal.model.effects import Effect, find_effect
 
 
 def speed_look(case: Case, unfeatured: Unfeatured) -> Found:
@@ -122,7 +123,7 @@ class _Looks:
         step = as_step(self.case, self.screen, told)
         if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
             return step
-        return step if told.lead > BY_ITSELF else None
+        return step if told.lead > BY_ITSELF or self._explains(told) else None
 
     def not_left_over(self, guess: Step | None) -> Step | None:
         """Return an effect beyond the list, unless features of what is there gain as much."""
@@ -133,20 +134,36 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        noise = self._noise if has_noise(self.case.question) else None
         gains = pace_gains(self.paces, not_yet_there(self.case, self.beside))
-        said = answer(gains, noise, level=level_of(self.number))
+        said = answer(gains, self._noise(self.beside), level=level_of(self.number))
         if said.told is None:
             return said
         return dataclasses.replace(said, told=without_idle_ties(said.told, self._stands))
 
+    def _explains(self, told: Told) -> bool:
+        """Return whether a name leads, and no other one gains more than chance beside it."""
+        if not told.lead > SURE:
+            return False
+        own = find_effect(told.gain.name)
+        return not self._stand(not_yet_there(self.case, (*self.beside, own)), own)
+
     def _stands(self, effect: Effect, beside: Effect) -> bool:
-        return tell(pace_gains(self.paces.and_beside(beside), [effect])) is not None
+        return self._stand([effect], beside)
 
-    def _noise(self, clear: Sequence[Gain]) -> list[ByNoise]:
-        """Return what noise makes features gain."""
+    def _stand(self, effects: Sequence[Effect], beside: Effect) -> bool:
+        """Return whether features of any effect gain more than chance beside those of another."""
+        gains = pace_gains(self.paces.and_beside(beside), effects)
+        return tell(gains, self._noise((*self.beside, beside))) is not None
 
-        def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
-            return pace_gains(Paces(screen=other, beside=self.beside), effects)
+    def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
+        """Return what tells how much of a gain beside some effects noise of positions makes."""
+        if not has_noise(self.case.question):
+            return None
 
-        return noise_of_features(self.case, clear, gains)
+        def noise(clear: Sequence[Gain]) -> list[ByNoise]:
+            def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
+                return pace_gains(Paces(screen=other, beside=beside), effects)
+
+            return noise_of_features(self.case, clear, gains)
+
+        return noise

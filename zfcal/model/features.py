@@ -12,12 +12,13 @@ The files of effects say which features theirs are. How they are fitted stands i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 
@@ -52,8 +53,9 @@ class Seen:
         it was itself.
     bearing : ndarray, shape (step, other, 2)
         To the other.
-    distance_m, off_axis_rad, speed_m_s : ndarray, shape (step, other)
-        Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its speed.
+    distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
+        Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its last
+        speed, and the mean over two seconds.
     heading : ndarray, shape (step, other, 2)
         Of the other.
     here, in_sight, is_robot : ndarray of bool, shape (step, other)
@@ -97,6 +99,7 @@ class Seen:
     distance_m: Floats
     off_axis_rad: Floats
     speed_m_s: Floats
+    lately_m_s: Floats
     heading: Floats
     here: NDArray[np.bool_]
     in_sight: NDArray[np.bool_]
@@ -121,15 +124,26 @@ class Seen:
     @property
     def nearest(self) -> Floats:
         """One for the nearest other one, else 0, shape (step, other, 1)."""
-        if not self.here.size:
-            return np.zeros((*self.here.shape, 1))
-        chosen = np.zeros(self.here.shape)
-        chosen[np.arange(len(chosen)), self.distance_m.argmin(axis=1)] = 1.0
-        return (chosen * self.here)[..., None]
+        return self.chosen(-self.distance_m, self.here)
 
-    def by_distance(self, knots_m: Sequence[float]) -> Floats:
-        """Return hat functions of the distances, 0 for who is not there."""
-        return hats(self.distance_m, knots_m) * self.here[..., None]
+    @property
+    def foremost(self) -> Floats:
+        """One for the other one that is most straight ahead, of those before the fish."""
+        return self.chosen(-self.off_axis_rad, self.here & (self.off_axis_rad < math.pi / 2))
+
+    def chosen(self, values: Floats, among: NDArray[np.bool_]) -> Floats:
+        """Return one for the other one of the highest value, else 0, shape (step, other, 1).
+
+        Parameters
+        ----------
+        values, among : ndarray, shape (step, other)
+            Of those among whom it is chosen.
+        """
+        if not among.size:
+            return np.zeros((*among.shape, 1))
+        best = np.where(among, values, -np.inf).argmax(axis=1)
+        is_best = best[:, None] == np.arange(among.shape[1])
+        return np.asarray((is_best & among)[..., None], dtype=np.float64)
 
 
 Weights: TypeAlias = Callable[[Seen], Floats]
@@ -323,30 +337,6 @@ Mixed: TypeAlias = Component | Turned | Sharper
 
 Single: TypeAlias = Mixed | Tilt | Leaving
 Feature: TypeAlias = Single | OneOf
-
-
-def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
-    """Return the hat functions between knots, which add up to one.
-
-    Parameters
-    ----------
-    values : array_like
-        Beyond the first and last knot they count as there.
-    knots
-        Ascending.
-
-    Returns
-    -------
-    ndarray, shape (..., knot)
-    """
-    at = np.asarray(knots, dtype=np.float64)
-    x = np.clip(np.asarray(values, dtype=np.float64), at[0], at[-1])
-    below = np.clip(np.searchsorted(at, x, side="right") - 1, 0, len(at) - 2)
-    share = (x - at[below]) / (at[below + 1] - at[below])
-    made = np.zeros((*x.shape, len(at)))
-    np.put_along_axis(made, below[..., None], (1 - share)[..., None], -1)
-    np.put_along_axis(made, below[..., None] + 1, share[..., None], -1)
-    return made
 
 
 def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:

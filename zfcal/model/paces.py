@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,14 @@ class Swum:
     ----------
     last, before_last, third : ndarray, shape (step,)
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
+    last_m_s, last_ago_m_s : ndarray, shape (step,)
+        The own speed one step ago, and some seconds before that; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
     others : ndarray, shape (step, other)
         Normal scores of the others' last speeds; 0 where they are not known.
+    others_m_s, others_ago_m_s : ndarray, shape (step, other)
+        Their last speeds, and those of some seconds before; NaN where they are not known.
     distance_m : ndarray, shape (step, other)
         To them; `zfcal.model.features.AWAY_M` for who is not there.
     here : ndarray of bool, shape (step, other)
@@ -40,8 +45,12 @@ class Swum:
     last: Floats
     before_last: Floats
     third: Floats
+    last_m_s: Floats
+    last_ago_m_s: Floats
     last_turn_rad: Floats
     others: Floats
+    others_m_s: Floats
+    others_ago_m_s: Floats
     distance_m: Floats
     here: NDArray[np.bool_]
     time: Floats
@@ -62,3 +71,45 @@ class Pace:
 
     label: str
     weights: Callable[[Swum], Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spread:
+    """A change of how speeds are spread: slow, middling and fast ones each in a measure of its own.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    weights
+        Shape (step, weight): each has a strength for each sort of speed.
+    """
+
+    label: str
+    weights: Callable[[Swum], Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Copied:
+    """Some speeds drawn about a known one: one more component of their law.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    of
+        The known speeds in m/s, shape (step, source); NaN where there is none.
+    ago
+        The same of some seconds before. What these gain as well is no copy: speeds are alike that
+        change slowly.
+    weights
+        Shape (step, source, weight): a strength is fitted for each weight.
+    """
+
+    label: str
+    of: Callable[[Swum], Floats]
+    ago: Callable[[Swum], Floats]
+    weights: Callable[[Swum], Floats]
+
+
+PaceFeature: TypeAlias = Pace | Spread | Copied

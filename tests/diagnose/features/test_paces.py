@@ -119,6 +119,65 @@ def test_bursts_are_told_by_the_own_last_speeds(nothing):
     assert told.gain.nats > 15
 
 
+def gliding(speed, rng):
+    """One step in eight keeps 0.7 of the last speed."""
+    made = speed.copy()
+    for k in range(1, len(made)):
+        if rng.uniform() < 0.12:
+            made[k] = 0.7 * made[k - 1] + rng.normal(0, 0.004)
+    return np.maximum(made, 0.012)
+
+
+def kicking(speed, rng):
+    """Two slow steps are followed by a kick, now and then."""
+    made = speed.copy()
+    slow = np.quantile(speed, 0.4)
+    for k in range(2, len(made)):
+        if max(made[k - 1], made[k - 2]) < slow and rng.uniform() < 0.25:
+            made[k] = np.quantile(speed, 0.9)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("rule", "label"),
+    [
+        (gliding, "a share of the last speed"),
+        (kicking, "slow and fast ones, by the last two"),
+    ],
+)
+def test_speeds_of_a_few_steps_are_told(nothing, rule, label):
+    """The mean hardly changes; how speeds are spread does, and it is there all the time."""
+    paces = scores_by_last(nothing, rule)
+    told = tell(pace_gains(paces, ALL))
+    assert (told.gain.name, told.gain.label) == ("burst-and-coast", label)
+    assert told.gain.nats > 15
+    course = paces.course(told.gain)
+    assert course.in_all_minutes
+    assert course.in_all_phases
+
+
+def test_speeds_that_change_slowly_are_not_copied(nothing):
+    """They are as near to the speed of some seconds ago."""
+
+    def drifts(speed, _rng):
+        return speed * np.exp(0.5 * np.sin(np.arange(len(speed)) / 60))
+
+    gains = pace_gains(scores_by_last(nothing, drifts), [find_effect("burst-and-coast")])
+    nats = {gain.label: gain.log_p.sum() for gain in gains}
+    assert nats["a share of the last speed"] < 0.2 * nats["by the last three speeds"]
+
+
+def test_a_few_slow_steps_among_others_are_crowding(nothing, changed):
+    """One in ten of those with two others near is slow."""
+    times = np.ones(len(nothing.scene.moves))
+    near = (nothing.swum.distance_m < 0.1).sum(axis=1) >= 2
+    chosen = near & (np.random.default_rng(5).uniform(size=len(near)) < 0.2)
+    times[nothing.rows] = np.where(chosen, 0.3, 1.0)
+    told = tell(pace_gains(changed(times), ALL))
+    assert told.gain.name == "crowding"
+    assert told.gain.label.startswith("slow and fast ones")
+
+
 def test_what_one_room_does_to_speeds_is_no_effect(nothing, changed):
     """A lamp over one room makes fish fast there: fields have means of their own."""
     scene = nothing.scene

@@ -41,7 +41,7 @@ class Peak:
     Parameters
     ----------
     x : ndarray, shape (argument,)
-        There; the last one is the lapse.
+        There.
     scores : ndarray, shape (step, argument)
         Derivatives of the log density of each step.
     low, high : ndarray, shape (argument,)
@@ -122,6 +122,22 @@ class Fit:
 def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
     """Return where a log likelihood is highest; the last of its arguments is the lapse.
 
+    Parameters
+    ----------
+    objective
+        The log likelihood, and what gives the scores of single steps.
+    x0
+        Where the search begins.
+    bounds
+        Of all arguments but the lapse.
+    """
+    lapse = (float(logit(LAPSE[0])), float(logit(LAPSE[1])))
+    return climb_within(objective, x0, [*bounds, lapse])
+
+
+def climb_within(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
+    """Return where a log likelihood is highest.
+
     The squares of the scores of single steps stand for the curvature, so that a step of the search
     is a least squares problem with bounds (Berndt et al. 1974, Annals of Economic and Social
     Measurement 3: 653-665).
@@ -133,11 +149,10 @@ def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
     x0
         Where the search begins.
     bounds
-        Of all arguments but the lapse.
+        Of all arguments.
     """
-    all_ = [*bounds, (float(logit(LAPSE[0])), float(logit(LAPSE[1])))]
-    low = np.array([-np.inf if pair[0] is None else pair[0] for pair in all_])
-    high = np.array([np.inf if pair[1] is None else pair[1] for pair in all_])
+    low = np.array([-np.inf if pair[0] is None else pair[0] for pair in bounds])
+    high = np.array([np.inf if pair[1] is None else pair[1] for pair in bounds])
     x = np.clip(x0, low, high)
     value, scores_of = objective(x)
     for _ in range(_CLIMBS):

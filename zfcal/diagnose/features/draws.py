@@ -46,6 +46,9 @@ from zfcal.units import HEADING_MIN_STEP_M
 _SOON = 0.1
 """Share of a step of a response that is a little late."""
 
+_LATELY_S = 2.0
+"""How fast others were lately is taken over so long."""
+
 _RECENT, _FADING = 5, 0.6
 """So many turns are remembered, each that much less than the one after it."""
 
@@ -251,6 +254,7 @@ def _seen(
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
         speed_m_s=theirs(SPEED, at),
+        lately_m_s=_lately(states[:, SPEED], steps.scene.dt_s)[at[:, None], others],
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         here=here,
         in_sight=angle[rows, others] > 0,
@@ -272,6 +276,18 @@ def _seen(
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
     )
+
+
+def _lately(speed: Floats, dt_s: float) -> Floats:
+    """Return the mean speed over two seconds up to each sample, of what is known of it."""
+    n = max(1, round(_LATELY_S / dt_s))
+    known = np.isfinite(speed) & (speed >= 0)
+    sums = [
+        np.cumsum(np.pad(each.astype(np.float64), ((n, 0), (0, 0))), axis=0)
+        for each in (np.where(known, speed, 0.0), known)
+    ]
+    total, count = (each[n:] - each[:-n] for each in sums)
+    return np.asarray(total / np.maximum(count, 1))
 
 
 def _ago_heading(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:

@@ -4,7 +4,8 @@ Speeds have no law but a measured one for each zone, so they are taken as normal
 within a zone, put on the scale of a standard normal law (van der Waerden 1952, Indagationes
 Mathematicae 14: 453-458). Fields of the tank and individuals have a mean of their own, which is
 taken off. What is left is regressed on weights of what was there before the step: the gain is that
-of the normal law, and all strengths and the spread are fitted.
+of the normal law, and all strengths and the spread are fitted. What changes a few speeds, and not
+their mean, is fitted to the law of scores of each fish (`zfcal.diagnose.features.spreads`).
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import orth
-from scipy.special import ndtri
-from scipy.stats import rankdata
+from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.spreads import Drawn, Spreads
+from zfcal.diagnose.features.swum import normal_scores, scores_of_speeds, swum_of
 from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import LEVEL
 from zfcal.diagnose.steadiness import Course
 from zfcal.model.effects import Effect, find_effect
-from zfcal.model.features import AWAY_M
-from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Copied, Pace, PaceFeature, Spread, Swum
 from zfcal.model.scene import Moves, Scene
 
 _LEAST_MOVES = 50
@@ -123,39 +124,22 @@ class Paces:
         return int(np.unique(self._grains, return_counts=True)[1].max()) <= _MOST_ALIKE * n
 
     @cached_property
+    def _raw(self) -> tuple[Floats, float, Floats]:
+        """Normal scores; the spread of what is left of them less the means; that itself."""
+        raw = normal_scores(self._grains, self.turns.zone)
+        left = self._less_means(raw)
+        return raw, max(float(left.std()), _LEAST), left
+
+    @cached_property
     def scores(self) -> Floats:
         """Normal scores less the means, of variance one, shape (move,)."""
-        left = self._less_means(_normal_scores(self._grains, self.turns.zone))
-        return np.asarray(left / max(float(left.std()), _LEAST))
+        _, spread, left = self._raw
+        return np.asarray(left / spread)
 
     @cached_property
     def swum(self) -> Swum:
         """What was there before each move."""
-        scene, moves = self.scene, self.turns
-        at, who = moves.at, moves.who
-        scores = _table(scene, moves, self.scores)
-        states = scene.states
-        columns = states.shape[2]
-        each = [[j for j in range(columns) if j != i] for i in range(columns)]
-        others = np.array(each, dtype=np.int64).reshape(columns, columns - 1)[who]
-        own, theirs = states[at, :, who], np.moveaxis(states[at], 1, 2)
-        theirs = np.take_along_axis(theirs, others[..., None], axis=1)
-        here = theirs[..., ZONE] > 0
-        away = np.hypot(
-            theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
-        )  # fmt: skip
-        paces = _paces_of_all(states)[at[:, None], others]
-        return Swum(
-            last=_known(scores, scene, at, who, 1),
-            before_last=_known(scores, scene, at, who, 2),
-            third=_known(scores, scene, at, who, 3),
-            last_turn_rad=_last_turn(states, at, who),
-            others=np.where(here, np.nan_to_num(paces), 0.0),
-            distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
-            here=here,
-            time=at / max(1, len(scene.k) - 1),
-            track=moves.track,
-        )
+        return swum_of(self.scene, self.turns, self.scores)
 
     @cached_property
     def _also(self) -> Floats:
@@ -164,6 +148,7 @@ class Paces:
             self._less_means(feature.weights(self.swum))
             for effect in self.beside
             for feature in effect.paces
+            if isinstance(feature, Pace)
         ]
         return _span([np.zeros((len(self.rows), 0)), *made])
 
@@ -172,39 +157,91 @@ class Paces:
         """Scores less all that is there."""
         return self.scores - self._also @ (self._also.T @ self.scores)
 
+    @cached_property
+    def _spreads(self) -> Spreads:
+        """The law of what is left of the scores, with what is there of those that bend it.
+
+        As for a tilt of headings: each is fitted once, where it gains more than chance.
+        """
+        own = self._left / self._wide
+        spreads = Spreads(scores=own, who=self._groups[1])
+        for effect in self.beside:
+            for feature in effect.paces:
+                if isinstance(feature, Pace):
+                    continue
+                drawn = self._drawn(feature, spreads)
+                gained = max(float(drawn.log_p.sum()), 0.0)
+                if drawn.n_strengths and chdtrc(drawn.n_strengths, 2 * gained) < LEVEL:
+                    spreads = spreads.beside(drawn)
+        return spreads
+
+    @cached_property
+    def _wide(self) -> float:
+        return max(float(self._left.std()), _LEAST)
+
     @property
     def gained_beside(self) -> tuple[Floats, int]:
         """What features of what is there add to its model, shape (move,); number of strengths."""
         return _normal_gain(self.scores, self._left), self._also.shape[1]
 
-    def gain(self, name: str, feature: Pace) -> Gain:
+    def gain(self, name: str, feature: PaceFeature) -> Gain:
         """Return what a feature of an effect adds."""
-        change, n = self._changed(feature)
-        made = _normal_gain(self._left, self._left - change)
+        if isinstance(feature, Pace):
+            change, n = self._changed(feature)
+            made = _normal_gain(self._left, self._left - change)
+        else:
+            drawn = self._drawn(feature, self._spreads)
+            made, n = drawn.log_p, drawn.n_strengths
+        if isinstance(feature, Copied):
+            ago = replace(feature, of=feature.ago)
+            made = made - self._drawn(ago, self._spreads).log_p
         return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
 
     def course(self, gain: Gain) -> Course:
         """Return what a feature gains at each move, and what it would if it were there."""
         effect = find_effect(gain.name)
         feature = next(each for each in effect.paces if each.label == gain.label)
-        change, _ = self._changed(feature)
-        apart = change * (self._left - change)
-        return Course(apart=apart, expected=change**2 / 2, of=(self.scene, self.turns.at))
+        of = (self.scene, self.turns.at)
+        if isinstance(feature, Pace):
+            change, _ = self._changed(feature)
+            return Course(apart=change * (self._left - change), expected=change**2 / 2, of=of)
+        drawn = self._drawn(feature, self._spreads)
+        return Course(apart=drawn.log_p - drawn.expected, expected=drawn.expected, of=of)
 
     def and_beside(self, effect: Effect) -> Paces:
         """Return fits in which one more effect is there."""
         made = replace(self, beside=(*self.beside, effect))
-        kept = ("rows", "turns", "_groups", "scores", "swum")
+        kept = ("rows", "turns", "_groups", "_raw", "scores", "swum")
         made.__dict__.update({key: getattr(self, key) for key in kept})
         return made
 
     def _changed(self, feature: Pace) -> tuple[Floats, int]:
         """Return by how much a feature changes each score, and the number of its strengths."""
-        columns = self._less_means(feature.weights(self.swum))
-        columns = columns - self._also @ (self._also.T @ columns)
+        columns = self._beside_means(feature.weights(self.swum))
         columns = columns[:, (columns**2).mean(axis=0) > _LEAST]
         found, _, rank, _ = np.linalg.lstsq(columns, self._left, rcond=None)
         return np.asarray(columns @ found), int(rank)
+
+    def _beside_means(self, values: Floats) -> Floats:
+        columns = self._less_means(values)
+        return np.asarray(columns - self._also @ (self._also.T @ columns))
+
+    def _drawn(self, feature: Spread | Copied, spreads: Spreads) -> Drawn:
+        """Return what a feature adds to the law of scores that is there."""
+        if isinstance(feature, Spread):
+            columns = self._less_means(feature.weights(self.swum))
+            return spreads.spread(_span([columns]) * math.sqrt(len(columns)))
+        speeds = feature.of(self.swum) / self._factor[:, None]
+        raw = scores_of_speeds(speeds, self.screen.own_speeds[self.rows], self.turns.zone)
+        # As the own score of the step: less the means of its groups, and what is there.
+        own, spread, _ = self._raw
+        apart = own - self._left * spread
+        about = (raw - apart[:, None]) / (spread * self._wide)
+        return spreads.copied(about, feature.weights(self.swum))
+
+    @cached_property
+    def _factor(self) -> Floats:
+        return np.asarray(self.screen.model_factor[self.rows])
 
 
 def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
@@ -234,52 +271,6 @@ def _means(values: Floats, group: NDArray[np.intp]) -> Floats:
     if values.ndim == 1:
         return np.asarray(np.bincount(group, values) / n)
     return np.stack([np.bincount(group, column) / n for column in values.T], axis=1)
-
-
-def _normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
-    """Return the normal scores of values within each group."""
-    made = np.zeros_like(values)
-    for number in np.unique(group):
-        rows = group == number
-        made[rows] = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
-    return made
-
-
-def _table(scene: Scene, moves: Moves, values: Floats) -> Floats:
-    """Return values of moves by the sample in which each ends, shape (sample, column)."""
-    made = np.full((len(scene.k) + 1, scene.states.shape[2]), np.nan)
-    made[moves.at + 1, moves.who] = values
-    return made
-
-
-def _known(
-    scores: Floats, scene: Scene, at: NDArray[np.int64], who: NDArray[np.int64], ago: int
-) -> Floats:
-    """Return the scores of so many moves ago of the same track; 0 where there is none."""
-    then = at + 1 - ago
-    same = (then > 0) & (scene.tracks[np.maximum(then - 1, 0), who] == scene.tracks[at, who])
-    return np.where(same, np.nan_to_num(scores[np.maximum(then, 0), who]), 0.0)
-
-
-def _paces_of_all(states: Floats) -> Floats:
-    """Return the normal score of everybody's last speed, robots' too, within the zone it began in.
-
-    Shape (sample, column); NaN where it is not known.
-    """
-    speed, zone = states[:, SPEED], np.roll(states[:, ZONE], 1, axis=0)
-    made = np.full(speed.shape, np.nan)
-    known = np.isfinite(speed) & (speed >= 0) & (zone > 0)
-    known[0] = False
-    made[known] = _normal_scores(speed[known], zone[known].astype(np.int64))
-    return made
-
-
-def _last_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
-    """Return by how much the heading at a sample differs from that before it; 0 if unknown."""
-    hx, hy = states[at, HX, who], states[at, HY, who]
-    px, py = states[at - 1, HX, who], states[at - 1, HY, who]
-    angle = np.arctan2(px * hy - py * hx, px * hx + py * hy)
-    return np.where((at > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)
 
 
 def _normal_gain(before: Floats, after: Floats) -> Floats:

@@ -17,6 +17,7 @@ from zfcal.model.effects.forms import (
     tilt,
 )
 from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, attended, evenly
+from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
@@ -136,6 +137,7 @@ _COMPANY_M = 0.15
 _BY_DISTANCE = Along(
     cue="distance to the other (m)", knots=_KNOTS_M[:-1], besides=("the nearest, wherever it is",)
 )
+_TO_FOREMOST = Along(cue="distance to the one most ahead (m)", knots=_KNOTS_M[:-1])
 _AND_AS_SEEN = Along(
     cue=_BY_DISTANCE.cue,
     knots=_BY_DISTANCE.knots,
@@ -144,7 +146,9 @@ _AND_AS_SEEN = Along(
 
 
 def _near_and_far(seen: Seen) -> Floats:
-    return np.concatenate([seen.by_distance(_KNOTS_M)[..., :-1], seen.nearest], axis=2)
+    return np.concatenate(
+        [hats_where(seen.here, seen.distance_m, _KNOTS_M)[..., :-1], seen.nearest], axis=2
+    )
 
 
 def _of_all(seen: Seen) -> Floats:
@@ -153,6 +157,26 @@ def _of_all(seen: Seen) -> Floats:
 
 def _summed(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _near_and_far(seen), seen.heading))
+
+
+_AHEAD_RAD = (0.0, 0.8, 1.6, math.pi)
+_AHEAD_M = (0.0, 0.05, 0.15, 0.4)
+
+
+def _by_bearing(seen: Seen) -> Floats:
+    """Return the sums of the headings of others, by how far aside and how far away they are."""
+    near = hats_where(seen.here, seen.distance_m, _AHEAD_M)[..., :-1]
+    weights = near[..., None] * hats(seen.off_axis_rad, _AHEAD_RAD)[..., None, :]
+    flat = weights.reshape(*near.shape[:2], -1)
+    return np.asarray(np.einsum("sjb,sjd->sbd", flat, seen.heading))
+
+
+def _of_foremost(seen: Seen) -> Floats:
+    return hats_where(seen.here, seen.distance_m, _KNOTS_M)[..., :-1] * seen.foremost
+
+
+def _leaning_to_foremost(seen: Seen) -> Floats:
+    return np.asarray(np.einsum("sjb,sjd->sbd", _of_foremost(seen), seen.heading))
 
 
 def _mean(seen: Seen) -> Floats:
@@ -176,6 +200,15 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
     Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
     Tilt(label="leaning, the mean", vectors=_mean, low=0.0),
+    Tilt(label="leaning, by bearing", vectors=_by_bearing, low=0.0),
+    Tilt(label="leaning, the foremost", vectors=_leaning_to_foremost, low=0.0, along=_TO_FOREMOST),
+    Component(
+        label="drawn, the foremost",
+        toward="heading",
+        weights=_of_foremost,
+        kappa=9.0,
+        along=_TO_FOREMOST,
+    ),
     Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0),
 )
 

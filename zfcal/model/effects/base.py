@@ -39,7 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
-from zfcal.model.paces import Pace
+from zfcal.model.paces import PaceFeature
 
 MAX_PARAMETERS = 8
 
@@ -262,7 +262,7 @@ class Effect:
     looks_like: Likeness | None = None
     control: Control | None = None
     features: Callable[[Arena], tuple[Feature, ...]] = _no_features
-    paces: tuple[Pace, ...] = ()
+    paces: tuple[PaceFeature, ...] = ()
     fixed: tuple[str, ...] = ()
     idle: Callable[[Mapping[str, float]], tuple[str, ...]] = _none_idle
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)

@@ -7,11 +7,11 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, log_speed, quickness, times_faster
-from zfcal.model.features import hats
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Copied, Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
@@ -24,10 +24,32 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _KNOTS = (-1.5, -0.5, 0.5, 1.5)
+_SLOW_TO_FAST = (-1.2, 0.0, 1.2)
+_KEPT = (0.55, 0.7, 0.85, 1.0)
+"""Shares of the last speed that a coasting fish may have kept."""
 
 
 def _last(swum: Swum) -> Floats:
     return hats(swum.last, _KNOTS)[:, 1:] * (swum.last != 0.0)[:, None]
+
+
+def _lately(swum: Swum) -> Floats:
+    """Return how fast the faster of the last two steps was: of none where one is not known."""
+    known = (swum.last != 0.0) & (swum.before_last != 0.0)
+    faster = np.maximum(swum.last, swum.before_last)
+    return hats(faster, _SLOW_TO_FAST)[:, 1:] * known[:, None]
+
+
+def _spread_by_last(swum: Swum) -> Floats:
+    return hats(swum.last, _SLOW_TO_FAST)[:, 1:] * (swum.last != 0.0)[:, None]
+
+
+def _shares(speed_m_s: Floats) -> Floats:
+    return speed_m_s[:, None] * np.array(_KEPT)
+
+
+def _each_share(swum: Swum) -> Floats:
+    return np.broadcast_to(np.eye(len(_KEPT)), (len(swum.last), len(_KEPT), len(_KEPT)))
 
 
 def _some_ago(swum: Swum) -> Floats:
@@ -72,5 +94,13 @@ EFFECT = Effect(
     paces=(
         Pace(label="by the last speed", weights=_last),
         Pace(label="by the last three speeds", weights=_some_ago),
+        Spread(label="slow and fast ones, by the last speed", weights=_spread_by_last),
+        Spread(label="slow and fast ones, by the last two", weights=_lately),
+        Copied(
+            label="a share of the last speed",
+            of=lambda swum: _shares(swum.last_m_s),
+            ago=lambda swum: _shares(swum.last_ago_m_s),
+            weights=_each_share,
+        ),
     ),
 )

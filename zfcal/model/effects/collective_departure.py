@@ -24,9 +24,9 @@ from zfcal.model.features import (
     Tilt,
     Turned,
     aside_of,
-    hats,
     only,
 )
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import (

@@ -7,11 +7,11 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
-from zfcal.model.features import hats
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import ZONE
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
@@ -25,12 +25,23 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
+_NEAR_M = (0.0, 0.08, 0.25)
+_COMPANY_M = 0.1
 
 
 def _number(swum: Swum) -> Floats:
     """Return how many others there are, by distance."""
     weights = hats(swum.distance_m, _KNOTS_M) * swum.here[..., None]
     return np.asarray(weights.sum(axis=1)[:, :-1])
+
+
+def _company(swum: Swum) -> Floats:
+    near = swum.here * np.exp(-0.5 * (swum.distance_m / _COMPANY_M) ** 2)
+    return np.asarray(near.sum(axis=1, keepdims=True))
+
+
+def _spread_by_nearest(swum: Swum) -> Floats:
+    return hats(swum.distance_m.min(axis=1, initial=_NEAR_M[-1]), _NEAR_M)[:, :-1]
 
 
 def _nearest(swum: Swum) -> Floats:
@@ -72,5 +83,10 @@ EFFECT = Effect(
     shapes=lambda _arena: tuple({"radius_m": radius} for radius in (0.05, 0.08, 0.12, 0.2, 0.35)),
     lacks=needs_neighbour,
     fixed=("usual",),
-    paces=(Pace(label="number", weights=_number), Pace(label="the nearest", weights=_nearest)),
+    paces=(
+        Pace(label="number", weights=_number),
+        Pace(label="the nearest", weights=_nearest),
+        Spread(label="slow and fast ones, by how many are near", weights=_company),
+        Spread(label="slow and fast ones, by the nearest", weights=_spread_by_nearest),
+    ),
 )

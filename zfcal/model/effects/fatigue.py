@@ -5,11 +5,11 @@ from __future__ import annotations
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import times_faster
-from zfcal.model.features import hats
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import TIME
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
@@ -19,6 +19,10 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _TIMES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+
+def _spread_by_time(swum: Swum) -> Floats:
+    return hats(swum.time, (0.0, 0.5, 1.0))[:, 1:]
 
 
 def _by_time(swum: Swum) -> Floats:
@@ -52,5 +56,8 @@ EFFECT = Effect(
     fixed=("usual_at_s",),
     per_hour=True,
     shown_against="time",
-    paces=(Pace(label="time", weights=_by_time),),
+    paces=(
+        Pace(label="time", weights=_by_time),
+        Spread(label="slow and fast ones, by the time", weights=_spread_by_time),
+    ),
 )

@@ -18,7 +18,8 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, hats, only
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, only
+from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, ZONE, X, Y
@@ -138,7 +139,7 @@ def _leaning(seen: Seen) -> Floats:
 
 
 def _of_each(seen: Seen) -> Floats:
-    return seen.by_distance(_KNOTS_M)
+    return hats_where(seen.here, seen.distance_m, _KNOTS_M)
 
 
 def _of_each_seen(seen: Seen) -> Floats:

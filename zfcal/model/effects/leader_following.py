@@ -18,8 +18,8 @@ from zfcal.model.features import (
     Tilt,
     Weights,
     factor_on_attention,
-    hats,
 )
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import SPEED, ZONE, X, Y
@@ -79,19 +79,23 @@ _MOST_LED = 8
 """Of so many agents each is tried as the one that is followed."""
 
 _KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
+_LATELY_M_S = (0.03, 0.07, 0.11)
 
 
 def _attention(seen: Seen) -> Floats:
     return hats(seen.speed_m_s, _KNOTS_M_S)[..., 1:]
 
 
+def _attention_lately(seen: Seen) -> Floats:
+    return hats(seen.lately_m_s, _LATELY_M_S)[..., 1:]
+
+
 def _fastest(seen: Seen) -> Floats:
-    if not seen.here.size:
-        return np.zeros((*seen.here.shape, 1))
-    chosen = np.zeros(seen.here.shape)
-    quick = np.where(seen.attention > 0, seen.speed_m_s, -1.0)
-    chosen[np.arange(len(chosen)), quick.argmax(axis=1)] = 1.0
-    return chosen[..., None]
+    return seen.chosen(seen.speed_m_s, seen.attention > 0)
+
+
+def _fastest_lately(seen: Seen) -> Floats:
+    return seen.chosen(seen.lately_m_s, seen.attention > 0)
 
 
 def _who(seen: Seen) -> Floats:
@@ -120,11 +124,7 @@ def _within(reach_m: float) -> Weights:
 
     def weights(seen: Seen) -> Floats:
         near = seen.here & (seen.distance_m < reach_m) & (seen.speed_m_s >= 0)
-        if not near.size:
-            return np.zeros((*near.shape, 1))
-        quick = np.where(near, seen.speed_m_s, -1.0)
-        chosen = quick.argmax(axis=1)[:, None] == np.arange(near.shape[1])
-        return np.asarray((chosen & near)[..., None], float)
+        return seen.chosen(seen.speed_m_s, near)
 
     return weights
 
@@ -156,6 +156,15 @@ _FEATURES: tuple[Feature, ...] = (
         along=Along(cue="speed of the other (m/s)", knots=_KNOTS_M_S[1:], none_at=_KNOTS_M_S[0]),
     ),
     factor_on_attention(_fastest, label="the fastest in view"),
+    factor_on_attention(
+        _attention_lately,
+        label="attention, by speeds of two seconds",
+        along=Along(
+            cue="mean speed of the other over 2 s (m/s)", knots=_LATELY_M_S[1:],
+            none_at=_LATELY_M_S[0],
+        ),
+    ),
+    factor_on_attention(_fastest_lately, label="the fastest in view, over two seconds"),
     factor_on_attention(_who, label="who"),
     OneOf(
         kind=_DRAWN,

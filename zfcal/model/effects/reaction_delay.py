@@ -8,6 +8,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen
+from zfcal.model.hats import hats_where
 
 
 def _late(
@@ -47,7 +48,7 @@ def _by_distance(k: int) -> Component:
     """Return a response that is late by a share of its own for each distance."""
 
     def weights(seen: Seen) -> Floats:
-        return seen.attention[..., None] * seen.by_distance(_NEAR_M)
+        return seen.attention[..., None] * hats_where(seen.here, seen.distance_m, _NEAR_M)
 
     return Component(
         label=f"{LAGS[k]} steps, by distance",

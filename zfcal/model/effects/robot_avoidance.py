@@ -19,8 +19,8 @@ from zfcal.model.features import (
     Turned,
     aside_of,
     factor_on_attention,
-    hats,
 )
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
 from zfcal.model.kernels.state import FOLLOWS, KIND, X, Y

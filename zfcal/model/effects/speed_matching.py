@@ -14,11 +14,11 @@ from zfcal.model.effects.forms import (
     quickness,
     times_faster,
 )
-from zfcal.model.features import hats
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED, ZONE
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Copied, Pace, Swum
 
 _LEAST_M = 0.01
 
@@ -48,6 +48,20 @@ def _near(swum: Swum) -> Floats:
     """Return the sums of the others' last speeds, by distance."""
     weights = hats(swum.distance_m, _KNOTS_M) * swum.here[..., None]
     return np.asarray(np.einsum("sj,sjb->sb", swum.others, weights))
+
+
+def _of_nearest(swum: Swum, values: Floats) -> Floats:
+    """Return what belongs to the nearest other one, shape (step, 1); NaN without one."""
+    if not swum.here.size:
+        return np.full((len(swum.here), 1), np.nan)
+    rows, nearest = np.arange(len(swum.here)), swum.distance_m.argmin(axis=1)
+    return np.where(swum.here[rows, nearest], values[rows, nearest], np.nan)[:, None]
+
+
+def _near_or_far(swum: Swum) -> Floats:
+    """Return hat functions of the distance to the nearest, shape (step, 1, weight)."""
+    far = swum.distance_m.min(axis=1, initial=_KNOTS_M[-1])
+    return hats(far, _KNOTS_M)[:, None, :-1]
 
 
 def _nearest(swum: Swum) -> Floats:
@@ -115,5 +129,11 @@ EFFECT = Effect(
     paces=(
         Pace(label="of those near", weights=_near),
         Pace(label="of the nearest", weights=_nearest),
+        Copied(
+            label="the speed of the nearest",
+            of=lambda swum: _of_nearest(swum, swum.others_m_s),
+            ago=lambda swum: _of_nearest(swum, swum.others_ago_m_s),
+            weights=_near_or_far,
+        ),
     ),
 )

@@ -11,11 +11,12 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.features import Feature, Seen, Sharper, Tilt, hats
+from zfcal.model.features import Feature, Seen, Sharper, Tilt
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY
-from zfcal.model.paces import Pace, Swum
+from zfcal.model.paces import Pace, Spread, Swum
 
 
 @hook(FACTOR)
@@ -40,6 +41,10 @@ def _by_speed(seen: Seen) -> Floats:
 
 
 _KNOTS_RAD = (0.0, 0.5, 1.0, 2.0, 3.2)
+
+
+def _spread_by_last_turn(swum: Swum) -> Floats:
+    return hats(swum.last_turn_rad, (0.0, 0.5, 1.5))[:, 1:]
 
 
 def _by_last_turn(swum: Swum) -> Floats:
@@ -82,5 +87,8 @@ EFFECT = Effect(
     other_forms=("generic:speed:own-turn",),
     features=lambda _arena: _FEATURES,
     # Not by the turn of the step itself: near a wall a long step has to turn.
-    paces=(Pace(label="by the last turn", weights=_by_last_turn),),
+    paces=(
+        Pace(label="by the last turn", weights=_by_last_turn),
+        Spread(label="slow and fast ones, by the last turn", weights=_spread_by_last_turn),
+    ),
 )

@@ -1,0 +1,141 @@
+"""What there was before each step of fish, as features of speeds ask for it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import rankdata
+
+from zfcal.arrays import Floats
+from zfcal.model.features import AWAY_M
+from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
+from zfcal.model.paces import Swum
+from zfcal.model.scene import Moves, Scene
+
+_AGO_S = 4.0
+"""Before the last step: whatever changes slowly was much the same then."""
+
+_LEAST_RANK = 0.3
+"""Rank of a speed that is slower than all, or faster from the other end."""
+
+
+def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
+    """Return what was there before some moves.
+
+    Parameters
+    ----------
+    scene
+        The recording.
+    moves
+        That count.
+    scores : ndarray, shape (move,)
+        Normal scores of their speeds.
+    """
+    at, who, states = moves.at, moves.who, scene.states
+    table = _table(scene, moves, scores)
+    columns = states.shape[2]
+    each = [[j for j in range(columns) if j != i] for i in range(columns)]
+    others = np.array(each, dtype=np.int64).reshape(columns, columns - 1)[who]
+    own, theirs = states[at, :, who], np.moveaxis(states[at], 1, 2)
+    theirs = np.take_along_axis(theirs, others[..., None], axis=1)
+    here = theirs[..., ZONE] > 0
+    away = np.hypot(theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y])
+    paces = _paces_of_all(states)[at[:, None], others]
+    speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
+    ago = 1 + max(1, round(_AGO_S / scene.dt_s))
+    all_others = at[:, None], others
+    return Swum(
+        last=np.nan_to_num(_ago(table, scene, at, who, 1)),
+        before_last=np.nan_to_num(_ago(table, scene, at, who, 2)),
+        third=np.nan_to_num(_ago(table, scene, at, who, 3)),
+        last_m_s=_ago(speed, scene, at, who, 1),
+        last_ago_m_s=_ago(speed, scene, at, who, ago),
+        last_turn_rad=_last_turn(states, at, who),
+        others=np.where(here, np.nan_to_num(paces), 0.0),
+        others_m_s=_ago(speed, scene, *all_others, 1),
+        others_ago_m_s=_ago(speed, scene, *all_others, ago),
+        distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
+        here=here,
+        time=at / max(1, len(scene.k) - 1),
+        track=moves.track,
+    )
+
+
+def scores_of_speeds(speeds: Floats, of: Floats, zone: NDArray[np.int64]) -> Floats:
+    """Return the normal scores that speeds would have among those of a zone.
+
+    Parameters
+    ----------
+    speeds : ndarray, shape (step, source)
+        NaN where there is none.
+    of : ndarray, shape (step,)
+        All speeds.
+    zone : ndarray of int, shape (step,)
+    """
+    made = np.full(speeds.shape, np.nan)
+    for number in np.unique(zone):
+        rows = zone == number
+        known, own = np.sort(of[rows]), speeds[rows]
+        ends = [np.searchsorted(known, own, side=side) for side in ("left", "right")]
+        rank = np.clip((ends[0] + ends[1] + 1) / 2, _LEAST_RANK, len(known) + 1 - _LEAST_RANK)
+        made[rows] = np.where(np.isfinite(own), ndtri(rank / (len(known) + 1)), np.nan)
+    return made
+
+
+def normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
+    """Return the normal scores of values within each group."""
+    made = np.zeros_like(values)
+    for number in np.unique(group):
+        rows = group == number
+        made[rows] = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
+    return made
+
+
+def _table(scene: Scene, moves: Moves, values: Floats) -> Floats:
+    """Return values of moves by the sample in which each ends, shape (sample, column)."""
+    made = np.full((len(scene.k) + 1, scene.states.shape[2]), np.nan)
+    made[moves.at + 1, moves.who] = values
+    return made
+
+
+def _ago(
+    table: Floats, scene: Scene, at: NDArray[np.int64], who: NDArray[np.int64], ago: int
+) -> Floats:
+    """Return what the step so many before ended with, of the same track; NaN where there is none.
+
+    Parameters
+    ----------
+    table : ndarray, shape (sample, column)
+        By the sample in which each step ended.
+    scene
+        The recording.
+    at, who
+        Sample in which a step begins, and column.
+    ago
+        1 for the step that ended there.
+    """
+    then = at + 1 - ago
+    same = (then > 0) & (scene.tracks[np.maximum(then - 1, 0), who] == scene.tracks[at, who])
+    return np.where(same, table[np.maximum(then, 0), who], np.nan)
+
+
+def _paces_of_all(states: Floats) -> Floats:
+    """Return the normal score of everybody's last speed, robots' too, within the zone it began in.
+
+    Shape (sample, column); NaN where it is not known.
+    """
+    speed, zone = states[:, SPEED], np.roll(states[:, ZONE], 1, axis=0)
+    made = np.full(speed.shape, np.nan)
+    known = np.isfinite(speed) & (speed >= 0) & (zone > 0)
+    known[0] = False
+    made[known] = normal_scores(speed[known], zone[known].astype(np.int64))
+    return made
+
+
+def _last_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
+    """Return by how much the heading at a sample differs from that before it; 0 if unknown."""
+    hx, hy = states[at, HX, who], states[at, HY, who]
+    px, py = states[at - 1, HX, who], states[at - 1, HY, who]
+    angle = np.arctan2(px * hy - py * hx, px * hx + py * hy)
+    return np.where((at > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)
