@@ -28,9 +28,6 @@ AWAY_M = 9.0
 LAGS = (1, 2, 3, 4, 5, 8)
 """Steps by which a response may be late."""
 
-_LEAST = -0.98
-"""The lowest strength of what a mixture has already: two hundredths of it are left."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Seen:
@@ -307,6 +304,32 @@ class Leaving:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Landing:
+    """A preference for steps that end near something: a factor on where headings land.
+
+    Parameters
+    ----------
+    label
+        Tells it from other features of the effect.
+    away_m
+        How far some positions are from it, shape (row, heading): of what the fish of all steps have
+        about them, the rows of the steps that are asked for, and positions (row, heading, 2).
+    knots_m
+        Distances of its hat functions; at the last one there is none.
+    along
+        What its weights go by.
+    over
+        As of a `Component`.
+    """
+
+    label: str
+    away_m: Callable[[Seen, NDArray[np.intp], Floats], Floats]
+    knots_m: tuple[float, ...]
+    along: Along | None = None
+    over: Landing | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OneOf:
     """Features of which only the most promising ones are fitted, such as places.
 
@@ -322,8 +345,8 @@ class OneOf:
     """
 
     kind: str
-    features: Sequence[Component | Tilt | Turned]
-    near: Callable[[int], Sequence[Component | Tilt | Turned]] | None = None
+    features: Sequence[Component | Tilt | Turned | Landing]
+    near: Callable[[int], Sequence[Component | Tilt | Turned | Landing]] | None = None
 
     @property
     def n_tried(self) -> int:
@@ -335,55 +358,5 @@ class OneOf:
 Mixed: TypeAlias = Component | Turned | Sharper
 """What adds to the mixture: it is fitted with the base's parameters."""
 
-Single: TypeAlias = Mixed | Tilt | Leaving
+Single: TypeAlias = Mixed | Tilt | Leaving | Landing
 Feature: TypeAlias = Single | OneOf
-
-
-def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:
-    """Return the sines of the angles from the own heading to unit vectors.
-
-    Shape (step, vector), of vectors of shape (step, vector, 2). None along walls, if not asked for:
-    there the base law forgets the heading.
-    """
-    own = seen.own_heading[:, None]
-    sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
-    return sine if along_walls else np.where(seen.follows_walls[:, None], 0.0, sine)
-
-
-def only(weights: Floats) -> Floats:
-    """Return weights of a source that is the only one: an axis for it is put in."""
-    return weights[:, None]
-
-
-def attended(weights: Weights) -> Weights:
-    """Return weights of what is seen of the others, with a factor."""
-    return lambda seen: seen.attention[..., None] * weights(seen)
-
-
-def factor_on_attention(
-    weights: Weights,
-    label: str = "attention",
-    high: float | None = None,
-    along: Along | None = None,
-) -> Component:
-    """Return a factor on what fish attend to of the others: 1 + strength times weight, never none.
-
-    Parameters
-    ----------
-    weights
-        Shape (step, other, weight).
-    label
-        Of the feature.
-    high
-        Upper bound of the strengths: 0 where attention can but be lost.
-    along
-        Of the feature.
-    """
-    return Component(
-        label=label, toward="toward", weights=attended(weights), low=_LEAST, high=high, along=along
-    )
-
-
-def evenly(seen: Seen) -> Floats:
-    """Return one for everybody, shape (step, other, 1)."""
-    return np.ones((*seen.attention.shape, 1))

@@ -36,6 +36,10 @@ class Swum:
         Their last speeds, and those of some seconds before; NaN where they are not known.
     distance_m : ndarray, shape (step, other)
         To them; `zfcal.model.features.AWAY_M` for who is not there.
+    ahead_m : ndarray, shape (step,)
+        To the nearest other one before the fish; `zfcal.model.features.AWAY_M` without one.
+    since_fast : ndarray, shape (step,)
+        Steps since the last one whose speed one in eight exceeds; many if it is not known.
     here : ndarray of bool, shape (step, other)
     time : ndarray, shape (step,)
         Share of the recording that has passed.
@@ -52,6 +56,8 @@ class Swum:
     others_m_s: Floats
     others_ago_m_s: Floats
     distance_m: Floats
+    ahead_m: Floats
+    since_fast: Floats
     here: NDArray[np.bool_]
     time: Floats
     track: NDArray[np.int32]

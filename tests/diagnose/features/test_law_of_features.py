@@ -9,6 +9,7 @@ from scipy.special import i0e, ndtr
 
 from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
+from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.directions import turned_by
@@ -241,9 +242,9 @@ def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
     law = Law(scene=scene, fitted=fitted, noise_m=5e-4, n_draws=2)
     rng = np.random.default_rng(2)
     leaning, leaving = rng.normal(0, 0.1, (len(law.rows), 2)), rng.normal(0, 0.1, len(law.rows))
-    once = law.absorbing(leaning=leaning, leaving=(law.between, leaving))
-    half = law.absorbing(leaning=leaning / 2)
-    twice = half.absorbing(leaning=leaning / 2, leaving=(law.between, leaving))
+    once = law.absorbing(bent=leaned(law, leaning), leaving=(law.between, leaving))
+    half = law.absorbing(bent=leaned(law, leaning / 2))
+    twice = half.absorbing(bent=leaned(law, leaning / 2), leaving=(law.between, leaving))
     assert twice.draws is law.draws
     np.testing.assert_allclose(once.cells, twice.cells)
     np.testing.assert_allclose(once.log_here, twice.log_here)

@@ -18,9 +18,9 @@ from zfcal.model.effects import (
     generic_effects,
     less_attention_to_robots,
 )
-from zfcal.model.effects.places import places
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES
 from zfcal.model.packing import pack
+from zfcal.model.places import places
 from zfcal.model.simulate import simulate_tracks
 
 LISTED = {

@@ -248,6 +248,21 @@ def test_all_headings_can_lean_toward_that_of_the_nearest(density):
     np.testing.assert_allclose(found, expected / (expected.mean() / found.mean()), rtol=1e-3)
 
 
+def test_fish_can_align_with_who_is_most_straight_ahead(ask):
+    """Of two ahead the one in line, farther as it is; not beyond reach, and nobody behind."""
+    rows = {
+        "X": [0.0, 0.2, 0.05], "Y": [0.0, 0.01, 0.05], "HX": [1.0, 0.0, -1.0],
+        "HY": [0.0, 1.0, 0.0],
+    }  # fmt: skip
+    given = {"weight": 20.0, "kappa": 6.0, "among": 3.0}
+    asked = ask("alignment", {**given, "reach_m": 0.4}, **rows)
+    weight, (x, y, kappa) = asked.component()
+    assert (weight, x, y, kappa) == pytest.approx((0.2, 0.0, 1.0, 6.0))
+    assert ask("alignment", {**given, "reach_m": 0.15}, **rows).component()[0] == 0.0
+    behind = {**rows, "X": [0.0, -0.2, -0.05]}
+    assert ask("alignment", {**given, "reach_m": 0.4}, **behind).component()[0] == 0.0
+
+
 @pytest.mark.parametrize("name", ["burst-and-coast", "speed-matching"])
 def test_speeds_can_go_by_a_speed_evenly(ask, name):
     """0.05 m/s above the usual speed: e^0.4; a power of it would be (12 / 7)^0.4."""

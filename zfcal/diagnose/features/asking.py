@@ -10,11 +10,22 @@ from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Fits, Gain
+from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
-from zfcal.model.features import Feature, Leaving, Mixed, OneOf, Sharper, Single, Tilt, Turned
+from zfcal.model.features import (
+    Feature,
+    Landing,
+    Leaving,
+    Mixed,
+    OneOf,
+    Sharper,
+    Single,
+    Tilt,
+    Turned,
+)
 
 _IN_REACH = 0.5
 """Share of the nats of the best one below which a feature is not fitted anew."""
@@ -122,7 +133,7 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
             for each in chosen:
                 if isinstance(each, Mixed):
                     also.append(_either_way(each))
-                elif isinstance(each, Tilt) or law.zone_into(each.into):
+                elif not isinstance(each, Leaving) or law.zone_into(each.into):
                     law = _absorbed(law, each)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
@@ -141,8 +152,8 @@ def _either_way(feature: Mixed) -> Mixed:
     return replace(feature, high=feature.high or None)
 
 
-def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
-    """Return a law with a tilt or a factor on leaving, if that gains more than chance."""
+def _absorbed(law: Law, feature: Tilt | Leaving | Landing) -> Law:
+    """Return a law with a factor on headings or landings, if that gains more than chance."""
     fits = Fits(law=law)
     if isinstance(feature, Tilt):
         feature = replace(feature, low=None)
@@ -150,7 +161,9 @@ def _absorbed(law: Law, feature: Tilt | Leaving) -> Law:
     if chdtrc(len(made.strengths), 2 * max(float(made.log_p.sum()), 0.0)) > LEVEL:
         return law
     if isinstance(feature, Tilt):
-        return law.absorbing(leaning=made.factor)
+        return law.absorbing(bent=leaned(law, made.factor))
+    if isinstance(feature, Landing):
+        return law.absorbing(bent=fits.landings.bent(feature, made))
     return law.absorbing(leaving=(law.zone_into(feature.into), made.factor))
 
 

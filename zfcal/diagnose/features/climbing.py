@@ -94,7 +94,8 @@ class Fit:
     scale : ndarray, shape (argument,)
         What the search's arguments are divided by.
     factor : ndarray
-        Of a tilt its vectors, shape (step, 2); of leaving its logs, shape (step,). Else empty.
+        Of a tilt its vectors, shape (step, 2); of leaving its logs, shape (step,); of landing the
+        strengths of all its weights. Else empty.
     """
 
     log_p: Floats

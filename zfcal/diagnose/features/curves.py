@@ -19,7 +19,7 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import Effect
-from zfcal.model.features import Component, Leaving, Single, Tilt
+from zfcal.model.features import Component, Landing, Leaving, Single, Tilt
 from zfcal.model.kernels.landing import ANGLES
 
 _REDRAWN = 3
@@ -117,8 +117,12 @@ def redrawn(law: Law, screen: Screen, random: np.random.Generator) -> Law:
         tilt_taken = view.tilt_taken.copy()
         tilt_taken[rows] = view.tilt[rows, chosen]
         view = replace(view, tilt_taken=tilt_taken)
+    bent = law.bent
+    if bent is not None:
+        bent = bent[0], bent[0][np.arange(len(rows)), chosen]
     made = replace(
         law,
+        bent=bent,
         scene=replace(scene, turns=replace(scene.turns, taken=taken, landing=landing)),
         fitted=replace(law.fitted, view=view),
     )
@@ -139,7 +143,7 @@ def _name_of(feature: Single) -> str:
         if feature.toward == "toward":
             return "change of the attention (share)"
         return "weight (own way: 1)"
-    if isinstance(feature, Tilt):
+    if isinstance(feature, Tilt | Landing):
         return "preference (nats)"
     if isinstance(feature, Leaving):
         return "log of the factor on leaving"

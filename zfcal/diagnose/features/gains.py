@@ -15,19 +15,30 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import expit, logit
+from scipy.special import logit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
+from zfcal.diagnose.features.landings import Landings, leaned
+from zfcal.diagnose.features.lapses import UNIFORM, log_mixed, mixed
 from zfcal.diagnose.features.law import MOST_SHARPER, Law
 from zfcal.model.extended import LAPSE
-from zfcal.model.features import Component, Leaving, Mixed, OneOf, Sharper, Single, Tilt, Turned
+from zfcal.model.features import (
+    Component,
+    Landing,
+    Leaving,
+    Mixed,
+    OneOf,
+    Sharper,
+    Single,
+    Tilt,
+    Turned,
+)
 from zfcal.model.kernels.landing import ANGLES
 
-_UNIFORM = 1 / (2 * math.pi)
 _LEAST = 1e-9
 """Share of the base's density at the heading taken below which a mixture cannot be pushed."""
 
@@ -149,7 +160,7 @@ class Fits:
     def prepare(self) -> None:
         """Work out what all features need, before they are asked side by side."""
         _ = (self.law.own_parameters, self.law.cells)
-        _ = (self._null, self._untilted, self._mean_heading)
+        _ = (self._null, self._untilted, self._mean_heading, self.landings.chances)
 
     @property
     def n_beside(self) -> int:
@@ -168,7 +179,8 @@ class Fits:
         over = getattr(feature, "over", None)
         if over is not None and n:
             common = self.fit(over)
-            made, n = made - common.log_p, max(n - len(common.strengths), 0)
+            made, further = made - common.log_p, n - len(common.strengths)
+            n = further if further > 0 else n
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
@@ -182,18 +194,25 @@ class Fits:
             return self.tilt(feature)
         if isinstance(feature, Leaving):
             return self.leaving(feature)
+        if isinstance(feature, Landing):
+            return self.landings.fit(feature)
         columns, bounds = self._columns(feature)
         made = self._linear([columns], bounds, self._null.x)
         return replace(made, log_p=made.log_p - self.null_log_p)
 
+    @cached_property
+    def landings(self) -> Landings:
+        """Fits of features of landing."""
+        return Landings(law=self.law, lapse=self._lapse)
+
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
         """Return what a tilt adds with the base's parameters fitted once more beside it."""
-        leaning = self.tilt(feature).factor
-        beside = Fits(law=self.law.absorbing(leaning=leaning), also=self.also)
+        bent = leaned(self.law, self.tilt(feature).factor)
+        beside = Fits(law=self.law.absorbing(bent=bent), also=self.also)
         made = beside.null_log_p - (self.null_log_p if self.beyond is None else self.beyond)
         return replace(gain, log_p=made) if made.sum() > gain.log_p.sum() else gain
 
-    def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Component | Tilt | Turned]:
+    def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Single]:
         """Return the features that a first look says most of."""
         promise = [self._promise(feature) for feature in choice.features]
         order = [int(k) for k in np.argsort(promise)[::-1][:n] if promise[k] > 0]
@@ -201,7 +220,7 @@ class Fits:
             return [choice.features[k] for k in order]
         return [max(choice.near(k), key=self._promise) for k in order]
 
-    def _promise(self, feature: Component | Tilt | Turned) -> float:
+    def _promise(self, feature: Component | Tilt | Turned | Landing) -> float:
         """Return how clear a feature is: by the scores of its weights, or a gain in nats.
 
         The score of a component has no variance where the density is next to nothing, so it is
@@ -209,7 +228,9 @@ class Fits:
         """
         if isinstance(feature, Component):
             return self._promise_of(self.law.component(feature, first=True))
-        if isinstance(feature, Turned):
+        if isinstance(feature, Landing):
+            scores = self.landings.scores(feature)
+        elif isinstance(feature, Turned):
             (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
             scores = self._no_lapse[:, None] * (at / base_at - over / base_over)
         else:
@@ -230,7 +251,7 @@ class Fits:
                     * here
                     * (base_at[:, 0] + share * at.sum(axis=1))
                     / (base_over[:, 0] + share * over.sum(axis=1))
-                    + lapse * _UNIFORM
+                    + lapse * UNIFORM
                 ).sum()
             )
             for share in (0.0, *_TRIED)
@@ -242,7 +263,7 @@ class Fits:
         """Probability of each step that it was none, shape (step,)."""
         base_at, base_over = self.law.base
         density = (1 - self._lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
-        return np.asarray(density / (density + self._lapse * _UNIFORM))
+        return np.asarray(density / (density + self._lapse * UNIFORM))
 
     @cached_property
     def _mean_heading(self) -> Floats:
@@ -270,7 +291,7 @@ class Fits:
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
             density, top, whole = densities(x)
-            value, share, slope = _mixed(density, x[-1])
+            value, share, slope = mixed(density, x[-1])
 
             def scores() -> Floats:
                 # At a floor the law does not change.
@@ -287,7 +308,7 @@ class Fits:
             x0[: len(start) - 1], x0[-1] = start[:-1] * scale[: len(start) - 1], start[-1]
         ranges = [_scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
         peak = climb(objective, x0, ranges)
-        log_p = _log_mixed(densities(peak.x)[0], peak.x[-1])
+        log_p = log_mixed(densities(peak.x)[0], peak.x[-1])
         return Fit(
             log_p=log_p, peak=peak, n=len(bounds), scale=np.append(scale, 1.0), factor=np.zeros(0)
         )
@@ -306,14 +327,14 @@ class Fits:
             return np.asarray(at * np.exp((vector * taken).sum(axis=1)) / whole)
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-            value, share, slope = _mixed(density(x), x[-1])
+            value, share, slope = mixed(density(x), x[-1])
             ahead = share[:, None] * (taken - mean)
             return value, lambda: np.column_stack([np.einsum("sbd,sd->sb", vectors, ahead), slope])
 
         n_strengths = vectors.shape[1]
         bounds = [(_low(feature, _MOST_TILT), _MOST_TILT)] * n_strengths
         peak = self._climb_from_null(objective, bounds)
-        log_p = _log_mixed(density(peak.x), peak.x[-1]) - base
+        log_p = log_mixed(density(peak.x), peak.x[-1]) - base
         factor = np.einsum("sbd,b->sd", vectors, peak.x[:-1])
         return Fit(log_p=log_p, peak=peak, n=n_strengths, scale=_AS_IT_IS, factor=factor)
 
@@ -323,10 +344,10 @@ class Fits:
         at = np.exp(self.law.log_here) * self.law.base[0][:, 0] / self.law.cells.sum(axis=1)
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-            value, _, slope = _mixed(at, x[-1])
+            value, _, slope = mixed(at, x[-1])
             return value, lambda: slope[:, None]
 
-        return _log_mixed(at, self._climb_from_null(objective, []).x[-1])
+        return log_mixed(at, self._climb_from_null(objective, []).x[-1])
 
     def leaving(self, feature: Leaving) -> Fit:
         """Return what a factor on landing in a zone adds, beside one for each zone left."""
@@ -349,13 +370,13 @@ class Fits:
 
             def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
                 found, chance = density(x)
-                value, own, slope = _mixed(found, x[-1])
+                value, own, slope = mixed(found, x[-1])
                 ahead = own * (landed - chance)
                 return value, lambda: np.column_stack([ahead[:, None] * columns, slope])
 
             bounds = [(-_MOST_LEAVING, _MOST_LEAVING)] * columns.shape[1]
             peak = self._climb_from_null(objective, bounds)
-            log_p = _log_mixed(density(peak.x)[0], peak.x[-1])
+            log_p = log_mixed(density(peak.x)[0], peak.x[-1])
             factor = columns @ peak.x[:-1]
             n = columns.shape[1] - len(zones)
             return Fit(log_p=log_p, peak=peak, n=n, scale=_AS_IT_IS, factor=factor)
@@ -371,19 +392,6 @@ class Fits:
 
 def _low(feature: Tilt | Turned, most: float) -> float:
     return -most if feature.low is None else feature.low
-
-
-def _mixed(density: Floats, level: float) -> tuple[float, Floats, Floats]:
-    """Return the log likelihood with a lapse, the shares of steps that are none, and its slopes."""
-    lapse = float(expit(level))
-    mixed = (1 - lapse) * density + lapse * _UNIFORM
-    slope = (_UNIFORM - density) / mixed * lapse * (1 - lapse)
-    return float(np.log(mixed).sum()), (1 - lapse) * density / mixed, slope
-
-
-def _log_mixed(density: Floats, level: float) -> Floats:
-    lapse = float(expit(level))
-    return np.log((1 - lapse) * density + lapse * _UNIFORM)
 
 
 def _scaled(pair: Bounds, scale: float) -> Bounds:

@@ -63,8 +63,8 @@ class Law:
         Of where all were; where positions are exact they are the only one.
     every
         One of so many steps counts.
-    leaning : ndarray, shape (step, 2), optional
-        A factor exp(leaning . heading) on the density, beside what the model has.
+    bent
+        Log of a further factor on the density of each cell, (step, cell), and at headings taken.
     leaving
         Zones, and the log of a factor on landing there, shape (step,), likewise.
     """
@@ -75,11 +75,11 @@ class Law:
     seed: int = 0
     n_draws: int = DRAWS
     every: int = 1
-    leaning: Floats | None = None
+    bent: Columns | None = None
     leaving: tuple[tuple[int, Floats], ...] = ()
 
     def absorbing(
-        self, leaning: Floats | None = None, leaving: tuple[int, Floats] | None = None
+        self, bent: Columns | None = None, leaving: tuple[int, Floats] | None = None
     ) -> Law:
         """Return the law with a further factor of either sort.
 
@@ -87,7 +87,7 @@ class Law:
         """
         made = replace(
             self,
-            leaning=_sum(self.leaning, leaning),
+            bent=_sum(self.bent, bent),
             leaving=self.leaving if leaving is None else (*self.leaving, leaving),
         )
         made.__dict__.update(turns=self.turns, draws=self.draws, _weights=self._weights)
@@ -134,10 +134,8 @@ class Law:
         made = per * (self.turns.share * self._gamma[:, None]).sum(axis=2)
         tilt = self.fitted.view.tilt
         made = made * tilt[self.rows] if len(tilt) else made
-        if self.leaning is not None:
-            angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
-            ways = np.stack([np.cos(angle), np.sin(angle)])
-            made = made * np.exp(self.leaning @ ways)
+        if self.bent is not None:
+            made = made * np.exp(self.bent[0])
         return np.ascontiguousarray(made)
 
     @cached_property
@@ -176,8 +174,8 @@ class Law:
         taken = self.fitted.view.tilt_taken
         if len(taken):
             gamma = gamma + np.log(np.maximum(taken[self.rows], 1e-300))
-        if self.leaning is not None:
-            gamma = gamma + (self.leaning * self.turns.taken).sum(axis=1)
+        if self.bent is not None:
+            gamma = gamma + self.bent[1]
         return np.asarray(gamma)
 
     @cached_property
@@ -394,7 +392,7 @@ class Law:
         return np.asarray(whole * self.weight)
 
 
-def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
+def _sum(one: Columns | None, other: Columns | None) -> Columns | None:
     if one is None or other is None:
         return other if one is None else one
-    return one + other
+    return one[0] + other[0], one[1] + other[1]

@@ -16,6 +16,12 @@ from zfcal.model.scene import Moves, Scene
 _AGO_S = 4.0
 """Before the last step: whatever changes slowly was much the same then."""
 
+_AHEAD = 0.5
+"""Cosine of the angle from the heading within which another one is ahead."""
+
+_FAST, _LONG_AGO = 1.15, 12
+"""Score of a fast step, and steps after which it is forgotten."""
+
 _LEAST_RANK = 0.3
 """Rank of a speed that is slower than all, or faster from the other end."""
 
@@ -41,6 +47,8 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     theirs = np.take_along_axis(theirs, others[..., None], axis=1)
     here = theirs[..., ZONE] > 0
     away = np.hypot(theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y])
+    x, y = theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
+    is_ahead = own[:, None, HX] * x + own[:, None, HY] * y > _AHEAD * away
     paces = _paces_of_all(states)[at[:, None], others]
     speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
     ago = 1 + max(1, round(_AGO_S / scene.dt_s))
@@ -56,6 +64,8 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         others_m_s=_ago(speed, scene, *all_others, 1),
         others_ago_m_s=_ago(speed, scene, *all_others, ago),
         distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
+        ahead_m=np.where(here & is_ahead, away, AWAY_M).min(axis=1, initial=AWAY_M),
+        since_fast=_since_fast(table, scene, at, who),
         here=here,
         time=at / max(1, len(scene.k) - 1),
         track=moves.track,
@@ -118,6 +128,16 @@ def _ago(
     then = at + 1 - ago
     same = (then > 0) & (scene.tracks[np.maximum(then - 1, 0), who] == scene.tracks[at, who])
     return np.where(same, table[np.maximum(then, 0), who], np.nan)
+
+
+def _since_fast(
+    table: Floats, scene: Scene, at: NDArray[np.int64], who: NDArray[np.int64]
+) -> Floats:
+    """Return how many steps ago the last fast one was, 1 for the last step, shape (step,)."""
+    made = np.full(len(at), float(_LONG_AGO))
+    for ago in range(_LONG_AGO - 1, 0, -1):
+        made[_ago(table, scene, at, who, ago) > _FAST] = ago
+    return made
 
 
 def _paces_of_all(states: Floats) -> Floats:

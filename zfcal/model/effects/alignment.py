@@ -11,12 +11,14 @@ from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import (
     Hooked,
     apart,
+    foremost_agent,
     nearest_agent,
     needs_neighbour,
     seen_by_rank,
     tilt,
 )
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, attended, evenly
+from zfcal.model.effects.weights import attended, evenly
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
 from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -28,24 +30,34 @@ _USUAL_SR = 0.01
 
 _NEAR_M = 0.15
 _REACHES_M = (0.08, 0.25, 0.4)
+_FOREMOST_M = (0.08, 0.15, 0.4)
 _PER_WEIGHT = 0.03
 _WAY_PER_WEIGHT = 0.01
+
+
+@inlined
+def one_agent(state: Hooked, n: int, i: int, among: float, reach_m: float) -> int:
+    """Return the nearest other one, or the foremost within reach; -1 without one."""
+    if among < 3.0:
+        return nearest_agent(state, n, i)
+    return foremost_agent(state, n, i, reach_m)
 
 
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
     """Add a component about the neighbours' mean heading; the more they agree, the heavier.
 
-    Or about the heading of the nearest, or one about that of each.
+    Or about the heading of the nearest, or of the foremost, or one about that of each.
     """
     if parameters[3] > 0.0 or parameters[4] > 0.0:
         return 0.0
     if parameters[5] > 0.0 or parameters[7] > 0.0:
-        of_each = parameters[5] > 1.0
+        of_each = 1.0 < parameters[5] < 3.0
         if of_each == (parameters[7] > 0.0):
-            k = seen_by_rank(state, sight, n, i, parameters[7]) if of_each else (
-                nearest_agent(state, n, i)
-            )  # fmt: skip
+            if of_each:
+                k = seen_by_rank(state, sight, n, i, parameters[7])
+            else:
+                k = one_agent(state, n, i, parameters[5], parameters[6])
             if k >= 0:
                 out[0], out[1], out[2] = state[HX * n + k], state[HY * n + k], parameters[1]
                 graded = of_each and parameters[2] > 0.0
@@ -82,7 +94,7 @@ def near_heading(state: Hooked, n: int, i: int, reach_m: float) -> tuple[float, 
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by the mean heading of all that are near; the sense along a wall too.
 
-    Or by the heading of the nearest.
+    Or by the heading of the nearest, or of the foremost.
     """
     leaning = _PER_WEIGHT * parameters[3]
     if parameters[4] > 0.0 and state[FOLLOWS * n + i] > 0.0:
@@ -90,7 +102,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     if not leaning > 0.0:
         return 1.0
     if parameters[5] > 0.0:
-        k = nearest_agent(state, n, i)
+        k = one_agent(state, n, i, parameters[5], parameters[6])
         if k < 0:
             return 1.0
         return tilt(leaning * parameters[0], state[HX * n + k] * ux + state[HY * n + k] * uy, 1.0)
@@ -259,19 +271,20 @@ EFFECT = Effect(
         EffectParameter(
             name="among",
             low=0.0,
-            high=2.0,
+            high=3.0,
             default=0.0,
             says="0: the mean heading of those that are seen; 1: the heading of the nearest, seen "
             "or not, as one of 0.01 sr, or leaned toward; 2: a component about the heading of each "
-            "that is seen.",
+            "that is seen; 3: the heading of who is most straight ahead, if within reach, as of "
+            "the nearest.",
         ),
         EffectParameter(
             name="reach_m",
             low=0.0,
             high=1.0,
             default=_NEAR_M,
-            says="Distance within which the mean heading counts that fish lean or turn toward, in "
-            "metres.",
+            says="Distance within which the mean heading, or that of the foremost, counts that "
+            "fish lean or turn toward, in metres.",
         ),
     ),
     strength="weight",
@@ -296,6 +309,8 @@ EFFECT = Effect(
             for form in ({"among": 1.0}, {"among": 2.0}, {"among": 2.0, "grading": 0.0})
         ),
         {"leaning": 1.0, "among": 1.0},
+        *({"leaning": 1.0, "among": 3.0, "reach_m": reach_m} for reach_m in _FOREMOST_M),
+        {"among": 3.0, "reach_m": _FOREMOST_M[-1]},
         *({"leaning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
         *({"turning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
     ),

@@ -9,17 +9,8 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.features import (
-    Component,
-    Feature,
-    Leaving,
-    Seen,
-    Tilt,
-    Turned,
-    Weights,
-    aside_of,
-    only,
-)
+from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -117,6 +108,24 @@ def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
     )
 
 
+def _crossing(between: shapely.Geometry) -> Tilt:
+    """Return that each fish goes on between the rooms, or turns back, in a measure of its own."""
+
+    def ahead(seen: Seen) -> Floats:
+        inside = shapely.contains_xy(between, seen.xy_m).astype(np.float64)
+        return inside[:, None] * seen.own_heading
+
+    def by_who(seen: Seen) -> Floats:
+        rest = 1.0 - _who(seen).sum(axis=1, keepdims=True)
+        each = np.concatenate([_who(seen), rest], axis=1)
+        return np.asarray(each[..., None] * ahead(seen)[:, None])
+
+    return Tilt(
+        label="going on between the rooms, by who", vectors=by_who,
+        over=Tilt(label="going on between the rooms", vectors=lambda seen: ahead(seen)[:, None]),
+    )  # fmt: skip
+
+
 def _features(arena: Arena) -> tuple[Feature, ...]:
     """Return features of leaving, and of headings toward the way out where there is one."""
     made: list[Feature] = [
@@ -127,7 +136,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:
-        made += _by_who(between)
+        made += [*_by_who(between), _crossing(between)]
     return tuple(made)
 
 

@@ -25,6 +25,7 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 _KNOTS = (-1.5, -0.5, 0.5, 1.5)
 _SLOW_TO_FAST = (-1.2, 0.0, 1.2)
+_KNOTS_STEPS = (1.0, 2.0, 4.0, 7.0, 12.0)
 _KEPT = (0.55, 0.7, 0.85, 1.0)
 """Shares of the last speed that a coasting fish may have kept."""
 
@@ -50,6 +51,10 @@ def _shares(speed_m_s: Floats) -> Floats:
 
 def _each_share(swum: Swum) -> Floats:
     return np.broadcast_to(np.eye(len(_KEPT)), (len(swum.last), len(_KEPT), len(_KEPT)))
+
+
+def _since_fast(swum: Swum) -> Floats:
+    return hats(swum.since_fast, _KNOTS_STEPS)[:, :-1]
 
 
 def _some_ago(swum: Swum) -> Floats:
@@ -94,6 +99,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="by the last speed", weights=_last),
         Pace(label="by the last three speeds", weights=_some_ago),
+        Pace(label="by the time since a fast step", weights=_since_fast),
         Spread(label="slow and fast ones, by the last speed", weights=_spread_by_last),
         Spread(label="slow and fast ones, by the last two", weights=_lately),
         Copied(

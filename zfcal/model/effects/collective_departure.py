@@ -15,17 +15,8 @@ from zfcal.model.effects.forms import (
     turn_to,
     way_out,
 )
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    Leaving,
-    Seen,
-    Tilt,
-    Turned,
-    aside_of,
-    only,
-)
+from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.features import Along, Component, Feature, Leaving, Seen, Tilt, Turned
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION

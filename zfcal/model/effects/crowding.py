@@ -44,6 +44,10 @@ def _spread_by_nearest(swum: Swum) -> Floats:
     return hats(swum.distance_m.min(axis=1, initial=_NEAR_M[-1]), _NEAR_M)[:, :-1]
 
 
+def _ahead(swum: Swum) -> Floats:
+    return hats(swum.ahead_m, _KNOTS_M)[:, :-1]
+
+
 def _nearest(swum: Swum) -> Floats:
     return hats(swum.distance_m.min(axis=1, initial=_KNOTS_M[-1]), _KNOTS_M)[:, :-1]
 
@@ -86,6 +90,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="number", weights=_number),
         Pace(label="the nearest", weights=_nearest),
+        Pace(label="somebody ahead", weights=_ahead),
         Spread(label="slow and fast ones, by how many are near", weights=_company),
         Spread(label="slow and fast ones, by the nearest", weights=_spread_by_nearest),
     ),

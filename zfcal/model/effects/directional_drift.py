@@ -11,17 +11,8 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, SLOWEST_M_S, SPEED_M_S, cut, tilt, turn_to
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    OneOf,
-    Seen,
-    Tilt,
-    Turned,
-    aside_of,
-    only,
-)
+from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS

@@ -190,6 +190,20 @@ def nearest_agent(state: Hooked, n: int, i: int) -> int:
     return found
 
 
+@inlined
+def foremost_agent(state: Hooked, n: int, i: int, reach_m: float) -> int:
+    """Return who is most straight ahead, seen or not; -1 if that one is farther, or behind."""
+    found, most = -1, 0.0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
+            x, y = state[X * n + j] - state[X * n + i], state[Y * n + j] - state[Y * n + i]
+            ahead = state[HX * n + i] * x + state[HY * n + i] * y
+            cosine = ahead / max(math.hypot(x, y), 1e-9)
+            if cosine > most:
+                found, most = j, cosine
+    return found if found >= 0 and apart(state, n, i, found) < reach_m else -1
+
+
 def needs_neighbour(company: Company) -> str | None:
     """Return what a recording lacks for an effect between neighbours."""
     return None if company.n_fish + company.n_robots > 1 else "a neighbour"

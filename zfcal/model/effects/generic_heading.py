@@ -23,7 +23,6 @@ from zfcal.model.effects.cues import (
     window,
 )
 from zfcal.model.effects.forms import apart, beyond, nearest_seen, needs_neighbour, tilt
-from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import (
@@ -37,6 +36,7 @@ from zfcal.model.kernels.state import (
     TAU_Y,
     WALL,
 )
+from zfcal.model.places import places
 
 
 @hook(FACTOR)

@@ -20,10 +20,10 @@ from zfcal.model.effects.cues import (
     window,
 )
 from zfcal.model.effects.forms import apart, beyond, nearest_seen, needs_neighbour, times_faster
-from zfcal.model.effects.places import places
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, SPEED, WALL, X, Y
+from zfcal.model.places import places
 
 
 @hook(SPEED_HOOK)

@@ -18,7 +18,8 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned, aside_of, only
+from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
 from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION

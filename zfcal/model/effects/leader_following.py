@@ -9,16 +9,8 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    OneOf,
-    Seen,
-    Tilt,
-    Weights,
-    factor_on_attention,
-)
+from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Weights
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT

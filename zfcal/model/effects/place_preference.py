@@ -8,29 +8,21 @@ from typing import TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, tilt, turn_to
-from zfcal.model.effects.places import places
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    OneOf,
-    Seen,
-    Tilt,
-    Turned,
-    aside_of,
-    only,
-)
+from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import FOLLOWS, X, Y
+from zfcal.model.places import places
 
 _AT_IT_M = 0.02
 
@@ -89,6 +81,13 @@ _BY_DISTANCE = Along(cue="distance to the place (m)", knots=_KNOTS_M)
 _UP_TO = np.linspace(0.05, 0.95, 9)
 """Of the tank's width and height: corners as well, which fish like and keep away from."""
 
+_WALL_M = 0.1
+"""Shorter pieces of wall are none: a round tank has many."""
+
+_LANDS_M = (0.0, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
+_TO_WALL = Along(cue="distance to the wall (m)", knots=_LANDS_M[:-1])
+_SPOT_M = (0.0, 0.05, 0.08, 0.11, 0.15, 0.2)
+
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)
 """Of the way to the next of these places."""
 
@@ -120,13 +119,21 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
         return [(each, room) for each in spots if inside.covers(shapely.Point(each))]
 
     places = [(each, near(each)) for each in asked]
+    walls = [end for end in arena.segments_m if np.hypot(*(end[2:] - end[:2])) > _WALL_M]
     sorts = (
         ("drawn", _drawn),
         ("leaning", _leaning),
         ("turning", _turning),
         ("turning as a whole", _turning_as_a_whole),
     )
-    return tuple(_of_sort(kind, sort, places) for kind, sort in sorts)
+    landings = (
+        ("landing at a wall", [_at_wall(wall) for wall in walls]),
+        ("landing at a place", [_at_spot(spot) for spot in spots]),
+    )
+    return (
+        *(_of_sort(kind, sort, places) for kind, sort in sorts),
+        *(OneOf(kind=kind, features=features) for kind, features in landings if features),
+    )
 
 
 def _of_sort(
@@ -139,6 +146,30 @@ def _of_sort(
         kind=kind,
         features=[sort(*each) for each, _ in places],
         near=lambda k: [sort(*each) for each in places[k][1]],
+    )
+
+
+def _at_wall(wall: Floats) -> Landing:
+    """Return landings by how far they are from a straight piece of wall."""
+    start, way = wall[:2], wall[2:] - wall[:2]
+
+    def away_m(_seen: Seen, _rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+        share = np.clip((xy_m - start) @ way / (way @ way), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(xy_m - start - share[..., None] * way, axis=-1))
+
+    middle = start + way / 2
+    return Landing(
+        label=f"landing at the wall at {middle[0]:.2f}, {middle[1]:.2f}", away_m=away_m,
+        knots_m=_LANDS_M, along=_TO_WALL,
+    )  # fmt: skip
+
+
+def _at_spot(spot: Floats) -> Landing:
+    return Landing(
+        label=f"landing at {spot[0]:.2f}, {spot[1]:.2f}",
+        away_m=lambda _seen, _rows, xy_m: np.linalg.norm(xy_m - spot, axis=-1),
+        knots_m=_SPOT_M,
+        along=Along(cue="distance to the place (m)", knots=_SPOT_M[:-1]),
     )
 
 

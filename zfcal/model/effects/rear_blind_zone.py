@@ -7,7 +7,8 @@ import math
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import Along, Feature, Seen, factor_on_attention
+from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SIGHT

@@ -6,20 +6,13 @@ import math
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, Hooked, apart, beyond, tilt, turn_to
-from zfcal.model.features import (
-    Along,
-    Component,
-    Feature,
-    Seen,
-    Tilt,
-    Turned,
-    aside_of,
-    factor_on_attention,
-)
+from zfcal.model.effects.weights import aside_of, factor_on_attention
+from zfcal.model.features import AWAY_M, Along, Component, Feature, Landing, Seen, Tilt, Turned
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
@@ -123,6 +116,15 @@ def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
     return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside))
 
 
+def _from_robot(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+    """Return how far positions are from the nearest robot; far away without one."""
+    away = seen.bearing[rows] * seen.distance_m[rows, :, None]
+    robots = seen.xy_m[rows, None] + away
+    far = np.linalg.norm(xy_m[:, :, None] - robots[:, None], axis=-1)
+    return np.where(seen.is_robot[rows, None], far, AWAY_M).min(axis=2, initial=AWAY_M)
+
+
+_LANDS_M = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)
 _TO_ROBOT = Along(cue="distance to the robot (m)", knots=_KNOTS_M)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -140,6 +142,10 @@ _FEATURES: tuple[Feature, ...] = (
         label="drawn to it", toward="bearing", weights=_seen_robots, kappa=5.0, along=_TO_ROBOT
     ),
     Tilt(label="leaning", vectors=_leaning, along=_TO_ROBOT),
+    Landing(
+        label="landing near it", away_m=_from_robot, knots_m=_LANDS_M,
+        along=Along(cue="distance to the robot (m)", knots=_LANDS_M[:-1]),
+    ),
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
     Turned(
         label="turning as a whole", by=partial(_turning, along_walls=True), neighbours=True,

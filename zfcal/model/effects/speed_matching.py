@@ -18,7 +18,7 @@ from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED, ZONE
-from zfcal.model.paces import Copied, Pace, Swum
+from zfcal.model.paces import Copied, Pace, Spread, Swum
 
 _LEAST_M = 0.01
 
@@ -42,6 +42,8 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _KNOTS_M = (0.0, 0.1, 0.2, 0.4)
+_NEAR_M = 0.2
+_SLOW_TO_FAST = (-1.0, 0.3, 1.3)
 
 
 def _near(swum: Swum) -> Floats:
@@ -62,6 +64,14 @@ def _near_or_far(swum: Swum) -> Floats:
     """Return hat functions of the distance to the nearest, shape (step, 1, weight)."""
     far = swum.distance_m.min(axis=1, initial=_KNOTS_M[-1])
     return hats(far, _KNOTS_M)[:, None, :-1]
+
+
+def _by_fastest_near(swum: Swum) -> Floats:
+    """Return how fast the fastest of those near was, and whether anybody is near."""
+    is_near = swum.here & (swum.distance_m < _NEAR_M)
+    fastest = np.where(is_near, swum.others, -np.inf).max(axis=1, initial=-np.inf)
+    near = np.isfinite(fastest)[:, None]
+    return hats(np.where(near[:, 0], fastest, 0.0), _SLOW_TO_FAST) * near
 
 
 def _nearest(swum: Swum) -> Floats:
@@ -129,6 +139,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="of those near", weights=_near),
         Pace(label="of the nearest", weights=_nearest),
+        Spread(label="slow and fast ones, by the fastest near", weights=_by_fastest_near),
         Copied(
             label="the speed of the nearest",
             of=lambda swum: _of_nearest(swum, swum.others_m_s),

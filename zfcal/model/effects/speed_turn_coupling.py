@@ -7,11 +7,12 @@ turning less at speed for the model: the same joint law.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.features import Feature, Seen, Sharper, Tilt
+from zfcal.model.features import Along, Feature, Landing, Seen, Sharper, Tilt
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -51,9 +52,33 @@ def _by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, _KNOTS_RAD)[:, 1:]
 
 
+def _turn_rad(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+    """Return by how much a fish turns that goes to some positions."""
+    away, own = xy_m - seen.xy_m[rows, None], seen.own_heading[rows, None]
+    cross = own[..., 0] * away[..., 1] - own[..., 1] * away[..., 0]
+    return np.asarray(np.abs(np.arctan2(cross, (own * away).sum(axis=-1))))
+
+
+def _aside_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+    """Return how long an arc is that leads to positions: their distance times the turn."""
+    far_m = np.linalg.norm(xy_m - seen.xy_m[rows, None], axis=-1)
+    return np.asarray(_turn_rad(seen, rows, xy_m) * far_m)
+
+
+_TURN_RAD = (0.0, 0.4, 0.8, 1.2, 1.8, 2.8)
+_ASIDE_M = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07)
+
 _FEATURES: tuple[Feature, ...] = (
     Tilt(label="by speed", vectors=_by_speed),
     Sharper(label="sharper by speed", by=_quicker),
+    Landing(
+        label="landing aside",
+        away_m=_aside_m,
+        knots_m=_ASIDE_M,
+        along=Along(cue="turn times length of the step (m)", knots=_ASIDE_M[:-1]),
+        # More than by the turn alone, which would be another law of turns.
+        over=Landing(label="turning less", away_m=_turn_rad, knots_m=_TURN_RAD),
+    ),
 )
 
 

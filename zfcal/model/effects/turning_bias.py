@@ -10,7 +10,8 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned, only
+from zfcal.model.effects.weights import only
+from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY

@@ -10,13 +10,16 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.features import Component, Feature, Seen, Tilt, Turned, only
+from zfcal.model.effects.weights import only
+from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Sharper, Tilt, Turned
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
 
 _PER_STRENGTH = 0.1
 _KAPPA = 9.0
+_KNOTS_RAD = (0.0, 0.4, 0.8, 1.6, math.pi)
 
 
 @hook(FACTOR)
@@ -115,12 +118,36 @@ def _before_the_last(seen: Seen) -> Floats:
     return np.moveaxis(seen.ago_heading[1:], 0, 1)
 
 
+def _by_last_turn(seen: Seen) -> Floats:
+    """Return hat functions of how wide the last turn was, less their mean."""
+    weights = hats(np.abs(seen.last_turn_rad), _KNOTS_RAD)
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:])
+
+
+def _by_last_turn_off_walls(seen: Seen) -> Floats:
+    return _by_last_turn(seen) * _remembers(seen)[:, None]
+
+
+def _course(n: int) -> Component:
+    """Return headings drawn to the mean of the present one and some before, as `LAGS` has them."""
+
+    def toward(seen: Seen) -> Floats:
+        total = seen.own_heading + seen.ago_heading[:n].sum(axis=0)
+        return only(total / np.maximum(np.linalg.norm(total, axis=1), 1e-9)[:, None])
+
+    label = f"drawn to the course of {LAGS[n - 1] + 1} steps"
+    return Component(label=label, toward=toward, weights=_one, kappa=_KAPPA)
+
+
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=_last_turn, neighbours=False),
     Turned(label="offset by recent turns", by=lambda seen: seen.recent_turn_rad, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
     Component(label="drawn on as it turned", toward=_on, weights=_one, kappa=_KAPPA),
+    OneOf(kind="drawn to the course", features=tuple(_course(n) for n in (2, 4, 6))),
+    Sharper(label="sharper by the last turn", by=_by_last_turn),
+    Sharper(label="sharper by the last turn, off the walls", by=_by_last_turn_off_walls),
     Tilt(label="leaning to the heading before", vectors=_leaning),
     Tilt(label="leaning to earlier headings", vectors=_earlier),
     Tilt(label="leaning to earlier headings, along walls too", vectors=_before_the_last),

@@ -1,0 +1,134 @@
+"""Steps that end near something: a preference with an edge is seen, and has the strength it has."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.features.asking import fits_beside, gains_of
+from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.landings import leaned
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import tell
+from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.extended import maximise
+from zfcal.model.features import Landing, OneOf, Tilt
+from zfcal.model.kernels.landing import ANGLES
+
+WALL, BAND_M = np.array([0.95, 0.05, 0.95, 0.4]), 0.05
+
+
+@pytest.fixture(scope="module")
+def nothing(base):
+    """Return fits to ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Fits(law=Law(scene=scene, fitted=fitted))
+
+
+def ends_of(scene):
+    """Return where the heading of each cell would lead, shape (turn, cell, 2)."""
+    angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
+    ways = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    turns = scene.turns
+    xy = scene.states[turns.at, :2, turns.who]
+    return xy[:, None] + (turns.speed_m_s * scene.dt_s)[:, None, None] * ways
+
+
+@pytest.fixture(scope="module")
+def banded(base, worlds):
+    """Return a law of fish of which steps that end within 5 cm of one wall are likelier."""
+    scene, fitted = base
+    inside = WALL[0] - ends_of(scene)[..., 0] < BAND_M
+    factor = np.where(inside & (ends_of(scene)[..., 1] < WALL[3]), math.exp(3.0), 1.0)
+    drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
+    return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+
+
+def at_wall(arena):
+    """Return the feature of landing at that wall."""
+    (kind,) = (
+        each
+        for each in find_effect("place-preference").features(arena)
+        if isinstance(each, OneOf) and each.kind == "landing at a wall"
+    )
+    (found,) = (each for each in kind.features if each.label.endswith("at 0.95, 0.23"))
+    return found
+
+
+def test_a_band_along_a_wall_is_a_place(banded):
+    """A preference with an edge: no tilt toward the wall sees half as much."""
+    gains = gains_of(banded, all_effects())
+    told = tell(gains)
+    assert told.gain.name == "place-preference"
+    assert told.gain.label == "landing at the wall at 0.95, 0.23"
+    tilts = [g.nats for g in gains if g.name == "place-preference" and "leaning" in g.label]
+    assert told.gain.nats > 2 * max(tilts)
+
+
+def test_its_strengths_are_those_of_the_band(banded):
+    """About three nats up to 4 cm, next to nothing from 5 cm on."""
+    fits = Fits(law=banded)
+    fit = fits.fit(at_wall(banded.scene.arena))
+    by_knot = dict(zip(at_wall(banded.scene.arena).knots_m, fit.factor, strict=False))
+    assert 2.0 < np.mean([by_knot[k] for k in (0.02, 0.03, 0.04)]) < 4.0
+    assert abs(by_knot[0.07]) < 0.8
+
+
+def test_beside_itself_it_gains_nothing(banded):
+    """What was named is taken in with its strengths, and asked no more."""
+    fits = Fits(law=banded)
+    feature = at_wall(banded.scene.arena)
+    gained = fits.gain("place-preference", feature).log_p.sum()
+    beside = fits_beside(banded, [find_effect("place-preference")])
+    assert gained > 8
+    assert beside.gain("place-preference", feature).log_p.sum() < 0.3 * gained
+
+
+def test_every_landing_gains_nothing_where_nothing_is(nothing):
+    """A few nats at most, by as many strengths; never less than nothing."""
+    features = [
+        each
+        for effect in all_effects()
+        for feature in effect.features(nothing.law.scene.arena)
+        for each in (feature.features if isinstance(feature, OneOf) else [feature])
+        if isinstance(each, Landing)
+    ]
+    assert len(features) > 20
+    for feature in features:
+        fit = nothing.fit(feature)
+        assert -1e-2 < fit.log_p.sum() < 4 + 2 * len(fit.strengths)
+
+
+def test_a_landing_that_no_step_can_reach_has_no_strength(nothing):
+    """Nothing is fitted, and nothing gained."""
+    far = Landing(
+        label="far", away_m=lambda _seen, _rows, xy_m: xy_m[..., 0] + 9.0, knots_m=(0.0, 1.0)
+    )
+    fit = nothing.fit(far)
+    assert fit.n == 0
+    assert fit.log_p.sum() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_tilt_and_a_landing_bend_the_law_alike(nothing):
+    """A factor on cells, by its logs there and at the heading taken."""
+    law = nothing.law
+    east = Tilt(label="east", vectors=lambda seen: seen.x_axis[:, None])
+    cells, taken = leaned(law, 0.3 * east.vectors(law.draws[0].seen)[:, 0])
+    bent = law.absorbing(bent=(cells, taken))
+    np.testing.assert_allclose(taken, 0.3 * law.turns.taken[:, 0], rtol=1e-6)
+    whole = (law.cells * np.exp(cells)).sum(axis=1)
+    np.testing.assert_allclose(bent.cells.sum(axis=1), whole, rtol=1e-9)
+
+
+def test_a_preference_more_than_another_counts_its_own_strengths(nothing):
+    """Where both have as many strengths none is free."""
+    (aside,) = (
+        each
+        for each in find_effect("speed-turn-coupling").features(nothing.law.scene.arena)
+        if isinstance(each, Landing)
+    )
+    alone = nothing.gain("speed-turn-coupling", replace(aside, over=None))
+    more = nothing.gain("speed-turn-coupling", aside)
+    assert more.n_strengths == alone.n_strengths == len(aside.knots_m) - 1
+    assert more.log_p.sum() < alone.log_p.sum() + 1e-6

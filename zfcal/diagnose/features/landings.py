@@ -1,0 +1,187 @@
+"""Steps that end near something: what a preference for that adds to the law.
+
+A tilt toward a thing has no edge. Fish may like to be within a band along a wall, or in a spot:
+then headings that land there are likelier than those that land beside it, in the few steps that
+could do either. So the factor is on where a heading lands, by how far that is from the thing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logit
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.features.climbing import Fit, climb
+from zfcal.diagnose.features.lapses import UNIFORM, log_mixed, mixed
+from zfcal.diagnose.features.law import Law
+from zfcal.model.features import Landing
+from zfcal.model.hats import hats
+from zfcal.model.kernels.landing import ANGLES
+from zfcal.model.kernels.state import X, Y
+
+_MOST = 6.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Near:
+    """The steps that may end near a thing, and the weights of where they would.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (row,)
+        Of these steps, among those of the law.
+    cells : ndarray, shape (row, cell, weight)
+    taken : ndarray, shape (row, weight)
+    """
+
+    rows: NDArray[np.intp]
+    cells: Floats
+    taken: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Landings:
+    """Fits of features of landing to the steps of a law.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    lapse
+        At which a search begins.
+    """
+
+    law: Law
+    lapse: float
+
+    @cached_property
+    def chances(self) -> Floats:
+        """The law of each step on cells of headings, shape (step, cell)."""
+        cells = self.law.cells
+        return np.asarray(cells / cells.sum(axis=1, keepdims=True))
+
+    @cached_property
+    def _at(self) -> Floats:
+        """Density of the heading taken, shape (step,)."""
+        law = self.law
+        return np.asarray(np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1))
+
+    @cached_property
+    def _places(self) -> tuple[Floats, Floats]:
+        """Where each step begins, and how far it goes, shapes (step, 2) and (step,)."""
+        law = self.law
+        turns = law.turns
+        return law.scene.states[turns.at, :, turns.who][:, [X, Y]], (
+            turns.speed_m_s * law.scene.dt_s
+        )
+
+    def _near(self, feature: Landing) -> _Near:
+        """Return the steps that may end near what a feature is about."""
+        seen, (xy, reach) = self.law.draws[0].seen, self._places
+        every = np.arange(len(reach))
+        away = feature.away_m(seen, every, xy[:, None])[:, 0]
+        rows = np.flatnonzero(away - reach < feature.knots_m[-1])
+
+        def weights(headings: Floats) -> Floats:
+            ends = xy[rows, None] + reach[rows, None, None] * headings
+            return hats(feature.away_m(seen, rows, ends), feature.knots_m)[..., :-1]
+
+        taken = weights(self.law.turns.taken[rows, None])[:, 0]
+        return _Near(rows=rows, cells=weights(_ways()), taken=taken)
+
+    def scores(self, feature: Landing) -> Floats:
+        """Return the scores of a feature's weights where none has a strength, shape (row, weight).
+
+        Of the steps alone that may end near what it is about.
+        """
+        near = self._near(feature)
+        expected = np.einsum("sc,scb->sb", self.chances[near.rows], near.cells)
+        own, lapse = self._at[near.rows], self.lapse
+        share = (1 - lapse) * own / ((1 - lapse) * own + lapse * UNIFORM)
+        return np.asarray(share[:, None] * (near.taken - expected))
+
+    def fit(self, feature: Landing) -> Fit:
+        """Return a feature at the maximum, and what it adds to each step."""
+        near = self._near(feature)
+        chances, n = self.chances[near.rows], near.taken.shape[1]
+        is_asked = (near.taken != 0).any(axis=0)
+        cells, taken = near.cells[..., is_asked], near.taken[:, is_asked]
+
+        def density(x: Floats) -> tuple[Floats, Floats]:
+            bent = chances * np.exp(cells @ x[:-1])
+            whole = bent.sum(axis=1)
+            found = self._at.copy()
+            found[near.rows] *= np.exp(taken @ x[:-1]) / whole
+            return found, bent / whole[:, None]
+
+        def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
+            found, bent = density(x)
+            value, share, slope = mixed(found, x[-1])
+
+            def scores() -> Floats:
+                made = np.zeros((len(found), len(x)))
+                expected = np.einsum("sc,scb->sb", bent, cells)
+                made[near.rows, :-1] = share[near.rows, None] * (taken - expected)
+                made[:, -1] = slope
+                return made
+
+            return value, scores
+
+        nothing = climb(lambda x: _lapse_alone(self._at, x), np.array([logit(self.lapse)]), [])
+        x0 = np.append(np.zeros(taken.shape[1]), nothing.x)
+        peak = climb(objective, x0, [(-_MOST, _MOST)] * taken.shape[1])
+        log_p = log_mixed(density(peak.x)[0], peak.x[-1])
+        strengths = np.zeros(n)
+        strengths[is_asked] = peak.x[:-1]
+        return Fit(
+            log_p=log_p - log_mixed(self._at, nothing.x[-1]),
+            peak=peak,
+            n=taken.shape[1],
+            scale=np.ones(1),
+            factor=strengths,
+        )
+
+    def bent(self, feature: Landing, fit: Fit) -> tuple[Floats, Floats]:
+        """Return the log of the factor on each cell, and at the heading taken.
+
+        Parameters
+        ----------
+        feature
+            Of landing.
+        fit
+            Of it.
+        """
+        near = self._near(feature)
+        cells, taken = np.zeros(self.chances.shape), np.zeros(len(self.chances))
+        cells[near.rows], taken[near.rows] = near.cells @ fit.factor, near.taken @ fit.factor
+        return cells, taken
+
+
+def leaned(law: Law, vectors: Floats) -> tuple[Floats, Floats]:
+    """Return the log of the factor of a tilt on each cell, and at the heading taken.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    vectors : ndarray, shape (step, 2)
+        Of the tilt.
+    """
+    return vectors @ _ways().T, (vectors * law.turns.taken).sum(axis=1)
+
+
+def _ways() -> Floats:
+    """Return the headings of the cells, shape (cell, 2)."""
+    angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _lapse_alone(at: Floats, x: Floats) -> tuple[float, Callable[[], Floats]]:
+    value, _, slope = mixed(at, x[-1])
+    return value, lambda: slope[:, None]
