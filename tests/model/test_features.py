@@ -14,6 +14,7 @@ from zfcal.model.features import (
     AWAY_M,
     LAGS,
     Component,
+    Landing,
     Leaving,
     OneOf,
     Seen,
@@ -24,6 +25,7 @@ from zfcal.model.features import (
 from zfcal.model.hats import hats
 
 N, OTHERS = 6, 3
+_OF_OTHERS = ("here", "speed_m_s", "lately_m_s", "distance_m", "is_robot")
 
 
 @pytest.fixture
@@ -52,6 +54,7 @@ def seen():
         distance_m=rng.uniform(0.03, 0.5, (N, OTHERS)),
         off_axis_rad=rng.uniform(0, np.pi, (N, OTHERS)),
         speed_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
+        lately_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
         heading=ways(N, OTHERS),
         here=np.ones((N, OTHERS), dtype=bool),
         in_sight=rng.random((N, OTHERS)) < 0.7,
@@ -124,6 +127,11 @@ def test_features_have_a_number_for_each_step_and_weight(name, arena, seen):
         elif isinstance(each, Turned | Sharper):
             values = (each.by(seen),)
             assert values[0].shape[0] == N
+        elif isinstance(each, Landing):
+            away_m = each.away_m(seen, np.arange(N), np.stack([seen.xy_m, seen.xy_m + 0.1], axis=1))
+            assert away_m.shape == (N, 2)
+            assert (away_m >= 0).all()
+            values = (away_m, hats(away_m, each.knots_m)[..., :-1])
         else:
             assert isinstance(each, Leaving)
             values = (each.weights(seen),)
@@ -186,7 +194,8 @@ def test_who_is_who_is_asked_of_a_few_tracks(arena, seen):
 def test_no_turn_is_remembered_along_walls_or_where_none_is_known(arena, seen):
     """There the base forgets the heading, and a heading before is but the present one."""
     unknown = dataclasses.replace(seen, last_turn_rad=np.array([0.0, 0.2] * (N // 2)))
-    drawn, _, leaning = features_of("turning-memory", arena)[3:6]
+    drawn = labelled("turning-memory", "drawn to the heading before", arena)
+    leaning = labelled("turning-memory", "leaning to the heading before", arena)
     expected = (~seen.follows_walls) & (unknown.last_turn_rad != 0)
     np.testing.assert_array_equal(drawn.weights(unknown)[:, 0, 0], expected)
     np.testing.assert_array_equal(leaning.vectors(unknown)[:, 0].any(axis=1), expected)
@@ -426,6 +435,87 @@ def test_the_fastest_in_view_is_one_fish(arena, seen):
     np.testing.assert_array_equal(weights[..., 0], np.tile([0.0, 2.0, 0.0], (N, 1)))
 
 
+def test_the_fastest_over_two_seconds_is_one_fish(arena, seen):
+    """Whatever its last step was."""
+    feature = labelled("leader-following", "the fastest in view, over two seconds", arena)
+    weights = feature.weights(
+        dataclasses.replace(seen, lately_m_s=np.tile([0.3, 0.1, 0.2], (N, 1)),
+                            speed_m_s=np.tile([0.1, 0.2, 0.3], (N, 1)),
+                            attention=np.tile([2.0, 1.0, 1.0], (N, 1)))
+    )  # fmt: skip
+    np.testing.assert_array_equal(weights[..., 0], np.tile([2.0, 0.0, 0.0], (N, 1)))
+
+
+def test_the_foremost_is_the_one_most_straight_ahead(arena, seen):
+    """Nobody beside or behind is; its heading counts by its distance."""
+    some = dataclasses.replace(
+        seen,
+        off_axis_rad=np.array([[0.2, 0.5, 3.0], [1.7, 2.0, 3.0]] * (N // 2)),
+        distance_m=np.full((N, OTHERS), 0.05),
+    )
+    chosen = some.foremost[..., 0]
+    np.testing.assert_array_equal(chosen, [[1, 0, 0], [0, 0, 0]] * (N // 2))
+    vectors = labelled("alignment", "leaning, the foremost", arena).vectors(some)
+    np.testing.assert_allclose(vectors.sum(axis=1)[::2], some.heading[::2, 0])
+    assert not vectors[1::2].any()
+
+
+def test_headings_count_by_bearing_and_distance(arena, seen):
+    """Within 0.4 m the weights of each other one add up to one."""
+    near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.05))
+    vectors = labelled("alignment", "leaning, by bearing", arena).vectors(near)
+    assert vectors.shape == (N, 12, 2)
+    np.testing.assert_allclose(vectors.sum(axis=1), near.heading.sum(axis=1))
+
+
+def test_a_course_is_the_mean_of_some_headings(arena, seen):
+    """A fish that went straight on is drawn straight on."""
+    ahead = np.broadcast_to(seen.own_heading, seen.ago_heading.shape)
+    straight = dataclasses.replace(seen, ago_heading=ahead)
+    for steps in (3, 5, 9):
+        feature = labelled("turning-memory", f"drawn to the course of {steps} steps", arena)
+        np.testing.assert_allclose(feature.toward(straight)[:, 0], seen.own_heading)
+
+
+def test_steps_are_sharper_by_the_last_turn_along_walls_or_not(arena, seen):
+    """Everywhere, or off the walls alone."""
+    turned = dataclasses.replace(seen, last_turn_rad=np.linspace(-2, 2, N))
+    along = labelled("turning-memory", "sharper by the last turn", arena).by(turned)
+    off = labelled("turning-memory", "sharper by the last turn, off the walls", arena).by(turned)
+    np.testing.assert_allclose(along.sum(axis=0), 0.0, atol=1e-12)
+    assert not off[turned.follows_walls].any()
+    np.testing.assert_array_equal(off[~turned.follows_walls], along[~turned.follows_walls])
+
+
+def test_landings_by_hand(arena, seen):
+    """Distances to a wall, a place, the robot, and how long an arc is."""
+    rows = np.array([0, 3])
+    xy = np.array([[[0.9, 0.2], [0.94, 0.3]], [[0.9, 0.1], [0.95, 0.5]]])
+    wall = labelled("place-preference", "landing at the wall at 0.95, 0.23", arena)
+    far = wall.away_m(seen, rows, xy)
+    np.testing.assert_allclose(far, [[0.05, 0.01], [0.05, 0.1]], atol=2e-3)
+    robot = labelled("robot-avoidance", "landing near it", arena)
+    at = seen.xy_m + (seen.bearing * seen.distance_m[..., None])[:, -1]
+    found = robot.away_m(seen, rows, at[rows][:, None] + [[[0.03, 0.04]]])
+    np.testing.assert_allclose(found, 0.05)
+    nobody = dataclasses.replace(seen, is_robot=np.zeros((N, OTHERS), dtype=bool))
+    assert (robot.away_m(nobody, rows, xy) == AWAY_M).all()
+    aside = labelled("speed-turn-coupling", "landing aside", arena)
+    ends = seen.xy_m[rows, None] + 0.02 * left_of(seen.own_heading[rows])[:, None]
+    np.testing.assert_allclose(aside.away_m(seen, rows, ends), 0.02 * np.pi / 2)
+    np.testing.assert_allclose(aside.over.away_m(seen, rows, ends), np.pi / 2)
+
+
+def test_who_goes_on_between_the_rooms_counts_there_alone(arena, seen):
+    """Each fish by its own heading; in a room nothing."""
+    feature = labelled("boldness", "going on between the rooms, by who", arena)
+    middle = arena.zones[[z.name for z in arena.zones].index("corridor")].polygon.centroid
+    inside = dataclasses.replace(seen, xy_m=np.tile([middle.x, middle.y], (N, 1)))
+    np.testing.assert_allclose(feature.vectors(inside).sum(axis=1), seen.own_heading)
+    outside = dataclasses.replace(seen, xy_m=np.tile([0.1, 0.8], (N, 1)))
+    assert not feature.vectors(outside).any()
+
+
 def test_a_pull_to_one_fish_is_asked_of_each(arena, seen):
     """Of two fish and a robot: the robot is nobody's leader, and there is no third fish."""
     found = find_effect("leader-following").features(arena)
@@ -440,7 +530,7 @@ def test_a_pull_to_one_fish_is_asked_of_each(arena, seen):
 
 def test_who_is_alone_has_no_features_of_others(arena, seen):
     """No others at all: weights of no source, and no failure."""
-    shapes = {name: getattr(seen, name) for name in ("here", "speed_m_s", "distance_m", "is_robot")}
+    shapes = {name: getattr(seen, name) for name in _OF_OTHERS}
     none = dataclasses.replace(
         seen,
         **{name: values[:, :0] for name, values in shapes.items()},

@@ -67,11 +67,11 @@ def _near_or_far(swum: Swum) -> Floats:
 
 
 def _by_fastest_near(swum: Swum) -> Floats:
-    """Return how fast the fastest of those near was, and whether anybody is near."""
+    """Return how fast the fastest of those near was; a slow one says as little as none."""
     is_near = swum.here & (swum.distance_m < _NEAR_M)
     fastest = np.where(is_near, swum.others, -np.inf).max(axis=1, initial=-np.inf)
     near = np.isfinite(fastest)[:, None]
-    return hats(np.where(near[:, 0], fastest, 0.0), _SLOW_TO_FAST) * near
+    return hats(np.where(near[:, 0], fastest, 0.0), _SLOW_TO_FAST)[:, 1:] * near
 
 
 def _nearest(swum: Swum) -> Floats:
