@@ -25,7 +25,7 @@ from zfcal.model.features import (
 from zfcal.model.hats import hats
 
 N, OTHERS = 6, 3
-_OF_OTHERS = ("here", "speed_m_s", "lately_m_s", "distance_m", "is_robot")
+_OF_OTHERS = ("here", "speed_m_s", "lately_m_s", "distance_m", "off_axis_rad", "is_robot")
 
 
 @pytest.fixture

@@ -157,6 +157,7 @@ _FEATURES: tuple[Feature, ...] = (
         ),
     ),
     factor_on_attention(_fastest_lately, label="the fastest in view, over two seconds"),
+    factor_on_attention(lambda seen: seen.foremost, label="the foremost"),
     factor_on_attention(_who, label="who"),
     OneOf(
         kind=_DRAWN,
