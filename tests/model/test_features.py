@@ -56,6 +56,7 @@ def seen():
         speed_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
         lately_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
         heading=ways(N, OTHERS),
+        course=0.05 * ways(N, OTHERS),
         here=np.ones((N, OTHERS), dtype=bool),
         in_sight=rng.random((N, OTHERS)) < 0.7,
         is_robot=robot,
@@ -485,6 +486,39 @@ def test_steps_are_sharper_by_the_last_turn_along_walls_or_not(arena, seen):
     np.testing.assert_allclose(along.sum(axis=0), 0.0, atol=1e-12)
     assert not off[turned.follows_walls].any()
     np.testing.assert_array_equal(off[~turned.follows_walls], along[~turned.follows_walls])
+
+
+def test_an_axis_has_two_ways(arena, seen):
+    """Headings are drawn to one as much as to the other."""
+    feature = labelled("directional-drift", "drawn along 60 degrees", arena)
+    ways = feature.toward(seen)
+    np.testing.assert_allclose(ways[:, 0], np.tile([0.5, np.sqrt(0.75)], (N, 1)))
+    np.testing.assert_allclose(ways[:, 0], -ways[:, 1])
+    assert (feature.weights(seen) == 1).all()
+
+
+def test_who_leaves_when_is_none_of_what_all_do(arena, seen):
+    """Over all fish the weights of a moment add up to nothing."""
+    three = dataclasses.replace(
+        seen, track=np.array([3, 4, 5] * 2, dtype=np.int32), time=np.full(N, 0.25)
+    )
+    weights = labelled("boldness", "who, by the time", arena).weights(three)
+    assert weights.shape == (N, 6)
+    each = weights[:3]
+    np.testing.assert_allclose(each[1:].sum(axis=0), -each[0])
+    assert np.abs(each).sum(axis=1).min() > 0
+
+
+def test_a_course_is_as_long_as_the_others_were_fast(arena, seen):
+    """Of who is not seen it counts by distance alone."""
+    far = dataclasses.replace(
+        seen, distance_m=np.full((N, OTHERS), 0.6), in_sight=np.zeros((N, OTHERS), dtype=bool)
+    )
+    vectors = labelled("alignment", "leaning, their course", arena).vectors(far)
+    assert not vectors.any()
+    near = dataclasses.replace(far, distance_m=np.zeros((N, OTHERS)))
+    vectors = labelled("alignment", "leaning, their course", arena).vectors(near)
+    np.testing.assert_allclose(vectors[:, 0], near.course.sum(axis=1) / 0.05)
 
 
 def test_landings_by_hand(arena, seen):

@@ -53,8 +53,9 @@ class Seen:
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
         Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its last
         speed, and the mean over two seconds.
-    heading : ndarray, shape (step, other, 2)
-        Of the other.
+    heading, course : ndarray, shape (step, other, 2)
+        Of the other: the direction of its last step, and its mean velocity over two seconds in m/s;
+        zeros where that is not known.
     here, in_sight, is_robot : ndarray of bool, shape (step, other)
     other : ndarray of int, shape (step, other)
         Track of the other; -1 for who is not there.
@@ -98,6 +99,7 @@ class Seen:
     speed_m_s: Floats
     lately_m_s: Floats
     heading: Floats
+    course: Floats
     here: NDArray[np.bool_]
     in_sight: NDArray[np.bool_]
     is_robot: NDArray[np.bool_]

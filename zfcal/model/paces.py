@@ -26,12 +26,16 @@ class Swum:
     ----------
     last, before_last, third : ndarray, shape (step,)
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
+    lately : ndarray, shape (step,)
+        Mean of the own ones over two seconds.
     last_m_s, last_ago_m_s : ndarray, shape (step,)
         The own speed one step ago, and some seconds before that; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
     others : ndarray, shape (step, other)
         Normal scores of the others' last speeds; 0 where they are not known.
+    others_lately : ndarray, shape (step, other)
+        Their means over two seconds.
     others_m_s, others_ago_m_s : ndarray, shape (step, other)
         Their last speeds, and those of some seconds before; NaN where they are not known.
     distance_m : ndarray, shape (step, other)
@@ -49,10 +53,12 @@ class Swum:
     last: Floats
     before_last: Floats
     third: Floats
+    lately: Floats
     last_m_s: Floats
     last_ago_m_s: Floats
     last_turn_rad: Floats
     others: Floats
+    others_lately: Floats
     others_m_s: Floats
     others_ago_m_s: Floats
     distance_m: Floats

@@ -177,8 +177,9 @@ def climb_within(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> 
 
 def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:
     """Return the change that sets the scores of single steps nearest to one, within bounds."""
-    size = np.maximum(np.linalg.norm(scores, axis=0), 1e-300)
-    square = (scores / size).T @ (scores / size) + _RIDGE * np.eye(len(size))
+    gram = scores.T @ scores
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    square = gram / size / size[:, None] + _RIDGE * np.eye(len(size))
     root = np.linalg.cholesky(square)
     toward = solve_triangular(root, scores.sum(axis=0) / size, lower=True)
     found = lsq_linear(root.T, toward, (low * size, high * size), method="bvls", tol=1e-8)

@@ -256,6 +256,7 @@ def _seen(
         speed_m_s=theirs(SPEED, at),
         lately_m_s=_lately(states[:, SPEED], steps.scene.dt_s)[at[:, None], others],
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
+        course=_courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,
         in_sight=angle[rows, others] > 0,
         is_robot=(theirs(KIND, at) > 0) & here,
@@ -288,6 +289,19 @@ def _lately(speed: Floats, dt_s: float) -> Floats:
     ]
     total, count = (each[n:] - each[:-n] for each in sums)
     return np.asarray(total / np.maximum(count, 1))
+
+
+def _courses(states: Floats, dt_s: float) -> Floats:
+    """Return everybody's mean velocity over two seconds, shape (sample, agent, 2), in m/s."""
+    n = max(1, round(_LATELY_S / dt_s))
+    xy = np.moveaxis(states[:, [X, Y]], 1, 2)
+    made = np.zeros_like(xy)
+    made[n:] = (xy[n:] - xy[:-n]) / (n * dt_s)
+    was_there = np.zeros(made.shape[:2], dtype=bool)
+    was_there[n:] = np.lib.stride_tricks.sliding_window_view(
+        states[:, ZONE] > 0, n + 1, axis=0
+    ).all(axis=-1)  # fmt: skip
+    return np.where(was_there[..., None] & np.isfinite(made), made, 0.0)
 
 
 def _ago_heading(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
@@ -331,6 +345,7 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
         then_toward=turned_by(seen.then_toward, b),
         bearing=turned_by(seen.bearing, b),
         heading=turned_by(seen.heading, b),
+        course=turned_by(seen.course, b),
         own_heading=turned_by(seen.own_heading, back),
         ago_heading=turned_by(seen.ago_heading, back),
         along_wall=turned_by(seen.along_wall, back),

@@ -160,7 +160,7 @@ class Fits:
     def prepare(self) -> None:
         """Work out what all features need, before they are asked side by side."""
         _ = (self.law.own_parameters, self.law.cells)
-        _ = (self._null, self._untilted, self._mean_heading, self.landings.chances)
+        _ = (self._null, self._untilted, self._mean_heading, self.landings.prepared)
 
     @property
     def n_beside(self) -> int:

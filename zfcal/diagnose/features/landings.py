@@ -66,6 +66,11 @@ class Landings:
         cells = self.law.cells
         return np.asarray(cells / cells.sum(axis=1, keepdims=True))
 
+    @property
+    def prepared(self) -> tuple[Floats, ...]:
+        """What all features need, worked out before they are asked side by side."""
+        return self.chances, self._at, self._ends
+
     @cached_property
     def _at(self) -> Floats:
         """Density of the heading taken, shape (step,)."""
@@ -81,19 +86,24 @@ class Landings:
             turns.speed_m_s * law.scene.dt_s
         )
 
+    @cached_property
+    def _ends(self) -> Floats:
+        """Where the heading of each cell would lead, shape (step, cell, 2)."""
+        xy, reach = self._places
+        return np.asarray(xy[:, None] + reach[:, None, None] * _ways())
+
     def _near(self, feature: Landing) -> _Near:
         """Return the steps that may end near what a feature is about."""
         seen, (xy, reach) = self.law.draws[0].seen, self._places
         every = np.arange(len(reach))
         away = feature.away_m(seen, every, xy[:, None])[:, 0]
         rows = np.flatnonzero(away - reach < feature.knots_m[-1])
-
-        def weights(headings: Floats) -> Floats:
-            ends = xy[rows, None] + reach[rows, None, None] * headings
-            return hats(feature.away_m(seen, rows, ends), feature.knots_m)[..., :-1]
-
-        taken = weights(self.law.turns.taken[rows, None])[:, 0]
-        return _Near(rows=rows, cells=weights(_ways()), taken=taken)
+        ended = xy[rows, None] + reach[rows, None, None] * self.law.turns.taken[rows, None]
+        cells, taken = (
+            hats(feature.away_m(seen, rows, ends), feature.knots_m)[..., :-1]
+            for ends in (self._ends[rows], ended)
+        )
+        return _Near(rows=rows, cells=cells, taken=taken[:, 0])
 
     def scores(self, feature: Landing) -> Floats:
         """Return the scores of a feature's weights where none has a strength, shape (row, weight).

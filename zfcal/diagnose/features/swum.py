@@ -16,6 +16,8 @@ from zfcal.model.scene import Moves, Scene
 _AGO_S = 4.0
 """Before the last step: whatever changes slowly was much the same then."""
 
+_LATELY_S = 2.0
+
 _AHEAD = 0.5
 """Cosine of the angle from the heading within which another one is ahead."""
 
@@ -49,7 +51,10 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     away = np.hypot(theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y])
     x, y = theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
     is_ahead = own[:, None, HX] * x + own[:, None, HY] * y > _AHEAD * away
-    paces = _paces_of_all(states)[at[:, None], others]
+    all_paces = _paces_of_all(states)
+    paces = all_paces[at[:, None], others]
+    few = range(max(1, round(_LATELY_S / scene.dt_s)))
+    theirs_lately = [np.nan_to_num(_ago(all_paces, scene, at[:, None], others, 1 + k)) for k in few]
     speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
     ago = 1 + max(1, round(_AGO_S / scene.dt_s))
     all_others = at[:, None], others
@@ -57,10 +62,12 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         last=np.nan_to_num(_ago(table, scene, at, who, 1)),
         before_last=np.nan_to_num(_ago(table, scene, at, who, 2)),
         third=np.nan_to_num(_ago(table, scene, at, who, 3)),
+        lately=np.mean([np.nan_to_num(_ago(table, scene, at, who, 1 + k)) for k in few], axis=0),
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
         last_turn_rad=_last_turn(states, at, who),
         others=np.where(here, np.nan_to_num(paces), 0.0),
+        others_lately=np.where(here, np.mean(theirs_lately, axis=0), 0.0),
         others_m_s=_ago(speed, scene, *all_others, 1),
         others_ago_m_s=_ago(speed, scene, *all_others, ago),
         distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),

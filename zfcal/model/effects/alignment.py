@@ -172,6 +172,7 @@ def _summed(seen: Seen) -> Floats:
 
 
 _AHEAD_RAD = (0.0, 0.8, 1.6, math.pi)
+_USUAL_M_S = 0.05
 _AHEAD_M = (0.0, 0.05, 0.15, 0.4)
 
 
@@ -181,6 +182,13 @@ def _by_bearing(seen: Seen) -> Floats:
     weights = near[..., None] * hats(seen.off_axis_rad, _AHEAD_RAD)[..., None, :]
     flat = weights.reshape(*near.shape[:2], -1)
     return np.asarray(np.einsum("sjb,sjd->sbd", flat, seen.heading))
+
+
+def _their_course(seen: Seen) -> Floats:
+    """Return the sums of the others' mean velocities over two seconds, by distance and if seen."""
+    near = hats_where(seen.here, seen.distance_m, _AHEAD_M)[..., :-1]
+    weights = np.concatenate([near, seen.in_sight[..., None]], axis=2) / _USUAL_M_S
+    return np.asarray(np.einsum("sjb,sjd->sbd", weights, seen.course))
 
 
 def _of_foremost(seen: Seen) -> Floats:
@@ -213,6 +221,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
     Tilt(label="leaning, the mean", vectors=_mean, low=0.0),
     Tilt(label="leaning, by bearing", vectors=_by_bearing, low=0.0),
+    Tilt(label="leaning, their course", vectors=_their_course, low=0.0),
     Tilt(label="leaning, the foremost", vectors=_leaning_to_foremost, low=0.0, along=_TO_FOREMOST),
     Component(
         label="drawn, the foremost",

@@ -11,6 +11,7 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -57,6 +58,9 @@ def _lacks(company: Company) -> str | None:
     return None if company.n_fish > 1 else "a second fish"
 
 
+_TIMES = (0.0, 0.5, 1.0)
+
+
 def _who(seen: Seen) -> Floats:
     """Return one for each of the longest tracks but one, shape (step, track)."""
     tracks, n_steps = np.unique(seen.track, return_counts=True)
@@ -66,6 +70,17 @@ def _who(seen: Seen) -> Floats:
 
 def _leaning(seen: Seen) -> Floats:
     return np.asarray(_who(seen)[..., None] * seen.way_out[:, None])
+
+
+def _who_by_time(seen: Seen) -> Floats:
+    """Return what each fish has beside the first by the time: some leave from their moment on.
+
+    What all do alike is none of these weights.
+    """
+    who = _who(seen)
+    first = 1.0 - who.sum(axis=1, keepdims=True)
+    weights = (who - first)[..., None] * hats(seen.time, _TIMES)[:, None]
+    return np.asarray(weights.reshape(len(seen.time), -1))
 
 
 def _near_way_out(between: shapely.Geometry) -> Weights:
@@ -130,6 +145,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     """Return features of leaving, and of headings toward the way out where there is one."""
     made: list[Feature] = [
         Leaving(label="who", weights=_who),
+        Leaving(label="who, by the time", weights=_who_by_time),
         Leaving(label="who, into the open", weights=_who, into="open"),
         Tilt(label="leaning to the way out", vectors=_leaning),
     ]

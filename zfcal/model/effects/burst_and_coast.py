@@ -99,6 +99,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="by the last speed", weights=_last),
         Pace(label="by the last three speeds", weights=_some_ago),
+        Pace(label="by the mean over two seconds", weights=lambda swum: swum.lately[:, None]),
         Pace(label="by the time since a fast step", weights=_since_fast),
         Spread(label="slow and fast ones, by the last speed", weights=_spread_by_last),
         Spread(label="slow and fast ones, by the last two", weights=_lately),

@@ -99,6 +99,18 @@ def _off_the_walls(angle_rad: float) -> Component:
     )
 
 
+def _both_ways(angle_rad: float) -> Component:
+    """Return that headings are drawn to a direction and to its opposite alike, as by a compass."""
+    way = np.array([math.cos(angle_rad), math.sin(angle_rad)])
+    ways = np.stack([way, -way])[None]
+    return Component(
+        label=f"drawn along {math.degrees(angle_rad):.0f} degrees",
+        toward=lambda seen: np.broadcast_to(of_tank(seen.x_axis, ways), (len(seen.zone), 2, 2)),
+        weights=lambda seen: np.ones((len(seen.zone), 2, 1)),
+        kappa=2.0,
+    )
+
+
 def _axes_off_the_walls(seen: Seen) -> Floats:
     return np.asarray((~seen.follows_walls)[:, None, None] * _axes(seen))
 
@@ -113,6 +125,9 @@ _FEATURES: tuple[Feature, ...] = (
     OneOf(
         kind="drawn, off the walls",
         features=tuple(_off_the_walls(k * math.pi / 6) for k in range(12)),
+    ),
+    OneOf(
+        kind="drawn along an axis", features=tuple(_both_ways(k * math.pi / 6) for k in range(6))
     ),
     Tilt(label="leaning", vectors=_axes),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),

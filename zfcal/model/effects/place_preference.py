@@ -86,7 +86,7 @@ _WALL_M = 0.1
 
 _LANDS_M = (0.0, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
 _TO_WALL = Along(cue="distance to the wall (m)", knots=_LANDS_M[:-1])
-_SPOT_M = (0.0, 0.05, 0.08, 0.11, 0.15, 0.2)
+_SPOT_M = (0.0, 0.04, 0.07, 0.1, 0.15)
 
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)
 """Of the way to the next of these places."""

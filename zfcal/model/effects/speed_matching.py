@@ -14,7 +14,7 @@ from zfcal.model.effects.forms import (
     quickness,
     times_faster,
 )
-from zfcal.model.hats import hats
+from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED, ZONE
@@ -48,8 +48,14 @@ _SLOW_TO_FAST = (-1.0, 0.3, 1.3)
 
 def _near(swum: Swum) -> Floats:
     """Return the sums of the others' last speeds, by distance."""
-    weights = hats(swum.distance_m, _KNOTS_M) * swum.here[..., None]
+    weights = hats_where(swum.here, swum.distance_m, _KNOTS_M)
     return np.asarray(np.einsum("sj,sjb->sb", swum.others, weights))
+
+
+def _near_lately(swum: Swum) -> Floats:
+    """Return the sums of the others' mean speeds over two seconds, by distance."""
+    weights = hats_where(swum.here, swum.distance_m, _KNOTS_M)
+    return np.asarray(np.einsum("sj,sjb->sb", swum.others_lately, weights))
 
 
 def _of_nearest(swum: Swum, values: Floats) -> Floats:
@@ -139,6 +145,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="of those near", weights=_near),
         Pace(label="of the nearest", weights=_nearest),
+        Pace(label="of those near, over two seconds", weights=_near_lately),
         Spread(label="slow and fast ones, by the fastest near", weights=_by_fastest_near),
         Copied(
             label="the speed of the nearest",
