@@ -321,7 +321,7 @@ class Landing:
     along
         What its weights go by.
     over
-        As of a `Component`.
+        As of a `Component`; it need not be a part of this one.
     """
 
     label: str

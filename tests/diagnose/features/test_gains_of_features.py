@@ -17,7 +17,7 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import answer, best_by_name, tell, tried
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import LAPSE, maximise, with_effect
-from zfcal.model.features import Component, Leaving, OneOf, Sharper, Tilt, Turned
+from zfcal.model.features import Component, Landing, Leaving, OneOf, Sharper, Tilt, Turned
 
 
 def gain(name, values, *, n_strengths=1, label="one", n_tried=1):
@@ -143,7 +143,14 @@ def test_features_are_asked_by_kind(nothing):
     found = gains_of(nothing.law, effects, kinds={("place-preference", "leaning")})
     assert {each.key for each in found} <= {("place-preference", "leaning")}
     kinds = [kind_of(each) for each in effects[1].features(nothing.law.scene.arena)]
-    assert kinds == ["drawn", "leaning", "turning", "turning as a whole"]
+    assert kinds == [
+        "drawn",
+        "leaning",
+        "turning",
+        "turning as a whole",
+        "landing at a wall",
+        "landing at a place",
+    ]
 
 
 def test_numbers_do_not_depend_on_threads(base):
@@ -162,7 +169,7 @@ def test_every_sort_of_feature_has_its_fit(base):
     for effect in all_effects():
         for feature in effect.features(base[0].arena):
             sorts.add(type(feature))
-    assert sorts == {Component, Tilt, Turned, Sharper, Leaving, OneOf}
+    assert sorts == {Component, Tilt, Turned, Sharper, Leaving, Landing, OneOf}
 
 
 STEPS = np.random.default_rng(8).normal(0.02, 0.1, 4000)

@@ -179,8 +179,9 @@ class Fits:
         over = getattr(feature, "over", None)
         if over is not None and n:
             common = self.fit(over)
-            made, further = made - common.log_p, n - len(common.strengths)
-            n = further if further > 0 else n
+            made = made - common.log_p
+            # What a landing has to gain more than is no part of it: all its strengths are its own.
+            n -= 0 if isinstance(feature, Landing) else min(n, len(common.strengths))
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
