@@ -101,13 +101,30 @@ def test_every_landing_gains_nothing_where_nothing_is(nothing):
 
 
 def test_a_landing_that_no_step_can_reach_has_no_strength(nothing):
-    """Nothing is fitted, and nothing gained."""
+    """It stays at nothing, and nothing is gained."""
     far = Landing(
         label="far", away_m=lambda _seen, _rows, xy_m: xy_m[..., 0] + 9.0, knots_m=(0.0, 1.0)
     )
     fit = nothing.fit(far)
-    assert fit.n == 0
+    assert fit.strengths == pytest.approx([0.0])
     assert fit.log_p.sum() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_where_nobody_lands_is_shunned(base, worlds):
+    """A spot in which no step ends, though many could: its strength is at its bound."""
+    scene, fitted = base
+    spot = np.array([0.2, 0.8])
+
+    def away_m(_seen, _rows, xy_m):
+        return np.linalg.norm(xy_m - spot, axis=-1)
+
+    inside = np.linalg.norm(ends_of(scene) - spot, axis=-1) < 0.06
+    factor = np.where(inside, 1e-9, 1.0)
+    drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
+    shunned = Fits(law=Law(scene=drawn, fitted=maximise(drawn, fitted.parameters)))
+    fit = shunned.fit(Landing(label="spot", away_m=away_m, knots_m=(0.0, 0.05, 0.06)))
+    assert (fit.strengths < -3).all()
+    assert fit.log_p.sum() > 5
 
 
 def test_a_tilt_and_a_landing_bend_the_law_alike(nothing):

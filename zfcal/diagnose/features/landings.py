@@ -119,9 +119,8 @@ class Landings:
     def fit(self, feature: Landing) -> Fit:
         """Return a feature at the maximum, and what it adds to each step."""
         near = self._near(feature)
-        chances, n = self.chances[near.rows], near.taken.shape[1]
-        is_asked = (near.taken != 0).any(axis=0)
-        cells, taken = near.cells[..., is_asked], near.taken[:, is_asked]
+        chances, cells, taken = self.chances[near.rows], near.cells, near.taken
+        n = taken.shape[1]
 
         def density(x: Floats) -> tuple[Floats, Floats]:
             bent = chances * np.exp(cells @ x[:-1])
@@ -144,17 +143,14 @@ class Landings:
             return value, scores
 
         nothing = climb(lambda x: _lapse_alone(self._at, x), np.array([logit(self.lapse)]), [])
-        x0 = np.append(np.zeros(taken.shape[1]), nothing.x)
-        peak = climb(objective, x0, [(-_MOST, _MOST)] * taken.shape[1])
+        peak = climb(objective, np.append(np.zeros(n), nothing.x), [(-_MOST, _MOST)] * n)
         log_p = log_mixed(density(peak.x)[0], peak.x[-1])
-        strengths = np.zeros(n)
-        strengths[is_asked] = peak.x[:-1]
         return Fit(
             log_p=log_p - log_mixed(self._at, nothing.x[-1]),
             peak=peak,
-            n=taken.shape[1],
+            n=n,
             scale=np.ones(1),
-            factor=strengths,
+            factor=peak.x[:-1],
         )
 
     def bent(self, feature: Landing, fit: Fit) -> tuple[Floats, Floats]:

@@ -15,9 +15,9 @@ UNIFORM = 1 / (2 * math.pi)
 def mixed(density: Floats, level: float) -> tuple[float, Floats, Floats]:
     """Return the log likelihood with a lapse, the shares of steps that are none, and its slopes."""
     lapse = float(expit(level))
-    mixed = (1 - lapse) * density + lapse * UNIFORM
-    slope = (UNIFORM - density) / mixed * lapse * (1 - lapse)
-    return float(np.log(mixed).sum()), (1 - lapse) * density / mixed, slope
+    both = (1 - lapse) * density + lapse * UNIFORM
+    slope = (UNIFORM - density) / both * lapse * (1 - lapse)
+    return float(np.log(both).sum()), (1 - lapse) * density / both, slope
 
 
 def log_mixed(density: Floats, level: float) -> Floats:
