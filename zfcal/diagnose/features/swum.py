@@ -17,6 +17,7 @@ _AGO_S = 4.0
 """Before the last step: whatever changes slowly was much the same then."""
 
 _LATELY_S = 2.0
+"""Means of last speeds are over so long."""
 
 _AHEAD = 0.5
 """Cosine of the angle from the heading within which another one is ahead."""
@@ -48,8 +49,8 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     own, theirs = states[at, :, who], np.moveaxis(states[at], 1, 2)
     theirs = np.take_along_axis(theirs, others[..., None], axis=1)
     here = theirs[..., ZONE] > 0
-    away = np.hypot(theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y])
     x, y = theirs[..., X] - own[:, None, X], theirs[..., Y] - own[:, None, Y]
+    away = np.hypot(x, y)
     is_ahead = own[:, None, HX] * x + own[:, None, HY] * y > _AHEAD * away
     all_paces = _paces_of_all(states)
     paces = all_paces[at[:, None], others]
