@@ -127,6 +127,30 @@ def test_where_nobody_lands_is_shunned(base, worlds):
     assert fit.log_p.sum() > 5
 
 
+def test_what_all_walls_have_in_common_is_no_place(base, worlds):
+    """Middles of bodies keep off every wall: each wall is shunned by itself, and no more."""
+    scene, fitted = base
+    ends = ends_of(scene)
+    factor = np.where(scene.arena.wall_distance(ends) < 0.025, 1e-9, 1.0)
+    drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
+    law = Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+    walls = at_wall(law.scene.arena)
+    alone = Fits(law=law).gain("place-preference", walls)
+    beside = Fits(law=law, off_walls=True).gain("place-preference", walls)
+    assert alone.nats > 10
+    assert beside.nats < 2
+    told = tell(gains_of(law, all_effects()))
+    assert told is None or "landing" not in told.gain.label
+
+
+def test_a_band_along_one_wall_is_more_than_all_have(banded):
+    """It is not taken for what they have in common."""
+    walls = at_wall(banded.scene.arena)
+    alone = Fits(law=banded).gain("place-preference", walls).log_p.sum()
+    beside = Fits(law=banded, off_walls=True).gain("place-preference", walls).log_p.sum()
+    assert beside > 0.7 * alone
+
+
 def test_a_tilt_and_a_landing_bend_the_law_alike(nothing):
     """A factor on cells, by its logs there and at the heading taken."""
     law = nothing.law

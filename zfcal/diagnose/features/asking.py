@@ -71,7 +71,27 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         # One fish has nobody to follow: then a feature of who is who has no strength at all.
         some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
         hopeful = _hopeful([gain for _, gain in some])
+        if any(isinstance(feature, Landing) and gain in hopeful for feature, gain in some):
+            some = _off_walls(fits, asked, some)
+            hopeful = _hopeful([gain for _, gain in some])
         return list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
+
+
+def _off_walls(
+    fits: Fits, asked: Sequence[tuple[str, Feature]], found: Sequence[tuple[Single, Gain]]
+) -> list[tuple[Single, Gain]]:
+    """Return what was found, landings fitted beside what all walls have in common.
+
+    That takes as long as all landings together, so it is asked where one of them stands out.
+    """
+    beside = replace(fits, off_walls=True)
+    landings = [pair for pair in asked if _is_landing(pair[1])]
+    others = [pair for pair in found if not isinstance(pair[0], Landing)]
+    return others + [pair for each in landings for pair in _gains(beside, *each)]
+
+
+def _is_landing(feature: Feature) -> bool:
+    return isinstance(feature.features[0] if isinstance(feature, OneOf) else feature, Landing)
 
 
 def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
@@ -100,7 +120,10 @@ def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
     asked = _askable(fits.law, effect)
     found = [pair for feature in asked for pair in _gains(fits, effect.name, feature)]
     some = [pair for pair in found if pair[1].n_strengths]
-    return max(some, key=lambda pair: pair[1].nats, default=None)
+    best = max(some, key=lambda pair: pair[1].nats, default=None)
+    if best is not None and isinstance(best[0], Landing) and not fits.off_walls:
+        return best_feature(replace(fits, off_walls=True), effect)
+    return best
 
 
 def _askable(law: Law, effect: Effect) -> list[Feature]:

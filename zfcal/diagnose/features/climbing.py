@@ -175,6 +175,12 @@ def climb_within(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> 
     return Peak(x=x, scores=scores, low=low, high=high)
 
 
+def scaled(pair: Bounds, scale: float) -> Bounds:
+    """Return bounds of an argument that is multiplied by a number above 0."""
+    low, high = (None if end is None else end * scale for end in pair)
+    return low, high
+
+
 def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:
     """Return the change that sets the scores of single steps nearest to one, within bounds."""
     gram = scores.T @ scores

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import logit
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb
+from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb, scaled
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
@@ -121,11 +121,14 @@ class Fits:
     beyond : ndarray, shape (step,), optional
         Log densities that are to be gained over, where the base alone has higher ones by another
         law: that of noisy positions, say.
+    off_walls
+        Whether landings are beside what all walls have in common.
     """
 
     law: Law
     also: tuple[Mixed, ...] = ()
     beyond: Floats | None = None
+    off_walls: bool = False
 
     @cached_property
     def _own(self) -> tuple[list[Columns], list[Bounds]]:
@@ -204,7 +207,8 @@ class Fits:
     @cached_property
     def landings(self) -> Landings:
         """Fits of features of landing."""
-        return Landings(law=self.law, lapse=self._lapse)
+        made = Landings(law=self.law, lapse=self._lapse)
+        return made.beyond_walls() if self.off_walls else made
 
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
         """Return what a tilt adds with the base's parameters fitted once more beside it."""
@@ -307,7 +311,7 @@ class Fits:
         x0[-1] = logit(self._lapse)
         if start is not None:
             x0[: len(start) - 1], x0[-1] = start[:-1] * scale[: len(start) - 1], start[-1]
-        ranges = [_scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
+        ranges = [scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
         peak = climb(objective, x0, ranges)
         log_p = log_mixed(densities(peak.x)[0], peak.x[-1])
         return Fit(
@@ -393,8 +397,3 @@ class Fits:
 
 def _low(feature: Tilt | Turned, most: float) -> float:
     return -most if feature.low is None else feature.low
-
-
-def _scaled(pair: Bounds, scale: float) -> Bounds:
-    low, high = (None if end is None else end * scale for end in pair)
-    return low, high

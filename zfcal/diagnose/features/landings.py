@@ -3,29 +3,37 @@
 A tilt toward a thing has no edge. Fish may like to be within a band along a wall, or in a spot:
 then headings that land there are likelier than those that land beside it, in the few steps that
 could do either. So the factor is on where a heading lands, by how far that is from the thing.
+
+A fish has a body, and its middle keeps off every wall: that is no preference for a place. What all
+walls have in common is fitted first, and a landing is what there is beyond it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logit
+from scipy.special import chdtrc, logit
 
+from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Fit, climb
+from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.lapses import UNIFORM, log_mixed, mixed
 from zfcal.diagnose.features.law import Law
-from zfcal.model.features import Landing
+from zfcal.diagnose.selection import LEVEL
+from zfcal.model.features import Landing, Seen
 from zfcal.model.hats import hats
 from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.state import X, Y
 
 _MOST = 6.0
+
+_OFF_WALLS_M = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,16 +63,32 @@ class Landings:
         Of the steps.
     lapse
         At which a search begins.
+    walls
+        Log of what all walls have in common, on each cell and at the heading taken; None where
+        that is nothing.
     """
 
     law: Law
     lapse: float
+    walls: Columns | None = None
+
+    def beyond_walls(self) -> Landings:
+        """Return fits beside what all walls have in common, if that gains more than chance."""
+        walls = _at_any_wall(self.law.scene.arena)
+        fit = self.fit(walls)
+        if chdtrc(len(fit.strengths), 2 * max(float(fit.log_p.sum()), 0.0)) > LEVEL:
+            return self
+        return replace(self, walls=self.bent(walls, fit))
+
+    @cached_property
+    def _cells(self) -> Floats:
+        cells = self.law.cells
+        return cells if self.walls is None else np.asarray(cells * np.exp(self.walls[0]))
 
     @cached_property
     def chances(self) -> Floats:
         """The law of each step on cells of headings, shape (step, cell)."""
-        cells = self.law.cells
-        return np.asarray(cells / cells.sum(axis=1, keepdims=True))
+        return np.asarray(self._cells / self._cells.sum(axis=1, keepdims=True))
 
     @property
     def prepared(self) -> tuple[Floats, ...]:
@@ -75,7 +99,8 @@ class Landings:
     def _at(self) -> Floats:
         """Density of the heading taken, shape (step,)."""
         law = self.law
-        return np.asarray(np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1))
+        here = law.log_here if self.walls is None else law.log_here + self.walls[1]
+        return np.asarray(np.exp(here) * law.base[0][:, 0] / self._cells.sum(axis=1))
 
     @cached_property
     def _places(self) -> tuple[Floats, Floats]:
@@ -167,6 +192,15 @@ class Landings:
         cells, taken = np.zeros(self.chances.shape), np.zeros(len(self.chances))
         cells[near.rows], taken[near.rows] = near.cells @ fit.factor, near.taken @ fit.factor
         return cells, taken
+
+
+def _at_any_wall(arena: Arena) -> Landing:
+    """Return landings by how far they are from the nearest wall."""
+
+    def away_m(_seen: Seen, _rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+        return arena.wall_distance(xy_m)
+
+    return Landing(label="landing at any wall", away_m=away_m, knots_m=_OFF_WALLS_M)
 
 
 def leaned(law: Law, vectors: Floats) -> tuple[Floats, Floats]:
