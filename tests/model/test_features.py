@@ -498,13 +498,15 @@ def test_an_axis_has_two_ways(arena, seen):
 
 
 def test_who_leaves_when_is_none_of_what_all_do(arena, seen):
-    """Over all fish the weights of a moment add up to nothing."""
+    """Over all fish the weights of a moment add up to nothing, beside those of all."""
     three = dataclasses.replace(
         seen, track=np.array([3, 4, 5] * 2, dtype=np.int32), time=np.full(N, 0.25)
     )
-    weights = labelled("boldness", "who, by the time", arena).weights(three)
-    assert weights.shape == (N, 6)
-    each = weights[:3]
+    feature = labelled("boldness", "who, by the time", arena)
+    weights, common = feature.weights(three), feature.over.weights(three)
+    assert weights.shape == (N, 8)
+    np.testing.assert_array_equal(weights[:, :2], common)
+    each = weights[:3, 2:]
     np.testing.assert_allclose(each[1:].sum(axis=0), -each[0])
     assert np.abs(each).sum(axis=1).min() > 0
 

@@ -297,12 +297,15 @@ class Leaving:
         count.
     along
         What its weights go by, where that is one number: they are a curve then.
+    over
+        As of a `Component`.
     """
 
     label: str
     weights: Weights
     into: Literal["between", "open"] = "between"
     along: Along | None = None
+    over: Leaving | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 
+LATELY_S = 2.0
+"""Means of last speeds are over so long."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Swum:
@@ -28,8 +31,10 @@ class Swum:
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
     lately : ndarray, shape (step,)
         Mean of the own ones over two seconds.
+    earlier, before_earlier : ndarray, shape (step,)
+        Scores of two steps in a row, the later one about a second before the last step.
     last_m_s, last_ago_m_s : ndarray, shape (step,)
-        The own speed one step ago, and some seconds before that; NaN where it is not known.
+        The own speed one step ago, and about a second before that; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
     others : ndarray, shape (step, other)
@@ -37,7 +42,7 @@ class Swum:
     others_lately : ndarray, shape (step, other)
         Their means over two seconds.
     others_m_s, others_ago_m_s : ndarray, shape (step, other)
-        Their last speeds, and those of some seconds before; NaN where they are not known.
+        Their last speeds, and those of about a second before; NaN where they are not known.
     distance_m : ndarray, shape (step, other)
         To them; `zfcal.model.features.AWAY_M` for who is not there.
     ahead_m : ndarray, shape (step,)
@@ -54,6 +59,8 @@ class Swum:
     before_last: Floats
     third: Floats
     lately: Floats
+    earlier: Floats
+    before_earlier: Floats
     last_m_s: Floats
     last_ago_m_s: Floats
     last_turn_rad: Floats
@@ -79,10 +86,14 @@ class Pace:
         Tells it from other features of the effect.
     weights
         Shape (step, weight): a strength is fitted for each weight.
+    past_s
+        How far back it looks, where that is more than a few steps: it is asked of tracks that are
+        many times as long.
     """
 
     label: str
     weights: Callable[[Swum], Floats]
+    past_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,10 +106,14 @@ class Spread:
         Tells it from other features of the effect.
     weights
         Shape (step, weight): each has a strength for each sort of speed.
+    ago
+        The same of about a second before. What these gain as well is no answer to what has just
+        been: fish may vary their speed more at some times than at others.
     """
 
     label: str
     weights: Callable[[Swum], Floats]
+    ago: Callable[[Swum], Floats] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,8 +127,8 @@ class Copied:
     of
         The known speeds in m/s, shape (step, source); NaN where there is none.
     ago
-        The same of some seconds before. What these gain as well is no copy: speeds are alike that
-        change slowly.
+        The same of about a second before. What these gain as well is no copy: speeds are alike
+        that change slowly.
     weights
         Shape (step, source, weight): a strength is fitted for each weight.
     """

@@ -4,12 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.kernels.state import SPEED
+from zfcal.model.paces import Spread
 
 ALL = tuple(all_effects())
 
@@ -157,7 +159,7 @@ def test_speeds_of_a_few_steps_are_told(nothing, rule, label):
 
 
 def test_speeds_that_change_slowly_are_not_copied(nothing):
-    """They are as near to the speed of some seconds ago."""
+    """They are as near to the speed of a second ago."""
 
     def drifts(speed, _rng):
         return speed * np.exp(0.5 * np.sin(np.arange(len(speed)) / 60))
@@ -165,6 +167,42 @@ def test_speeds_that_change_slowly_are_not_copied(nothing):
     gains = pace_gains(scores_by_last(nothing, drifts), [find_effect("burst-and-coast")])
     nats = {gain.label: gain.log_p.sum() for gain in gains}
     assert nats["a share of the last speed"] < 0.2 * nats["by the last three speeds"]
+
+
+def test_speeds_that_are_spread_more_at_times_are_no_bursts(nothing):
+    """The spread of each fish drifts, its median does not: no speed answers to the last one."""
+
+    def varies(speed, rng):
+        drift = np.exp(0.3 * lfilter([0.18], [1, -0.983], rng.normal(size=len(speed))))
+        return np.maximum(np.exp(np.log(0.07) + 0.4 * drift * rng.normal(size=len(speed))), 0.012)
+
+    paces = scores_by_last(nothing, varies)
+    assert tell(pace_gains(paces, ALL)) is None
+    bursts = find_effect("burst-and-coast")
+    bare = [
+        paces.gain("burst-and-coast", dataclasses.replace(each, ago=None)).nats
+        for each in bursts.paces
+        if isinstance(each, Spread)
+    ]
+    assert max(bare) > 15
+
+
+def test_independent_speeds_of_short_tracks_do_not_swing(nothing):
+    """The mean over two seconds is asked of tracks that are a hundred times as long."""
+    scene = nothing.scene
+    first = scene.moves.at // 150
+    pieces = (scene.tracks * 1000 + (np.arange(len(scene.k)) // 150)[:, None]).astype(np.int32)
+    speed = np.random.default_rng(8).permutation(scene.moves.speed_m_s)
+    states = scene.states.copy()
+    states[scene.moves.at + 1, SPEED, scene.moves.who] = speed
+    moves = dataclasses.replace(
+        scene.moves, track=(scene.moves.track * 1000 + first).astype(np.int32), speed_m_s=speed
+    )
+    # Two seconds are thirty steps of a fifteenth of a second.
+    other = dataclasses.replace(scene, moves=moves, tracks=pieces, states=states, dt_s=1 / 15)
+    paces = Paces(screen=Screen(scene=other, fitted=nothing.screen.fitted))
+    assert paces.has_law
+    assert tell(pace_gains(paces, ALL)) is None
 
 
 def test_a_few_slow_steps_among_others_are_crowding(nothing, changed):

@@ -35,7 +35,7 @@ _LEAST_MOVES = 50
 """Of a track that has a mean of its own; shorter ones have one together."""
 
 _LEAST_OF_TRACK = 100
-"""Moves per track, in the mean, from which features are asked."""
+"""Moves per track, in the mean, from which features are asked; or lengths of the past asked for."""
 
 _GRAIN_M_S = 1e-4
 """Speeds that differ by less count as the same: ranks would make much of rounding."""
@@ -115,11 +115,24 @@ class Paces:
     def _grains(self) -> Floats:
         return np.round(self.screen.own_speeds[self.rows] / _GRAIN_M_S)
 
+    @cached_property
+    def _moves_per_track(self) -> float:
+        return len(self.rows) / max(1, len(np.unique(self.turns.track)))
+
+    def looks_back(self, feature: PaceFeature) -> bool:
+        """Return whether tracks are long enough for the past that a feature looks at.
+
+        The more steps a mean is over, the more of it is the track's own mean that is taken off.
+        """
+        if not isinstance(feature, Pace):
+            return True
+        return self._moves_per_track * self.scene.dt_s >= _LEAST_OF_TRACK * feature.past_s
+
     @property
     def has_law(self) -> bool:
         """Whether speeds differ enough for normal scores, and tracks are long enough for a past."""
-        n, n_tracks = len(self.rows), len(np.unique(self.turns.track))
-        if n < _LEAST_OF_TRACK * max(n_tracks, 1):
+        n = len(self.rows)
+        if self._moves_per_track < _LEAST_OF_TRACK:
             return False
         return int(np.unique(self._grains, return_counts=True)[1].max()) <= _MOST_ALIKE * n
 
@@ -186,16 +199,17 @@ class Paces:
 
     def gain(self, name: str, feature: PaceFeature) -> Gain:
         """Return what a feature of an effect adds."""
+        made, n = self._gained(feature)
+        if not isinstance(feature, Pace) and feature.ago is not None:
+            made = made - self._gained(_ago(feature))[0]
+        return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
+
+    def _gained(self, feature: PaceFeature) -> tuple[Floats, int]:
         if isinstance(feature, Pace):
             change, n = self._changed(feature)
-            made = _normal_gain(self._left, self._left - change)
-        else:
-            drawn = self._drawn(feature, self._spreads)
-            made, n = drawn.log_p, drawn.n_strengths
-        if isinstance(feature, Copied):
-            ago = replace(feature, of=feature.ago)
-            made = made - self._drawn(ago, self._spreads).log_p
-        return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
+            return _normal_gain(self._left, self._left - change), n
+        drawn = self._drawn(feature, self._spreads)
+        return drawn.log_p, drawn.n_strengths
 
     def course(self, gain: Gain) -> Course:
         """Return what a feature gains at each move, and what it would if it were there."""
@@ -217,8 +231,7 @@ class Paces:
 
     def _changed(self, feature: Pace) -> tuple[Floats, int]:
         """Return by how much a feature changes each score, and the number of its strengths."""
-        columns = self._beside_means(feature.weights(self.swum))
-        columns = columns[:, (columns**2).mean(axis=0) > _LEAST]
+        columns = _some(self._beside_means(feature.weights(self.swum)))
         found, _, rank, _ = np.linalg.lstsq(columns, self._left, rcond=None)
         return np.asarray(columns @ found), int(rank)
 
@@ -254,15 +267,30 @@ def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
     if not paces.has_law:
         return []
     found = [
-        paces.gain(effect.name, feature) for effect in effects for feature in effect.paces
-    ]  # fmt: skip
+        paces.gain(effect.name, feature)
+        for effect in effects
+        for feature in effect.paces
+        if paces.looks_back(feature)
+    ]
     return [gain for gain in found if gain.n_strengths]
 
 
 def _span(columns: Sequence[Floats]) -> Floats:
     """Return orthonormal columns with the span of all, of which some may be sums of others."""
-    whole = np.concatenate(columns, axis=1)
+    whole = _some(np.concatenate(columns, axis=1))
     return np.asarray(orth(whole, rcond=_LEAST)) if whole.size else whole
+
+
+def _some(columns: Floats) -> Floats:
+    """Return the columns that are more than rounding."""
+    return np.asarray(columns[:, (columns**2).mean(axis=0) > _LEAST])
+
+
+def _ago(feature: Spread | Copied) -> Spread | Copied:
+    """Return a feature of what was there before that."""
+    if isinstance(feature, Copied):
+        return replace(feature, of=feature.ago)
+    return feature if feature.ago is None else replace(feature, weights=feature.ago)
 
 
 def _means(values: Floats, group: NDArray[np.intp]) -> Floats:

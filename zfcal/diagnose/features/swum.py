@@ -10,14 +10,12 @@ from scipy.stats import rankdata
 from zfcal.arrays import Floats
 from zfcal.model.features import AWAY_M
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
-from zfcal.model.paces import Swum
+from zfcal.model.paces import LATELY_S, Swum
 from zfcal.model.scene import Moves, Scene
 
-_AGO_S = 4.0
-"""Before the last step: whatever changes slowly was much the same then."""
-
-_LATELY_S = 2.0
-"""Means of last speeds are over so long."""
+_AGO_S, _AGO_STEPS = 1.0, 2
+"""Before the last step, and at least so many: what changes slowly was much the same then, and what
+answers to the last step does not answer to that one."""
 
 _AHEAD = 0.5
 """Cosine of the angle from the heading within which another one is ahead."""
@@ -54,16 +52,18 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     is_ahead = own[:, None, HX] * x + own[:, None, HY] * y > _AHEAD * away
     all_paces = _paces_of_all(states)
     paces = all_paces[at[:, None], others]
-    few = range(max(1, round(_LATELY_S / scene.dt_s)))
+    few = range(max(1, round(LATELY_S / scene.dt_s)))
     theirs_lately = [np.nan_to_num(_ago(all_paces, scene, at[:, None], others, 1 + k)) for k in few]
     speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
-    ago = 1 + max(1, round(_AGO_S / scene.dt_s))
+    ago = 1 + max(_AGO_STEPS, round(_AGO_S / scene.dt_s))
     all_others = at[:, None], others
     return Swum(
         last=np.nan_to_num(_ago(table, scene, at, who, 1)),
         before_last=np.nan_to_num(_ago(table, scene, at, who, 2)),
         third=np.nan_to_num(_ago(table, scene, at, who, 3)),
         lately=np.mean([np.nan_to_num(_ago(table, scene, at, who, 1 + k)) for k in few], axis=0),
+        earlier=np.nan_to_num(_ago(table, scene, at, who, ago)),
+        before_earlier=np.nan_to_num(_ago(table, scene, at, who, ago + 1)),
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
         last_turn_rad=_last_turn(states, at, who),

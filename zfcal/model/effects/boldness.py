@@ -75,12 +75,17 @@ def _leaning(seen: Seen) -> Floats:
 def _who_by_time(seen: Seen) -> Floats:
     """Return what each fish has beside the first by the time: some leave from their moment on.
 
-    What all do alike is none of these weights.
+    Beside what all do alike by the time: where one is seldom asked, what all do would be gained
+    by the others having less of it.
     """
     who = _who(seen)
     first = 1.0 - who.sum(axis=1, keepdims=True)
     weights = (who - first)[..., None] * hats(seen.time, _TIMES)[:, None]
-    return np.asarray(weights.reshape(len(seen.time), -1))
+    return np.concatenate([_all_by_time(seen), weights.reshape(len(seen.time), -1)], axis=1)
+
+
+def _all_by_time(seen: Seen) -> Floats:
+    return hats(seen.time, _TIMES)[:, 1:]
 
 
 def _near_way_out(between: shapely.Geometry) -> Weights:
@@ -145,7 +150,11 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     """Return features of leaving, and of headings toward the way out where there is one."""
     made: list[Feature] = [
         Leaving(label="who", weights=_who),
-        Leaving(label="who, by the time", weights=_who_by_time),
+        Leaving(
+            label="who, by the time",
+            weights=_who_by_time,
+            over=Leaving(label="by the time", weights=_all_by_time),
+        ),
         Leaving(label="who, into the open", weights=_who, into="open"),
         Tilt(label="leaning to the way out", vectors=_leaning),
     ]

@@ -11,7 +11,7 @@ from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
-from zfcal.model.paces import Copied, Pace, Spread, Swum
+from zfcal.model.paces import LATELY_S, Copied, Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
@@ -34,15 +34,14 @@ def _last(swum: Swum) -> Floats:
     return hats(swum.last, _KNOTS)[:, 1:] * (swum.last != 0.0)[:, None]
 
 
-def _lately(swum: Swum) -> Floats:
-    """Return how fast the faster of the last two steps was: of none where one is not known."""
-    known = (swum.last != 0.0) & (swum.before_last != 0.0)
-    faster = np.maximum(swum.last, swum.before_last)
-    return hats(faster, _SLOW_TO_FAST)[:, 1:] * known[:, None]
+def _by_faster(last: Floats, before_last: Floats) -> Floats:
+    """Return how fast the faster of two steps was: of none where one is not known."""
+    known = (last != 0.0) & (before_last != 0.0)
+    return hats(np.maximum(last, before_last), _SLOW_TO_FAST)[:, 1:] * known[:, None]
 
 
-def _spread_by_last(swum: Swum) -> Floats:
-    return hats(swum.last, _SLOW_TO_FAST)[:, 1:] * (swum.last != 0.0)[:, None]
+def _slow_to_fast(last: Floats) -> Floats:
+    return hats(last, _SLOW_TO_FAST)[:, 1:] * (last != 0.0)[:, None]
 
 
 def _shares(speed_m_s: Floats) -> Floats:
@@ -99,10 +98,22 @@ EFFECT = Effect(
     paces=(
         Pace(label="by the last speed", weights=_last),
         Pace(label="by the last three speeds", weights=_some_ago),
-        Pace(label="by the mean over two seconds", weights=lambda swum: swum.lately[:, None]),
+        Pace(
+            label="by the mean over two seconds",
+            weights=lambda swum: swum.lately[:, None],
+            past_s=LATELY_S,
+        ),
         Pace(label="by the time since a fast step", weights=_since_fast),
-        Spread(label="slow and fast ones, by the last speed", weights=_spread_by_last),
-        Spread(label="slow and fast ones, by the last two", weights=_lately),
+        Spread(
+            label="slow and fast ones, by the last speed",
+            weights=lambda swum: _slow_to_fast(swum.last),
+            ago=lambda swum: _slow_to_fast(swum.earlier),
+        ),
+        Spread(
+            label="slow and fast ones, by the last two",
+            weights=lambda swum: _by_faster(swum.last, swum.before_last),
+            ago=lambda swum: _by_faster(swum.earlier, swum.before_earlier),
+        ),
         Copied(
             label="a share of the last speed",
             of=lambda swum: _shares(swum.last_m_s),

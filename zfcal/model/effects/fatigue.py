@@ -9,7 +9,7 @@ from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import TIME
-from zfcal.model.paces import Pace, Spread, Swum
+from zfcal.model.paces import Pace, Swum
 
 
 @hook(SPEED_HOOK)
@@ -19,10 +19,6 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 
 
 _TIMES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-
-
-def _spread_by_time(swum: Swum) -> Floats:
-    return hats(swum.time, (0.0, 0.5, 1.0))[:, 1:]
 
 
 def _by_time(swum: Swum) -> Floats:
@@ -56,8 +52,5 @@ EFFECT = Effect(
     fixed=("usual_at_s",),
     per_hour=True,
     shown_against="time",
-    paces=(
-        Pace(label="time", weights=_by_time),
-        Spread(label="slow and fast ones, by the time", weights=_spread_by_time),
-    ),
+    paces=(Pace(label="time", weights=_by_time),),
 )
