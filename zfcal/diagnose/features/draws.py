@@ -254,7 +254,7 @@ def _seen(
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
         speed_m_s=theirs(SPEED, at),
-        lately_m_s=_lately(states[:, SPEED], steps.scene.dt_s)[at[:, None], others],
+        lately_m_s=_lately(states, steps.scene.dt_s)[at[:, None], others],
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         course=_courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,
@@ -279,15 +279,18 @@ def _seen(
     )
 
 
-def _lately(speed: Floats, dt_s: float) -> Floats:
-    """Return the mean speed over two seconds up to each sample, of what is known of it."""
-    n = max(1, round(_LATELY_S / dt_s))
-    known = np.isfinite(speed) & (speed >= 0)
-    sums = [
-        np.cumsum(np.pad(each.astype(np.float64), ((n, 0), (0, 0))), axis=0)
-        for each in (np.where(known, speed, 0.0), known)
-    ]
-    total, count = (each[n:] - each[:-n] for each in sums)
+def _lately(states: Floats, dt_s: float) -> Floats:
+    """Return the mean speed over two seconds up to each sample, since who is there came."""
+    speed, present = states[:, SPEED], states[:, ZONE] > 0
+    total, count = np.zeros_like(speed), np.zeros_like(speed)
+    for ago in range(min(len(speed), max(1, round(_LATELY_S / dt_s)))):
+        present = present.copy()
+        present[ago:] &= states[: len(speed) - ago, ZONE] > 0
+        present[:ago] = False
+        then = np.roll(speed, ago, axis=0)
+        known = present & np.isfinite(then) & (then >= 0)
+        total += np.where(known, then, 0.0)
+        count += known
     return np.asarray(total / np.maximum(count, 1))
 
 

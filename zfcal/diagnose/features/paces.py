@@ -176,8 +176,14 @@ class Paces:
 
         As for a tilt of headings: each is fitted once, where it gains more than chance.
         """
+        return self._bent[0]
+
+    @cached_property
+    def _bent(self) -> tuple[Spreads, Floats, int]:
+        """That law, what bends it, shape (move,), and by how many strengths."""
         own = self._left / self._wide
         spreads = Spreads(scores=own, who=self._groups[1])
+        made, n = np.zeros(len(own)), 0
         for effect in self.beside:
             for feature in effect.paces:
                 if isinstance(feature, Pace):
@@ -186,7 +192,8 @@ class Paces:
                 gained = max(float(drawn.log_p.sum()), 0.0)
                 if drawn.n_strengths and chdtrc(drawn.n_strengths, 2 * gained) < LEVEL:
                     spreads = spreads.beside(drawn)
-        return spreads
+                    made, n = made + drawn.log_p, n + drawn.n_strengths
+        return spreads, made, n
 
     @cached_property
     def _wide(self) -> float:
@@ -195,7 +202,8 @@ class Paces:
     @property
     def gained_beside(self) -> tuple[Floats, int]:
         """What features of what is there add to its model, shape (move,); number of strengths."""
-        return _normal_gain(self.scores, self._left), self._also.shape[1]
+        _, bent, n = self._bent
+        return _normal_gain(self.scores, self._left) + bent, self._also.shape[1] + n
 
     def gain(self, name: str, feature: PaceFeature) -> Gain:
         """Return what a feature of an effect adds."""
