@@ -247,15 +247,15 @@ class Fits:
         return float(total @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ total)
 
     def _promise_of(self, columns: Columns) -> float:
-        (at, over), lapse = columns, self._lapse
+        (at, over), lapse = (each.sum(axis=1) for each in columns), self._lapse
         (base_at, base_over), here = self.law.base, np.exp(self.law.log_here)
         gains = [
             float(
                 np.log(
                     (1 - lapse)
                     * here
-                    * (base_at[:, 0] + share * at.sum(axis=1))
-                    / (base_over[:, 0] + share * over.sum(axis=1))
+                    * (base_at[:, 0] + share * at)
+                    / (base_over[:, 0] + share * over)
                     + lapse * UNIFORM
                 ).sum()
             )
