@@ -173,7 +173,7 @@ def test_speeds_that_are_spread_more_at_times_are_no_bursts(nothing):
     """The spread of each fish drifts, its median does not: no speed answers to the last one."""
 
     def varies(speed, rng):
-        drift = np.exp(0.3 * lfilter([0.18], [1, -0.983], rng.normal(size=len(speed))))
+        drift = np.exp(lfilter([0.038], [1, -0.992], rng.normal(size=len(speed))))
         return np.maximum(np.exp(np.log(0.07) + 0.4 * drift * rng.normal(size=len(speed))), 0.012)
 
     paces = scores_by_last(nothing, varies)

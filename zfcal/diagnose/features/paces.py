@@ -209,7 +209,7 @@ class Paces:
         """Return what a feature of an effect adds."""
         made, n = self._gained(feature)
         if not isinstance(feature, Pace) and feature.ago is not None:
-            made = made - self._gained(_ago(feature))[0]
+            made = made - _beyond_chance(*self._gained(_ago(feature)))
         return Gain(name=name, label=feature.label, log_p=made, n_strengths=n)
 
     def _gained(self, feature: PaceFeature) -> tuple[Floats, int]:
@@ -299,6 +299,16 @@ def _ago(feature: Spread | Copied) -> Spread | Copied:
     if isinstance(feature, Copied):
         return replace(feature, of=feature.ago)
     return feature if feature.ago is None else replace(feature, weights=feature.ago)
+
+
+def _beyond_chance(log_p: Floats, n_strengths: int) -> Floats:
+    """Return what is gained less what as many strengths gain on nothing, half a nat each (Wilks).
+
+    It is taken off in proportion, and nothing is left of a gain that is no larger.
+    """
+    whole = float(log_p.sum())
+    share = max(0.0, 1 - n_strengths / 2 / whole) if whole > 0 else 0.0
+    return np.asarray(share * log_p)
 
 
 def _means(values: Floats, group: NDArray[np.intp]) -> Floats:
