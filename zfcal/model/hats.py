@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.compiled import kernel
 
 
 def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
@@ -25,26 +24,14 @@ def hats(values: ArrayLike, knots: Sequence[float]) -> Floats:
     -------
     ndarray, shape (..., knot)
     """
-    at, x = np.asarray(knots, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    made = np.zeros((x.size, len(at)))
-    _write(np.ascontiguousarray(x).reshape(-1), at, made)
-    return made.reshape(*x.shape, len(at))
-
-
-@kernel
-def _write(values: Floats, knots: Floats, made: Floats) -> None:
-    """Write the hat functions of each value, shape (value, knot)."""
-    for k in range(values.size):
-        x = values[k]
-        if x < knots[0]:
-            x = knots[0]
-        elif x > knots[-1]:
-            x = knots[-1]
-        below = 0
-        while below < knots.size - 2 and not x < knots[below + 1]:
-            below += 1
-        share = (x - knots[below]) / (knots[below + 1] - knots[below])
-        made[k, below], made[k, below + 1] = 1 - share, share
+    at = np.asarray(knots, dtype=np.float64)
+    x = np.clip(np.asarray(values, dtype=np.float64), at[0], at[-1])
+    below = np.clip(np.searchsorted(at, x, side="right") - 1, 0, len(at) - 2)
+    share = (x - at[below]) / (at[below + 1] - at[below])
+    made = np.zeros((*x.shape, len(at)))
+    np.put_along_axis(made, below[..., None], (1 - share)[..., None], -1)
+    np.put_along_axis(made, below[..., None] + 1, share[..., None], -1)
+    return made
 
 
 def hats_where(there: NDArray[np.bool_], values: Floats, knots: Sequence[float]) -> Floats:
