@@ -52,6 +52,7 @@ def curve_of(
     made = FeatureCurve(label=feature.label, nats=gain.nats, form_nats=nats)
     if feature.along is None:
         return made
+    fits = replace(fits, off_walls=isinstance(feature, Landing))
     n, fit = len(feature.along.knots), fits.fit(feature)
     shown = _Knots(none_at=feature.along.none_at)
     return replace(
@@ -89,7 +90,7 @@ def _of_the_form(fits: Fits, feature: Single, with_it: Screen) -> Floats:
     """Return the strengths where headings are drawn from the model with the effect, their mean."""
     random = np.random.default_rng([fits.law.seed, 11])
     laws = [redrawn(fits.law, with_it, random) for _ in range(_REDRAWN)]
-    return np.mean([Fits(law=law, also=fits.also).fit(feature).strengths for law in laws], axis=0)
+    return np.mean([replace(fits, law=law).fit(feature).strengths for law in laws], axis=0)
 
 
 def redrawn(law: Law, screen: Screen, random: np.random.Generator) -> Law:
