@@ -139,6 +139,43 @@ def test_a_trial_that_is_gone_is_an_error_of_the_system(trial, clock):
         arrivals.look()
 
 
+def test_a_trial_that_goes_while_it_is_looked_at_is_whole_when_it_is_back(trial, clock):
+    """Names were read, then the disk went: what could not be opened is no damaged file."""
+    away = trial.with_name("away")
+
+    def goes_meanwhile():
+        if not away.exists():
+            trial.rename(away)
+        return clock.now_s
+
+    arrivals = Arrivals(trial, goes_meanwhile)
+    assert arrivals.look() == []
+    with pytest.raises(FileNotFoundError):
+        arrivals.look()
+    arrivals._clock = clock
+    away.rename(trial)
+    look_again(arrivals, clock)
+    assert arrivals.unfinished == {}
+    assert not arrivals.unsettled
+
+
+def test_a_file_that_could_not_be_read_for_a_moment_is_read_again(trial, clock, monkeypatch):
+    """Said once; what it looks like stays the same when a network disk answers again."""
+    arrivals = Arrivals(trial, clock)
+    path = trial / "models" / "000000.toml"
+
+    def refuse(_):
+        raise OSError(5, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("zfcal.online.arrivals.open_regular", refuse)
+        named = [each for each in arrivals.look() if isinstance(each, Unfinished)]
+        assert path in [each.path for each in named]
+        assert arrivals.look() == []
+    assert Arrived(path=path) in arrivals.look()
+    assert arrivals.unfinished == {}
+
+
 def test_what_a_stage_has_made_counts_at_once(trial, clock):
     """It is whole by the way in which it is made, and is not told; what is not there is not."""
     arrivals = Arrivals(trial, clock)

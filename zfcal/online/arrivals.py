@@ -146,12 +146,17 @@ class Arrivals:
             if file is not None:
                 self._forget(name)
             file = self._files[name] = _File(looks=looks, since_s=now_s)
-        if file.is_whole or file.problem or now_s - file.since_s < _patience_s(name):
+        if file.is_whole or now_s - file.since_s < _patience_s(name):
             return None
         path = self._root / name
-        file.problem = _problem(path)
-        if file.problem:
-            return Unfinished(path=path, problem=f"{path}: {file.problem}.")
+        before, problem = file.problem, _problem(path)
+        if problem and not _is_there(path):
+            # It went while it was looked at, maybe with the whole trial: that says nothing of it.
+            return None
+        file.problem = problem
+        if problem:
+            told = Unfinished(path=path, problem=f"{path}: {problem}.")
+            return None if problem == before else told
         file.is_whole = True
         self._note_whole(name, now_s)
         return Arrived(path=path)
@@ -219,6 +224,11 @@ def _looks(path: Path) -> Looks:
     except OSError:
         status = path.lstat()
     return status.st_size, status.st_mtime_ns, status.st_ino
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether there is a file, or a link that leads nowhere."""
+    return os.path.lexists(path)
 
 
 def _patience_s(name: str) -> float:
