@@ -110,6 +110,19 @@ def test_the_maximum_does_not_depend_on_the_start(scene, model):
     assert one.nats == pytest.approx(two.nats, abs=0.05)
 
 
+def test_a_long_step_does_not_end_where_neighbours_count_for_nothing(two_rooms, model):
+    """Where alpha is 0 the slope by kappa of the neighbours is 0, and that way leads nowhere."""
+    own = ((14.0, 3.2, 7.5), (22.7, 13.6, 23.3), (23.4, 22.3, 36.7))
+    zones = [
+        dataclasses.replace(zone, kappa_0=base, kappa_f=social, alpha=alpha)
+        for zone, base, social, alpha in zip(model.zones, *own, strict=True)
+    ]
+    true = dataclasses.replace(model, zones=tuple(zones))
+    xy_m, _ = simulate_tracks(true, two_rooms, n_agents=5, n_steps=3000, seed=8)
+    scene = make_scene(samples_of(xy_m), two_rooms)
+    assert maximise(scene, model).nats == pytest.approx(maximise(scene, true).nats, abs=0.2)
+
+
 @pytest.mark.parametrize("effects", HOOKS.values(), ids=HOOKS.keys())
 def test_scores_are_the_derivatives_of_the_log_density(short_scene, model, effects):
     """By central differences, step by step, for each parameter of each zone."""

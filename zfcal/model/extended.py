@@ -329,8 +329,13 @@ def limits_of(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floa
 
 
 def _shifted(x: Floats, by: Floats, turns: ZoneTurns, bounds: Bounds) -> Floats:
-    """Return a zone's parameters moved within their limits, the largest log gamma zero."""
+    """Return a zone's parameters moved within their limits, the largest log gamma zero.
+
+    At a kappa or an alpha of zero the mixture's slope says nothing: they are approached step by
+    step, as effects are.
+    """
     moved = x + by
+    moved[:3] = np.maximum(moved[:3], _SHRINK * x[:3])
     # A common factor of all gammas is no matter: it goes before the limits, not after.
     moved[3:-1] -= moved[3:-1][turns.reachable].max()
     return np.clip(moved, *limits_of(x, turns, bounds))
