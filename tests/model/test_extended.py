@@ -43,6 +43,10 @@ HOOKS = {
     "factor": {"turning-bias": {"strength": 0.5}},
     "sight": {"rear-blind-zone": {"ignored": 0.7}},
     "rotation": {"alignment": {"weight": 20.0, "turning": 1.0}},
+    "whole rotation": {
+        "alignment": {"weight": 20.0, "kappa": 6.0},
+        "directional-drift": {"strength": 4.0, "direction_rad": 1.9, "turning": 2.0},
+    },
     "lag": {"reaction-delay": {"delay_s": 0.4}},
     "lag between steps": {"reaction-delay": {"delay_s": 0.3}},
     "some of it late": {"reaction-delay": {"delay_s": 0.4, "share": 0.3}},
@@ -183,7 +187,9 @@ def expected(model, two_rooms, xy, heading, taken_rad, speed_m_s):
 MIDDLE = [(0.22, 0.77), (0.26, 0.80), (0.17, 0.74)], [0.4, 2.0, -2.5]
 
 
-@pytest.mark.parametrize("name", ["none", "component", "factor", "sight", "rotation"])
+@pytest.mark.parametrize(
+    "name", ["none", "component", "factor", "sight", "rotation", "whole rotation"]
+)
 @pytest.mark.parametrize("degrees", [-100, -20, 25, 60, 150])
 def test_the_log_density_is_that_of_a_simulated_step(two_rooms, model, name, degrees):
     """In the middle of a room, to 1e-3: kinds of effects and headings on all sides."""
@@ -193,7 +199,9 @@ def test_the_log_density_is_that_of_a_simulated_step(two_rooms, model, name, deg
     assert found == pytest.approx(expected(own, two_rooms, *MIDDLE, taken, speed), abs=1e-3)
 
 
-@pytest.mark.parametrize("name", ["none", "component", "factor", "sight", "rotation"])
+@pytest.mark.parametrize(
+    "name", ["none", "component", "factor", "sight", "rotation", "whole rotation"]
+)
 def test_the_log_density_near_walls_and_borders(two_rooms, model, name):
     """12 mm from a wall and from a zone's border: cells that straddle them cost 0.02 nats."""
     own, taken, speed = having(model, HOOKS[name]), math.radians(80), 0.12
@@ -369,6 +377,7 @@ FREE = {
     "component": ("alignment", {"weight": 20.0}, "weight"),
     "factor": ("turning-bias", {"strength": 0.4}, "strength"),
     "sight": ("rear-blind-zone", {"ignored": 0.8}, "ignored"),
+    "whole rotation": ("group-cohesion", {"weight": 3.0, "turning": 2.0}, "weight"),
     "strong factor": ("generic:heading:own-turn", {"strength": 9.0}, "strength"),
 }
 

@@ -38,6 +38,7 @@ from zfcal.diagnose.scores import (
     tables_of,
     tame,
 )
+from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
@@ -62,7 +63,8 @@ from zfcal.model.views import (
     late_sight,
     polynomial_of,
     speed_factor,
-    spin_of,
+    turned_view,
+    turns_of,
 )
 from zfcal.units import HEADING_MIN_STEP_M
 
@@ -191,7 +193,7 @@ class Screen:
             total += some / strong
         if effect.sight is not None:
             total += self._sight_scores(scene, at(strong)) / strong
-        if effect.calls("rotation", shape):
+        if any(effect.calls(kind, shape) for kind in ("rotation", "whole_rotation")):
             total += self._turned_scores(scene, at(effect.probe)) / effect.probe
         if effect.calls("factor", shape):
             tilted = self._tilted_scores(scene, at(effect.probe), polynomial_of([effect]))
@@ -235,22 +237,13 @@ class Screen:
         return total
 
     def _turned_scores(self, scene: Scene, packed: Packed) -> Floats:
-        """Return the scores of a mixture whose base directions are turned."""
-        fitted = self.fitted
-        spin = spin_of(scene, packed, fitted.view.seen_sr)
-        scores = np.zeros(len(scene.turns))
-        if not spin[:, 1].any():
+        """Return the scores of a mixture whose directions are turned."""
+        fitted, scores = self.fitted, np.zeros(len(scene.turns))
+        angles = turns_of(scene, packed, fitted.view.seen_sr)
+        if not any(angle.any() for angle in angles):
             return scores
-        if len(fitted.view.spin):
-            old = fitted.view.spin
-            spin = np.stack(
-                [
-                    spin[:, 0] * old[:, 0] - spin[:, 1] * old[:, 1],
-                    spin[:, 1] * old[:, 0] + spin[:, 0] * old[:, 1],
-                ],
-                axis=1,
-            )
-        other, _, other_taken = replace(fitted, view=replace(fitted.view, spin=spin)).tables()
+        view = turned_view(fitted.view, *angles)
+        other, _, other_taken = replace(fitted, view=view).tables()
         mixture_score(other, other_taken, *self._tables.mixtures(), scores)
         return scores
 
@@ -260,6 +253,8 @@ class Screen:
         values = candidate.values(_LATE_SHARE)
         packed = pack([with_effect(fitted.parameters, candidate.name, values)], self.scene.arena)
         toward, angle = late_sight(self.scene, packed, fitted.view.late)
+        if len(fitted.view.whole_rad):
+            toward = turned_by(toward, fitted.view.whole_rad[:, None])
         total = np.zeros(len(self.scene.turns))
         for x, zone, mixtures in zip(fitted.x, fitted.turns, self._mixtures, strict=True):
             rows, own = zone.rows, x[:3] * SCALES

@@ -155,6 +155,7 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         speeds=_hooks(effects, "speed", models),
         sights=_hooks(effects, "sight", models),
         rotations=_hooks(effects, "rotation", models),
+        whole_rotations=_hooks(effects, "whole_rotation", models),
         effects=_effect_parameters(effects, models, n_models),
     )
 

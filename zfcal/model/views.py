@@ -14,6 +14,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
+from zfcal.model.directions import turned_by
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.kernels.effect_evaluation import (
     PART,
@@ -56,6 +57,8 @@ class View:
     spin : ndarray, shape (step, 2)
         Cosine and sine of the angle by which base directions are turned; empty where no
         effect turns them.
+    whole_rad : ndarray, shape (step,)
+        Angle by which all directions were turned, those of the base among them; empty likewise.
     seen_sr : ndarray, shape (step, agent)
         Solid angles as effects are given them.
     parts : ndarray, shape (step, component, 4)
@@ -71,6 +74,7 @@ class View:
     tilt_taken: Floats
     seen_sr: Floats
     spin: Floats
+    whole_rad: Floats
     late: Late = dataclasses.field(default_factory=dict)
     """What was perceived late, so that a fit looks but once."""
 
@@ -104,25 +108,52 @@ def view_of(
         tilt, tilt_taken = factors_of(scene, packed, own, n_workers=n_workers)
     else:
         tilt, tilt_taken = smooth_factors_of(scene, packed, own, form, n_workers=n_workers)
-    return View(
+    view = View(
         toward=toward,
         angle_sr=angle,
         parts=parts,
         tilt=tilt,
         tilt_taken=tilt_taken,
         seen_sr=own,
-        spin=spin_of(scene, packed, own),
+        spin=np.zeros((0, 2)),
+        whole_rad=np.zeros(0),
         late=known,
     )
+    return turned_view(view, *turns_of(scene, packed, own))
 
 
-def spin_of(scene: Scene, packed: Packed, angle_sr: Floats) -> Floats:
-    """Return cosine and sine of the angle that effects turn base directions by; or nothing."""
-    turns = scene.turns
-    spin = np.zeros((len(turns) if len(packed.rotations) else 0, 2))
-    if len(packed.rotations):
-        ask_rotations(scene.states, turns.at, turns.who, packed, angle_sr, spin)
-    return spin
+def turns_of(scene: Scene, packed: Packed, angle_sr: Floats) -> tuple[Floats, Floats]:
+    """Return the angles that effects turn base directions by, and all; each empty without such."""
+    turns, made = scene.turns, []
+    for hooks in (packed.rotations, packed.whole_rotations):
+        made.append(np.zeros(len(turns) if len(hooks) else 0))
+        if len(hooks):
+            ask_rotations(scene.states, turns.at, turns.who, packed, hooks, angle_sr, made[-1])
+    return made[0], made[1]
+
+
+def turned_view(view: View, base_rad: Floats, whole_rad: Floats) -> View:
+    """Return a view whose directions are turned on to the left.
+
+    Parameters
+    ----------
+    base_rad, whole_rad : ndarray, shape (step,)
+        Those of the base alone, and all; empty for none.
+    """
+    if len(whole_rad):
+        parts = view.parts.copy()
+        parts[:, :, 1:3] = turned_by(parts[:, :, 1:3], whole_rad[:, None])
+        view = dataclasses.replace(
+            view,
+            parts=parts,
+            toward=turned_by(view.toward, whole_rad[:, None]),
+            whole_rad=view.whole_rad + whole_rad if len(view.whole_rad) else whole_rad,
+        )
+    for angle in (base_rad, whole_rad):
+        if len(angle):
+            spin = view.spin if len(view.spin) else np.eye(2)[:1]
+            view = dataclasses.replace(view, spin=turned_by(spin, angle))
+    return view
 
 
 def sees_late(packed: Packed) -> float:

@@ -57,6 +57,10 @@ class Asked:
         """Return the angle by which the base's directions are turned."""
         return self.effect.rotation.ctypes(*self._given(i))
 
+    def whole_rotation(self, *, i=0):
+        """Return the angle by which all directions are turned."""
+        return self.effect.whole_rotation.ctypes(*self._given(i))
+
     def component(self, *, i=0):
         """Return weight, unit vector and kappa."""
         out = np.zeros(3)

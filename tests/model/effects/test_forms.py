@@ -283,6 +283,37 @@ def test_fish_may_turn_to_a_side(ask, strength, follows):
     assert ask("turning-bias", {"strength": strength}).rotation() == 0.0
 
 
+WHOLE = {
+    "directional-drift": ("strength", 1.0, {"direction_rad": math.pi / 2}, 1.0),
+    "group-cohesion": ("weight", 1.0, {}, 1.0),
+    "place-preference": (
+        "strength", 1.0, {"x_m": 0.0, "y_m": 0.1, "reach_m": 2.0}, 0.1 / 0.12 / (1 + 0.05**4),
+    ),
+    "robot-avoidance": ("strength", -1.0, {}, math.exp(-1.0)),
+}  # fmt: skip
+"""Each with a pull of one to the left of a fish that swims along x, and what is left of it."""
+
+
+@pytest.mark.parametrize("follows", [0.0, 1.0])
+@pytest.mark.parametrize("name", WHOLE)
+def test_all_directions_may_turn_to_something(ask, name, follows):
+    """By a tenth of a radian, along walls too; the base's alone do not, and none lean or are drawn.
+
+    In the other form the base's directions alone turn, and along walls headings lean.
+    """
+    key, sign, given, left = WHOLE[name]
+    rows = {"X": [0.0, 0.0], "Y": [0.0, 0.1], "ZONE": 3.0, "FOLLOWS": follows, "KIND": [0.0, 1.0]}
+    whole = ask(name, {key: sign, "turning": 2.0, **given}, HX=1.0, HY=0.0, **rows)
+    assert whole.whole_rotation() == pytest.approx(0.1 * left)
+    assert whole.rotation() == 0.0
+    assert whole.factor(1.0) == whole.factor(-1.0) == 1.0
+    assert whole.component()[0] == 0.0
+    base = ask(name, {key: sign, "turning": 1.0, **given}, HX=1.0, HY=0.0, **rows)
+    assert base.whole_rotation() == 0.0
+    assert base.rotation() == pytest.approx(0.0 if follows else 0.1 * left)
+    assert (base.factor(1.0) != base.factor(-1.0)) == bool(follows)
+
+
 def test_the_bold_may_swim_into_a_zone(ask):
     """Into the third: e^(2 s) for the bold, e^(-2 s) for the shy, wherever they are."""
     given = {"spread": 0.5, "heading_share": 0.0, "into_zone": 3.0}

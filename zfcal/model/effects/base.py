@@ -165,8 +165,9 @@ class Effect:
         Name of the parameter that is zero where the effect is absent.
     probe
         A strength so small that the effect is proportional to it.
-    component, factor, speed, sight, rotation
-        Compiled functions (`numba.cfunc`), None for what it does not touch.
+    component, factor, speed, sight, rotation, whole_rotation
+        Compiled functions (`numba.cfunc`), None for what it does not touch. A rotation is of the
+        base's directions; a whole one of those to neighbours and of components as well.
     harmonics
         The log of its factor is a trigonometric polynomial of the heading, of this degree,
         plus a number of the landing zone; None where it is not, or where there is no factor.
@@ -243,6 +244,7 @@ class Effect:
     speed: Any = None
     sight: Any = None
     rotation: Any = None
+    whole_rotation: Any = None
     harmonics: int | None = None
     by_landing: bool = False
     each: str = ""

@@ -10,7 +10,16 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import RAD_PER_STRENGTH, SLOWEST_M_S, SPEED_M_S, cut, tilt, turn_to
+from zfcal.model.effects.forms import (
+    RAD_PER_STRENGTH,
+    SLOWEST_M_S,
+    SPEED_M_S,
+    cut,
+    of_base,
+    sine_to,
+    tilt,
+    turn_to,
+)
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
@@ -34,7 +43,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     Where fish turn to it, those along walls alone.
     """
     if parameters[5] > 0.0:
-        if not state[FOLLOWS * n + i] > 0.0:
+        if parameters[5] > 1.0 or not state[FOLLOWS * n + i] > 0.0:
             return 1.0
     elif parameters[3] > 0.0:
         return 1.0
@@ -48,9 +57,18 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(ROTATION)
 def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn to the direction by the sine of the angle to it; not along a wall."""
-    if not parameters[5] > 0.0:
+    if not of_base(parameters[5]):
         return 0.0
     aside = turn_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
+    return RAD_PER_STRENGTH * parameters[0] * aside
+
+
+@hook(ROTATION)
+def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn all directions to it, along walls too."""
+    if not parameters[5] > 1.0:
+        return 0.0
+    aside = sine_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
     return RAD_PER_STRENGTH * parameters[0] * aside
 
 
@@ -185,10 +203,11 @@ EFFECT = Effect(
         EffectParameter(
             name="turning",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="1: all turn to that direction, by a tenth of a radian per strength times the "
-            "sine of the angle to it; along a wall they prefer the sense that is nearer to it.",
+            "sine of the angle to it; along a wall they prefer the sense that is nearer to it. 2: "
+            "so do the directions to neighbours and those along walls.",
         ),
     ),
     probe=0.01,
@@ -197,14 +216,15 @@ EFFECT = Effect(
     harmonics=1,
     shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
     rotation=rotation,
+    whole_rotation=whole_rotation,
     further_shapes=lambda _arena: tuple(
-        {"direction_rad": eighth * math.pi / 4, form: 1.0}
-        for form in ("drawn", "turning")
+        {"direction_rad": eighth * math.pi / 4, **form}
+        for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
         for eighth in range(-3, 5)
     ),
     fixed=("drawn", "kappa", "turning"),
     idle=lambda values: ("by_slowness",) if values["drawn"] + values["turning"] > 0 else (),
-    needs={"component": ("drawn",), "rotation": ("turning",)},
+    needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,
 )

@@ -90,9 +90,19 @@ def leftward(state: Hooked, n: int, i: int, ux: float, uy: float, along_walls: f
 @inlined
 def turn_to(state: Hooked, n: int, i: int, x: float, y: float) -> float:
     """Return the sine of the angle from the heading to a unit vector; 0 along walls."""
-    if state[FOLLOWS * n + i] > 0.0:
-        return 0.0
+    return 0.0 if state[FOLLOWS * n + i] > 0.0 else sine_to(state, n, i, x, y)
+
+
+@inlined
+def sine_to(state: Hooked, n: int, i: int, x: float, y: float) -> float:
+    """Return the sine of the angle from the heading to a unit vector, along walls too."""
     return float(state[HX * n + i] * y - state[HY * n + i] * x)
+
+
+@inlined
+def of_base(turning: float) -> bool:
+    """Return whether the base's directions turn, but not those to neighbours."""
+    return 0.0 < turning <= 1.0
 
 
 @inlined

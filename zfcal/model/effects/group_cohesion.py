@@ -14,7 +14,9 @@ from zfcal.model.effects.forms import (
     Hooked,
     apart,
     needs_neighbour,
+    of_base,
     seen_by_rank,
+    sine_to,
     tilt,
     turn_to,
 )
@@ -93,7 +95,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     """Weigh headings by the bearing of the centroid of all others, seen or not, or the nearest."""
     leaning = parameters[3]
     if parameters[6] > 0.0:
-        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i]
+        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i] * of_base(parameters[6])
     if not leaning > 0.0:
         return 1.0
     x, y, away_m = middle(state, n, i, parameters[5])
@@ -105,13 +107,25 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(ROTATION)
 def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn to that bearing by the sine of the angle to it; not along a wall."""
-    if not parameters[6] > 0.0:
+    if not of_base(parameters[6]):
         return 0.0
     x, y, away_m = middle(state, n, i, parameters[5])
     if not away_m > 0.0:
         return 0.0
     pull = parameters[0] * grown(away_m, parameters[2])
     return RAD_PER_STRENGTH * pull * turn_to(state, n, i, x, y)
+
+
+@hook(ROTATION)
+def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn all directions to that bearing, along walls too."""
+    if not parameters[6] > 1.0:
+        return 0.0
+    x, y, away_m = middle(state, n, i, parameters[5])
+    if not away_m > 0.0:
+        return 0.0
+    pull = parameters[0] * grown(away_m, parameters[2])
+    return RAD_PER_STRENGTH * pull * sine_to(state, n, i, x, y)
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
@@ -255,10 +269,11 @@ EFFECT = Effect(
         EffectParameter(
             name="turning",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="1: all turn to that bearing, by a tenth of a radian per weight times the sine "
-            "of the angle to it; along a wall they prefer the sense that is nearer to it.",
+            "of the angle to it; along a wall they prefer the sense that is nearer to it. 2: so do "
+            "the directions to neighbours and those along walls.",
         ),
     ),
     strength="weight",
@@ -266,6 +281,7 @@ EFFECT = Effect(
     component=component,
     factor=factor,
     rotation=rotation,
+    whole_rotation=whole_rotation,
     harmonics=1,
     shapes=lambda _arena: (
         {"kappa": 2.0, "full_m": 0.0},
@@ -288,7 +304,8 @@ EFFECT = Effect(
             for full_m in (0.0, 0.3)
         )
         + tuple(
-            {"turning": 1.0, "full_m": full_m, "nearest": nearest}
+            {"turning": turning, "full_m": full_m, "nearest": nearest}
+            for turning in (1.0, 2.0)
             for nearest in (0.0, 1.0)
             for full_m in (0.0, 0.3)
         )
@@ -296,6 +313,10 @@ EFFECT = Effect(
     lacks=needs_neighbour,
     fixed=("full_m", "leaning", "each", "nearest", "turning"),
     idle=lambda values: ("kappa",) if values["leaning"] + values["turning"] > 0 else (),
-    needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
+    needs={
+        "factor": ("leaning", "turning"),
+        "rotation": ("turning",),
+        "whole_rotation": ("turning",),
+    },
     features=lambda _arena: _FEATURES,
 )

@@ -14,7 +14,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
-from zfcal.model.effects.forms import RAD_PER_STRENGTH, tilt, turn_to
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
 from zfcal.model.hats import hats
@@ -48,7 +48,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         return 1.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     if parameters[6] > 0.0:
-        pull *= RAD_PER_STRENGTH * state[FOLLOWS * n + i]
+        pull *= RAD_PER_STRENGTH * state[FOLLOWS * n + i] * of_base(parameters[6])
     return tilt(parameters[0], pull * (ux * dx + uy * dy) / away, pull)
 
 
@@ -57,10 +57,21 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     """Turn to the place by the sine of the angle to it; not along a wall."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not away > 0.0 or not parameters[6] > 0.0:
+    if not away > 0.0 or not of_base(parameters[6]):
         return 0.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     return RAD_PER_STRENGTH * parameters[0] * pull * turn_to(state, n, i, dx / away, dy / away)
+
+
+@hook(ROTATION)
+def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn all directions to the place, along walls too."""
+    dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    away = math.sqrt(dx * dx + dy * dy)
+    if not away > 0.0 or not parameters[6] > 1.0:
+        return 0.0
+    pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    return RAD_PER_STRENGTH * parameters[0] * pull * sine_to(state, n, i, dx / away, dy / away)
 
 
 def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
@@ -273,23 +284,27 @@ EFFECT = Effect(
         EffectParameter(
             name="turning",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="1: all turn to the place, by a tenth of a radian per strength times the sine "
-            "of the angle to it; along a wall they prefer the sense that is nearer to it.",
+            "of the angle to it; along a wall they prefer the sense that is nearer to it. 2: so do "
+            "the directions to neighbours and those along walls.",
         ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
     rotation=rotation,
+    whole_rotation=whole_rotation,
     harmonics=1,
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
     further_shapes=lambda arena: tuple(
-        {"x_m": x, "y_m": y, form: 1.0} for form in ("drawn", "turning") for x, y in places(arena)
+        {"x_m": x, "y_m": y, **form}
+        for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
+        for x, y in places(arena)
     ),
     fixed=("drawn", "kappa", "turning"),
-    needs={"component": ("drawn",), "rotation": ("turning",)},
+    needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.
     looks_like=Likeness(name="directional-drift", share=_one_sided),

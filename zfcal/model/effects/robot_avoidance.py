@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.forms import RAD_PER_STRENGTH, Hooked, apart, beyond, tilt, turn_to
+from zfcal.model.effects.forms import (
+    RAD_PER_STRENGTH,
+    Hooked,
+    apart,
+    beyond,
+    of_base,
+    sine_to,
+    tilt,
+    turn_to,
+)
 from zfcal.model.effects.weights import aside_of, factor_on_attention
 from zfcal.model.features import AWAY_M, Along, Component, Feature, Landing, Seen, Tilt, Turned
 from zfcal.model.hats import hats
@@ -27,8 +36,9 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Change the attention that a robot gets."""
     if not state[KIND * n + j] > 0.0:
         return 1.0
-    lost = parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]) * (1.0 - parameters[5])
-    return math.exp(-lost)
+    if parameters[5] > 0.0:
+        return 1.0
+    return math.exp(-parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]))
 
 
 @hook(COMPONENT)
@@ -69,7 +79,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     """Weigh headings away from the robots that are seen; the nearer, the more."""
     leaning = parameters[1]
     if parameters[5] > 0.0:
-        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i]
+        leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i] * of_base(parameters[5])
     if not leaning > 0.0:
         return 1.0
     x, y, most = from_robots(state, sight, n, i)
@@ -79,10 +89,19 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(ROTATION)
 def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]
     """Turn away from the robots that are seen; not along a wall."""
-    if not parameters[5] > 0.0:
+    if not of_base(parameters[5]):
         return 0.0
     x, y, _ = from_robots(state, sight, n, i)
     return RAD_PER_STRENGTH * parameters[0] * turn_to(state, n, i, x, y)
+
+
+@hook(ROTATION)
+def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]
+    """Turn all directions away from the robots that are seen, along walls too."""
+    if not parameters[5] > 1.0:
+        return 0.0
+    x, y, _ = from_robots(state, sight, n, i)
+    return RAD_PER_STRENGTH * parameters[0] * sine_to(state, n, i, x, y)
 
 
 def _lacks(company: Company) -> str | None:
@@ -200,11 +219,12 @@ EFFECT = Effect(
         EffectParameter(
             name="turning",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="1: it gets the attention of a fish, and all turn away from it when it is close, "
             "by a tenth of a radian per strength times the sine of the angle; along a wall they "
-            "prefer the sense that leads away.",
+            "prefer the sense that leads away. 2: so do the directions to neighbours and those "
+            "along walls.",
         ),
     ),
     probe=0.01,
@@ -212,11 +232,13 @@ EFFECT = Effect(
     sight=sight,
     factor=factor,
     rotation=rotation,
+    whole_rotation=whole_rotation,
     harmonics=1,
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
     further_shapes=lambda _arena: (
         *({"drawn": 1.0, "reach_m": far_m, "kappa": 5.0} for far_m in (0.07, 0.12, 0.2, 0.35)),
         {"turning": 1.0},
+        {"turning": 2.0},
     ),
     lacks=_lacks,
     fixed=("flight", "drawn", "turning"),
@@ -227,6 +249,7 @@ EFFECT = Effect(
         "factor": ("flight", "turning"),
         "component": ("drawn",),
         "rotation": ("turning",),
+        "whole_rotation": ("turning",),
     },
     features=lambda _arena: _FEATURES,
 )

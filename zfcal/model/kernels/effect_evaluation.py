@@ -87,26 +87,28 @@ def ask_components(
 
 @kernel
 def ask_rotations(
-    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, spin: Floats
-) -> None:
-    """Write the cosine and sine of the angle by which effects turn the base's directions.
+    states: Floats, at: Ints, who: Ints, packed: Packed, hooks: Ints, angle_sr: Floats,
+    angle: Floats,
+) -> None:  # fmt: skip
+    """Write the angle by which some functions of effects turn directions.
 
     Parameters
     ----------
-    spin : ndarray, shape (step, 2)
+    hooks
+        Of the model: those that turn the base's directions, or all.
+    angle : ndarray, shape (step,)
     """
     n = states.shape[2]
     row = np.zeros(n * n)
     for s in range(at.size):
-        i, angle = who[s], 0.0
+        i, angle[s] = who[s], 0.0
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
-        for h in range(packed.rotations.shape[0]):
-            angle += call_rotation(
-                packed.rotations[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                packed.effects[0, packed.rotations[h, 1]].ctypes.data,
+        for h in range(hooks.shape[0]):
+            angle[s] += call_rotation(
+                hooks[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
+                packed.effects[0, hooks[h, 1]].ctypes.data,
             )  # fmt: skip
-        spin[s, 0], spin[s, 1] = math.cos(angle), math.sin(angle)
         for j in range(n):
             row[i * n + j] = 0.0
 

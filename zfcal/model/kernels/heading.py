@@ -175,7 +175,7 @@ def _draw_mixture(
                 cx, cy = -cx, -cy
         else:
             cx, cy = state[HX, i], state[HY, i]
-        if packed.rotations.shape[0] > 0:
+        if packed.rotations.shape[0] + packed.whole_rotations.shape[0] > 0:
             cx, cy = spun(cx, cy, work)
     elif not has_effects(packed):
         law, r, kappa = LAW_F, TABLE, packed.zones[model, zone, KAPPA_F]

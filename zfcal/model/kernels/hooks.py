@@ -31,7 +31,7 @@ stays and keeps its heading.
 """
 
 ROTATION = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER)
-"""``angle(state, sight, n, i, parameters)`` by which the base's directions turn left."""
+"""``angle(state, sight, n, i, parameters)`` by which directions turn left: the base's, or all."""
 
 SIGHT = _F8(_POINTER, _POINTER, _I8, _I8, _POINTER, _I8)
 """``factor(state, sight, n, i, parameters, j)`` on the solid angle of neighbour j."""

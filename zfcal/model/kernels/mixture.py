@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from zfcal.arrays import Floats
+from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation
 from zfcal.model.kernels.perception import Sight
@@ -112,24 +112,32 @@ def gather(
             parts[count, 0], parts[count, 4] = weight, vonmises_r(parts[count, 3])
             total += weight
             count += 1
+    angle = 0.0
+    if packed.whole_rotations.shape[0] > 0:
+        angle = _turn(i, packed.whole_rotations, state, model, packed, sight)
+        c, s = math.cos(angle), math.sin(angle)
+        for k in range(count):
+            x, y = parts[k, 1], parts[k, 2]
+            parts[k, 1], parts[k, 2] = c * x - s * y, s * x + c * y
     if packed.rotations.shape[0] > 0:
-        _spin(i, state, model, packed, sight, work)
-    else:
-        # The model before, of the same robot, may have had some.
-        work.spin[0], work.spin[1] = 1.0, 0.0
+        angle += _turn(i, packed.rotations, state, model, packed, sight)
+    # Of none as well: the model before, of the same robot, may have had some.
+    work.spin[0], work.spin[1] = math.cos(angle), math.sin(angle)
     return count, total
 
 
 @inlined
-def _spin(i: int, state: Floats, model: int, packed: Packed, sight: Sight, work: Work) -> None:
-    """Write the cosine and sine of the angle by which effects turn an agent's base law."""
+def _turn(
+    i: int, hooks: Ints, state: Floats, model: int, packed: Packed, sight: Sight
+) -> float:  # fmt: skip
+    """Return the angle by which some functions of effects turn an agent's directions."""
     angle = 0.0
-    for k in range(packed.rotations.shape[0]):
+    for k in range(hooks.shape[0]):
         angle += call_rotation(
-            packed.rotations[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-            state.shape[1], i, packed.effects[model, packed.rotations[k, 1]].ctypes.data,
+            hooks[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
+            state.shape[1], i, packed.effects[model, hooks[k, 1]].ctypes.data,
         )  # fmt: skip
-    work.spin[0], work.spin[1] = math.cos(angle), math.sin(angle)
+    return angle
 
 
 @inlined

@@ -86,7 +86,8 @@ class Packed(NamedTuple):
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
-    components, factors, speeds, sights, rotations : ndarray of int64, shape (hook, 2)
+    components, factors, speeds, sights, rotations, whole_rotations : ndarray of int64, \
+shape (hook, 2)
         Address of an effect's function and its row of ``effects``.
     effects : ndarray, shape (model, effect, 8)
         Parameters of the effects.
@@ -107,6 +108,7 @@ class Packed(NamedTuple):
     speeds: Ints
     sights: Ints
     rotations: Ints
+    whole_rotations: Ints
     effects: Floats
 
 
