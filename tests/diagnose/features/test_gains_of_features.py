@@ -95,6 +95,22 @@ def test_a_tilt_is_told_as_well(base, hidden):
     assert told.gain.log_p.sum() > 20
 
 
+def test_lapses_of_one_zone_are_no_effect(base, hidden):
+    """Off the walls one heading in 20 is anything at all: features begin where the model ended.
+
+    With one lapse for all zones the law of features would be tens of nats below the model's, and
+    what takes over these headings off the walls would gain them back.
+    """
+    scene, fitted = base
+    mixture, _, _ = fitted.tables()
+    off_walls = ~Law(scene=scene, fitted=fitted).follows[:, None]
+    law = hidden(lambda _: 1 + off_walls * 0.05 / (2 * math.pi) / np.maximum(mixture, 1e-12))
+    fits = Fits(law=law)
+    assert law.fitted.x[2][-1] > 10 * max(x[-1] for x in law.fitted.x[:2])
+    assert fits.null_log_p.sum() == pytest.approx(law.fitted.nats, abs=1.0)
+    assert tell(gains_of(law, all_effects())) is None
+
+
 @pytest.mark.parametrize("name", ["alignment", "turning-bias", "collective-departure"])
 def test_more_strengths_never_lose(nothing, name):
     """At worst they are zero: the log likelihood is that of the base."""

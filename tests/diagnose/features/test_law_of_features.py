@@ -30,7 +30,8 @@ def log_p_of(law):
     """Return log densities by the law's own columns."""
     at, over = (column[:, 0] for column in law.base)
     density = np.exp(law.log_here) * at / over
-    return np.log((1 - law.lapse) * density + law.lapse / (2 * math.pi))
+    lapse = law.lapses.usual
+    return np.log((1 - lapse) * density + lapse / (2 * math.pi))
 
 
 def test_the_law_is_the_fitted_one(law):
@@ -46,6 +47,7 @@ def test_the_law_is_the_fitted_one(law):
         {"directional-drift": {"strength": 0.05, "direction_rad": 1.0, "drawn": 1.0}},
         {"rear-blind-zone": {}},
         {"alignment": {"weight": 5.0, "turning": 1.0}},
+        {"alignment": {"weight": 5.0}, "group-cohesion": {"weight": 2.0, "turning": 2.0}},
     ],
     ids=str,
 )

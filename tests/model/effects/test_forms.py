@@ -10,8 +10,10 @@ import pytest
 from scipy import stats
 
 from zfcal.model.effects.base import NEIGHBOURS
+from zfcal.model.kernels.geometry import nearest_wall
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.packing import pack
+from zfcal.model.tank import tank_of
 
 HERE = (0.20, 0.77)
 XY = [HERE, (0.26, 0.77), (0.20, 0.85), (0.10, 0.77)]
@@ -312,6 +314,38 @@ def test_all_directions_may_turn_to_something(ask, name, follows):
     assert base.whole_rotation() == 0.0
     assert base.rotation() == pytest.approx(0.0 if follows else 0.1 * left)
     assert (base.factor(1.0) != base.factor(-1.0)) == bool(follows)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "follows", "weight"), [(1, 0, 2), (1, 1, 2), (2, 0, 2), (2, 1, 0)]
+)
+def test_a_drift_may_be_off_the_walls_alone(ask, drawn, follows, weight):
+    """Drawn there, and along a wall not at all."""
+    given = {"strength": 2.0, "drawn": drawn}
+    assert ask("directional-drift", given, FOLLOWS=float(follows)).component()[0] == weight
+
+
+@pytest.mark.parametrize("strength", [0.7, -0.7])
+def test_fish_may_keep_the_wall_on_one_side(ask, strength):
+    """Beside a wall at its left a fish goes on, for a bias to the left; off the walls anywhere."""
+    given = {"strength": strength, "along_walls": 2.0}
+    along = ask("turning-bias", given, FOLLOWS=1.0, TAU_X=0.0, TAU_Y=1.0)
+    assert math.log(along.factor(math.pi / 2) / along.factor(-math.pi / 2)) == pytest.approx(
+        2 * strength
+    )
+    off = ask("turning-bias", given)
+    assert off.factor(1.0) == off.factor(-1.0) == 1.0
+
+
+def test_along_the_wall_is_with_the_wall_on_the_left(two_rooms):
+    """Just below the wall at the top of the first room, and just right of that at its left."""
+    tank = tank_of(two_rooms)
+    left, _, right, top = two_rooms.outline.bounds
+    assert right > left
+    _, x, y = nearest_wall(0.22, top - 0.01, tank)
+    assert (x, y) == pytest.approx((1.0, 0.0), abs=1e-6)
+    _, x, y = nearest_wall(left + 0.01, 0.75, tank)
+    assert (x, y) == pytest.approx((0.0, 1.0), abs=1e-6)
 
 
 def test_the_bold_may_swim_into_a_zone(ask):

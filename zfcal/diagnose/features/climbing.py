@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear
 from scipy.special import logit
 
 from zfcal.arrays import Floats
+from zfcal.diagnose.features.lapses import Lapses
 from zfcal.model.extended import LAPSE
 
 _CLIMBS = 100
@@ -88,9 +89,11 @@ class Fit:
     log_p : ndarray, shape (step,)
         What it adds to the log densities; without a feature these themselves.
     peak
-        Of the search, whose last arguments but the lapse are the feature's strengths.
+        Of the search, whose last arguments but the lapses are the feature's strengths.
     n
         How many these are.
+    n_lapses
+        How many arguments after them are lapses.
     scale : ndarray, shape (argument,)
         What the search's arguments are divided by.
     factor : ndarray
@@ -101,27 +104,33 @@ class Fit:
     log_p: Floats
     peak: Peak
     n: int
+    n_lapses: int
     scale: Floats
     factor: Floats
 
     @property
     def strengths(self) -> Floats:
         """Of the feature, shape (strength,)."""
-        return self.x[len(self.x) - 1 - self.n : -1]
+        return self.x[self._own]
+
+    @property
+    def _own(self) -> slice:
+        end = len(self.peak.x) - self.n_lapses
+        return slice(end - self.n, end)
 
     @property
     def x(self) -> Floats:
-        """Strengths of all that was fitted, and the lapse."""
+        """Strengths of all that was fitted, and the lapses."""
         return self.peak.x / self.scale
 
     @property
     def interval(self) -> Floats:
         """95 % of each strength, shape (strength, 2)."""
-        return (self.peak.interval() / self.scale[:, None])[len(self.x) - 1 - self.n : -1]
+        return (self.peak.interval() / self.scale[:, None])[self._own]
 
 
 def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
-    """Return where a log likelihood is highest; the last of its arguments is the lapse.
+    """Return where a log likelihood is highest; the last of its arguments are lapses.
 
     Parameters
     ----------
@@ -130,10 +139,28 @@ def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
     x0
         Where the search begins.
     bounds
-        Of all arguments but the lapse.
+        Of all arguments but the lapses.
     """
     lapse = (float(logit(LAPSE[0])), float(logit(LAPSE[1])))
-    return climb_within(objective, x0, [*bounds, lapse])
+    return climb_within(objective, x0, [*bounds, *[lapse] * (len(x0) - len(bounds))])
+
+
+def lapses_alone(lapses: Lapses, density: Floats) -> Floats:
+    """Return the logits of lapses that are most likely where all else stays, shape (zone,).
+
+    Parameters
+    ----------
+    lapses
+        Of a law.
+    density : ndarray, shape (step,)
+        Without them.
+    """
+
+    def objective(levels: Floats) -> tuple[float, Callable[[], Floats]]:
+        value, _, slopes = lapses.mixed(density, levels)
+        return value, lambda: slopes
+
+    return climb(objective, lapses.start, []).x
 
 
 def climb_within(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:

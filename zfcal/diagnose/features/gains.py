@@ -1,6 +1,6 @@
 """What each name's features gain in likelihood.
 
-Components and turns are fitted with the base's parameters and the lapse (Wilks 1938, Annals of
+Components and turns are fitted with the base's parameters and the lapses (Wilks 1938, Annals of
 Mathematical Statistics 9: 60-62); tilts and leaving with the lapse, against the base as it is. A
 tilt that may be named has the base's parameters fitted beside it. These are taken as linear: where
 30 % of all headings had a cause of their own, fits about where the parameters had gone gained no
@@ -15,17 +15,23 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logit
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.climbing import Bounds, Fit, Objective, Peak, climb, scaled
+from zfcal.diagnose.features.climbing import (
+    Bounds,
+    Fit,
+    Objective,
+    Peak,
+    climb,
+    lapses_alone,
+    scaled,
+)
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
-from zfcal.diagnose.features.lapses import UNIFORM, log_mixed, mixed
+from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import MOST_SHARPER, Law
-from zfcal.model.extended import LAPSE
 from zfcal.model.features import (
     Component,
     Landing,
@@ -53,7 +59,7 @@ _MOST_TURN = 0.3
 _TRIED = (0.005, 0.02, 0.06)
 """Strengths of a component at which it is first asked for."""
 
-_AS_IT_IS = np.ones(1)
+_AS_IT_IS, _NONE = np.ones(1), np.zeros(0)
 
 _FITTED = 2
 """Of features of which the most promising are fitted, so many."""
@@ -152,10 +158,6 @@ class Fits:
         return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 
     @cached_property
-    def _lapse(self) -> float:
-        return float(np.clip(self.law.lapse.mean(), *LAPSE))
-
-    @cached_property
     def _null(self) -> Fit:
         """Log densities with the base's own columns alone, and where that fit ended."""
         return self._linear([], [], None)
@@ -207,7 +209,7 @@ class Fits:
     @cached_property
     def landings(self) -> Landings:
         """Fits of features of landing."""
-        made = Landings(law=self.law, lapse=self._lapse)
+        made = Landings(law=self.law)
         return made.beyond_walls() if self.off_walls else made
 
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
@@ -247,7 +249,7 @@ class Fits:
         return float(total @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ total)
 
     def _promise_of(self, columns: Columns) -> float:
-        (at, over), lapse = (each.sum(axis=1) for each in columns), self._lapse
+        (at, over), lapse = (each.sum(axis=1) for each in columns), self.law.lapses.likely
         (base_at, base_over), here = self.law.base, np.exp(self.law.log_here)
         gains = [
             float(
@@ -266,9 +268,9 @@ class Fits:
     @cached_property
     def _no_lapse(self) -> Floats:
         """Probability of each step that it was none, shape (step,)."""
-        base_at, base_over = self.law.base
-        density = (1 - self._lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
-        return np.asarray(density / (density + self._lapse * UNIFORM))
+        (base_at, base_over), lapse = self.law.base, self.law.lapses.likely
+        density = (1 - lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
+        return np.asarray(density / (density + lapse * UNIFORM))
 
     @cached_property
     def _mean_heading(self) -> Floats:
@@ -288,71 +290,64 @@ class Fits:
         scale = np.maximum(np.abs(at).mean(axis=0) / base_at.mean(), 1e-9)
         at, over = at / scale, over / scale
         here, least = np.exp(self.law.log_here), _OWN * self.law.own[1][:, 0]
+        n, lapses = at.shape[1], self.law.lapses
 
         def densities(x: Floats) -> tuple[Floats, Floats, Floats]:
-            top = np.maximum(base_at + at @ x[:-1], _LEAST * base_at)
-            whole = np.maximum(base_over + over @ x[:-1], least)
+            top = np.maximum(base_at + at @ x[:n], _LEAST * base_at)
+            whole = np.maximum(base_over + over @ x[:n], least)
             return here * top / whole, top, whole
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
             density, top, whole = densities(x)
-            value, share, slope = mixed(density, x[-1])
+            value, share, slopes = lapses.mixed(density, x[n:])
 
             def scores() -> Floats:
                 # At a floor the law does not change.
                 nothing = np.zeros_like(share)
                 by_top = np.divide(share, top, out=nothing.copy(), where=top > _LEAST * base_at)
                 by_whole = np.divide(share, whole, out=nothing, where=whole > least)
-                return np.column_stack([by_top[:, None] * at - by_whole[:, None] * over, slope])
+                return np.column_stack([by_top[:, None] * at - by_whole[:, None] * over, slopes])
 
             return value, scores
 
-        x0 = np.zeros(at.shape[1] + 1)
-        x0[-1] = logit(self._lapse)
+        x0 = np.append(np.zeros(n), lapses.start)
+        k = len(x0) - n
         if start is not None:
-            x0[: len(start) - 1], x0[-1] = start[:-1] * scale[: len(start) - 1], start[-1]
+            x0[: len(start) - k], x0[n:] = start[:-k] * scale[: len(start) - k], start[-k:]
         ranges = [scaled(pair, s) for pair, s in zip([*limits, *bounds], scale, strict=True)]
         peak = climb(objective, x0, ranges)
-        log_p = log_mixed(densities(peak.x)[0], peak.x[-1])
-        return Fit(
-            log_p=log_p, peak=peak, n=len(bounds), scale=np.append(scale, 1.0), factor=np.zeros(0)
-        )
+        log_p = lapses.log_mixed(densities(peak.x)[0], peak.x[n:])
+        return self._as_fit(log_p, peak, len(bounds), scale=np.append(scale, np.ones(k)))
 
     def tilt(self, feature: Tilt) -> Fit:
         """Return what a tilt adds to each step."""
         vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
         taken, base = self.law.turns.taken, self._untilted
-        n = len(taken)
-        whole, mean = np.empty(n), np.empty((n, 2))
+        n, lapses = vectors.shape[1], self.law.lapses
+        whole, mean = np.empty(len(taken)), np.empty((len(taken), 2))
         cells, at = self.law.cells, np.exp(self.law.log_here) * self.law.base[0][:, 0]
 
         def density(x: Floats) -> Floats:
-            vector = np.ascontiguousarray(np.einsum("sbd,b->sd", vectors, x[:-1]))
+            vector = np.ascontiguousarray(np.einsum("sbd,b->sd", vectors, x[:n]))
             tilted(cells, vector, whole, mean)
             return np.asarray(at * np.exp((vector * taken).sum(axis=1)) / whole)
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-            value, share, slope = mixed(density(x), x[-1])
+            value, share, slopes = lapses.mixed(density(x), x[n:])
             ahead = share[:, None] * (taken - mean)
-            return value, lambda: np.column_stack([np.einsum("sbd,sd->sb", vectors, ahead), slope])
+            return value, lambda: np.column_stack([np.einsum("sbd,sd->sb", vectors, ahead), slopes])
 
-        n_strengths = vectors.shape[1]
-        bounds = [(_low(feature, _MOST_TILT), _MOST_TILT)] * n_strengths
-        peak = self._climb_from_null(objective, bounds)
-        log_p = log_mixed(density(peak.x), peak.x[-1]) - base
-        factor = np.einsum("sbd,b->sd", vectors, peak.x[:-1])
-        return Fit(log_p=log_p, peak=peak, n=n_strengths, scale=_AS_IT_IS, factor=factor)
+        peak = self._climb_from_null(objective, [(_low(feature, _MOST_TILT), _MOST_TILT)] * n)
+        log_p = lapses.log_mixed(density(peak.x), peak.x[n:]) - base
+        factor = np.einsum("sbd,b->sd", vectors, peak.x[:n])
+        return self._as_fit(log_p, peak, n, factor)
 
     @cached_property
     def _untilted(self) -> Floats:
-        """Log densities by the law on cells, the lapse fitted alone."""
+        """Log densities by the law on cells, the lapses fitted alone."""
         at = np.exp(self.law.log_here) * self.law.base[0][:, 0] / self.law.cells.sum(axis=1)
 
-        def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-            value, _, slope = mixed(at, x[-1])
-            return value, lambda: slope[:, None]
-
-        return log_mixed(at, self._climb_from_null(objective, []).x[-1])
+        return self.law.lapses.log_mixed(at, lapses_alone(self.law.lapses, at))
 
     def leaving(self, feature: Leaving) -> Fit:
         """Return what a factor on landing in a zone adds, beside one for each zone left."""
@@ -364,35 +359,39 @@ class Fits:
         zones = np.unique(law.turns.zone[may])
         each = (law.turns.zone[:, None] == zones).astype(np.float64)
         weights = feature.weights(law.draws[0].seen)
-        may_ = may[:, None].astype(np.float64)
+        may_, lapses = may[:, None].astype(np.float64), law.lapses
 
         def fitted(columns: Floats) -> Fit:
+            n = columns.shape[1]
+
             def density(x: Floats) -> tuple[Floats, Floats]:
-                log_factor = columns @ x[:-1]
+                log_factor = columns @ x[:n]
                 factor = np.exp(log_factor)
                 whole = 1 - inside + inside * factor
                 return base * np.exp(log_factor * landed) / whole, inside * factor / whole
 
             def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
                 found, chance = density(x)
-                value, own, slope = mixed(found, x[-1])
+                value, own, slopes = lapses.mixed(found, x[n:])
                 ahead = own * (landed - chance)
-                return value, lambda: np.column_stack([ahead[:, None] * columns, slope])
+                return value, lambda: np.column_stack([ahead[:, None] * columns, slopes])
 
-            bounds = [(-_MOST_LEAVING, _MOST_LEAVING)] * columns.shape[1]
-            peak = self._climb_from_null(objective, bounds)
-            log_p = log_mixed(density(peak.x)[0], peak.x[-1])
-            factor = columns @ peak.x[:-1]
-            n = columns.shape[1] - len(zones)
-            return Fit(log_p=log_p, peak=peak, n=n, scale=_AS_IT_IS, factor=factor)
+            peak = self._climb_from_null(objective, [(-_MOST_LEAVING, _MOST_LEAVING)] * n)
+            log_p = lapses.log_mixed(density(peak.x)[0], peak.x[n:])
+            return self._as_fit(log_p, peak, n - len(zones), columns @ peak.x[:n])
 
         null = fitted(each * may_)
         made = fitted(np.concatenate([each, weights], axis=1) * may_)
         return replace(made, log_p=made.log_p - null.log_p)
 
     def _climb_from_null(self, objective: Objective, bounds: Sequence[tuple[float, float]]) -> Peak:
-        x0 = np.append(np.zeros(len(bounds)), logit(self._lapse))
-        return climb(objective, x0, bounds)
+        return climb(objective, np.append(np.zeros(len(bounds)), self.law.lapses.start), bounds)
+
+    def _as_fit(
+        self, log_p: Floats, peak: Peak, n: int, factor: Floats = _NONE, scale: Floats = _AS_IT_IS
+    ) -> Fit:
+        n_lapses = len(self.law.lapses.start)
+        return Fit(log_p=log_p, peak=peak, n=n, n_lapses=n_lapses, scale=scale, factor=factor)
 
 
 def _low(feature: Tilt | Turned, most: float) -> float:

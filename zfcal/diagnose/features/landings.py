@@ -17,13 +17,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, logit
+from scipy.special import chdtrc
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.climbing import Fit, climb
+from zfcal.diagnose.features.climbing import Fit, climb, lapses_alone
 from zfcal.diagnose.features.columns import Columns
-from zfcal.diagnose.features.lapses import UNIFORM, log_mixed, mixed
+from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.features import Landing, Seen
@@ -61,15 +61,12 @@ class Landings:
     ----------
     law
         Of the steps.
-    lapse
-        At which a search begins.
     walls
         Log of what all walls have in common, on each cell and at the heading taken; None where
         that is nothing.
     """
 
     law: Law
-    lapse: float
     walls: Columns | None = None
 
     def beyond_walls(self) -> Landings:
@@ -137,7 +134,7 @@ class Landings:
         """
         near = self._near(feature)
         expected = np.einsum("sc,scb->sb", self.chances[near.rows], near.cells)
-        own, lapse = self._at[near.rows], self.lapse
+        own, lapse = self._at[near.rows], self.law.lapses.likely[near.rows]
         share = (1 - lapse) * own / ((1 - lapse) * own + lapse * UNIFORM)
         return np.asarray(share[:, None] * (near.taken - expected))
 
@@ -145,37 +142,38 @@ class Landings:
         """Return a feature at the maximum, and what it adds to each step."""
         near = self._near(feature)
         chances, cells, taken = self.chances[near.rows], near.cells, near.taken
-        n = taken.shape[1]
+        n, lapses = taken.shape[1], self.law.lapses
 
         def density(x: Floats) -> tuple[Floats, Floats]:
-            bent = chances * np.exp(cells @ x[:-1])
+            bent = chances * np.exp(cells @ x[:n])
             whole = bent.sum(axis=1)
             found = self._at.copy()
-            found[near.rows] *= np.exp(taken @ x[:-1]) / whole
+            found[near.rows] *= np.exp(taken @ x[:n]) / whole
             return found, bent / whole[:, None]
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
             found, bent = density(x)
-            value, share, slope = mixed(found, x[-1])
+            value, share, slopes = lapses.mixed(found, x[n:])
 
             def scores() -> Floats:
                 made = np.zeros((len(found), len(x)))
                 expected = np.einsum("sc,scb->sb", bent, cells)
-                made[near.rows, :-1] = share[near.rows, None] * (taken - expected)
-                made[:, -1] = slope
+                made[near.rows, :n] = share[near.rows, None] * (taken - expected)
+                made[:, n:] = slopes
                 return made
 
             return value, scores
 
-        nothing = climb(lambda x: _lapse_alone(self._at, x), np.array([logit(self.lapse)]), [])
-        peak = climb(objective, np.append(np.zeros(n), nothing.x), [(-_MOST, _MOST)] * n)
-        log_p = log_mixed(density(peak.x)[0], peak.x[-1])
+        nothing = lapses_alone(lapses, self._at)
+        peak = climb(objective, np.append(np.zeros(n), nothing), [(-_MOST, _MOST)] * n)
+        log_p = lapses.log_mixed(density(peak.x)[0], peak.x[n:])
         return Fit(
-            log_p=log_p - log_mixed(self._at, nothing.x[-1]),
+            log_p=log_p - lapses.log_mixed(self._at, nothing),
             peak=peak,
             n=n,
+            n_lapses=len(nothing),
             scale=np.ones(1),
-            factor=peak.x[:-1],
+            factor=peak.x[:n],
         )
 
     def bent(self, feature: Landing, fit: Fit) -> tuple[Floats, Floats]:
@@ -220,8 +218,3 @@ def _ways() -> Floats:
     """Return the headings of the cells, shape (cell, 2)."""
     angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
-def _lapse_alone(at: Floats, x: Floats) -> tuple[float, Callable[[], Floats]]:
-    value, _, slope = mixed(at, x[-1])
-    return value, lambda: slope[:, None]

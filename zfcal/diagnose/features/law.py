@@ -24,6 +24,7 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.columns import Columns, less, weighed
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
+from zfcal.diagnose.features.lapses import Lapses
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.directions import turned_by
 from zfcal.model.features import Component, Sharper, Turned
@@ -123,9 +124,9 @@ class Law:
         return np.asarray(self._x[:, 2] * SCALES[2])
 
     @cached_property
-    def lapse(self) -> Floats:
-        """Share of headings drawn from anywhere, shape (step,)."""
-        return np.asarray(self._x[:, -1])
+    def lapses(self) -> Lapses:
+        """Shares of headings drawn from anywhere."""
+        return Lapses(usual=self._x[:, -1], zone=self.turns.zone)
 
     @cached_property
     def weight(self) -> Floats:

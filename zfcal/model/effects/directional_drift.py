@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -31,8 +32,10 @@ _MOST = 4.0
 
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Add a component about the direction."""
+    """Add a component about the direction, or one off the walls alone."""
     out[0], out[1], out[2] = math.cos(parameters[1]), math.sin(parameters[1]), parameters[4]
+    if parameters[3] > 1.0 and state[FOLLOWS * n + i] > 0.0:
+        return 0.0
     return parameters[0] if parameters[3] > 0.0 and not parameters[5] > 0.0 else 0.0
 
 
@@ -70,6 +73,13 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
         return 0.0
     aside = sine_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
     return RAD_PER_STRENGTH * parameters[0] * aside
+
+
+def _idle(values: Mapping[str, float]) -> tuple[str, ...]:
+    """Return what does nothing: slowness where fish do not lean, kappa where none are drawn."""
+    is_drawn = values["drawn"] > 0 and not values["turning"] > 0
+    leans = not values["drawn"] + values["turning"] > 0
+    return (*(() if leans else ("by_slowness",)), *(() if is_drawn else ("kappa",)))
 
 
 _DIRECTIONS = tuple(float(angle) for angle in np.arange(6) * np.pi / 3)
@@ -188,10 +198,10 @@ EFFECT = Effect(
         EffectParameter(
             name="drawn",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="0: all headings lean that way; 1: some are drawn about it, with the strength as "
-            "their weight beside the base's one.",
+            "their weight beside the base's one; 2: so are they off the walls alone.",
         ),
         EffectParameter(
             name="kappa",
@@ -219,11 +229,11 @@ EFFECT = Effect(
     whole_rotation=whole_rotation,
     further_shapes=lambda _arena: tuple(
         {"direction_rad": eighth * math.pi / 4, **form}
-        for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
+        for form in ({"drawn": 1.0}, {"drawn": 2.0}, {"turning": 1.0}, {"turning": 2.0})
         for eighth in range(-3, 5)
     ),
-    fixed=("drawn", "kappa", "turning"),
-    idle=lambda values: ("by_slowness",) if values["drawn"] + values["turning"] > 0 else (),
+    fixed=("drawn", "turning"),
+    idle=_idle,
     needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     shown_against="wall",
     features=lambda _arena: _FEATURES,

@@ -303,7 +303,8 @@ EFFECT = Effect(
         for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
         for x, y in places(arena)
     ),
-    fixed=("drawn", "kappa", "turning"),
+    fixed=("drawn", "turning"),
+    idle=lambda values: () if values["drawn"] > 0 and not values["turning"] > 0 else ("kappa",),
     needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.

@@ -14,7 +14,7 @@ from zfcal.model.effects.weights import only
 from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
-from zfcal.model.kernels.state import FOLLOWS, HX, HY
+from zfcal.model.kernels.state import FOLLOWS, HX, HY, TAU_X, TAU_Y
 
 _KAPPA = 4.0
 _PER_STRENGTH = 0.1
@@ -23,9 +23,16 @@ _ASIDE_DEGREES = (30, 60, 90, 135)
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the sine of the turn that they are; left is positive."""
+    """Weigh headings by the sine of the turn that they are; left is positive.
+
+    Or those along walls by which side the wall is on.
+    """
     if parameters[2] > 0.0 or parameters[3] > 0.0:
         return 1.0
+    if parameters[1] > 1.0:
+        if not state[FOLLOWS * n + i] > 0.0:
+            return 1.0
+        return tilt(parameters[0], ux * state[TAU_X * n + i] + uy * state[TAU_Y * n + i], 1.0)
     return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
 
 
@@ -111,10 +118,10 @@ EFFECT = Effect(
         EffectParameter(
             name="along_walls",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="0: left of the present heading everywhere; 1: where fish follow walls, left of "
-            "the way along the wall.",
+            "the way along the wall; 2: there alone, the way with the wall on the left.",
         ),
         EffectParameter(
             name="drawn",
@@ -139,7 +146,7 @@ EFFECT = Effect(
     harmonics=2,
     shapes=lambda _arena: ({"along_walls": 0.0}, {"along_walls": 1.0}),
     rotation=rotation,
-    further_shapes=lambda _arena: ({"drawn": 1.0}, {"turning": 1.0}),
+    further_shapes=lambda _arena: ({"drawn": 1.0}, {"turning": 1.0}, {"along_walls": 2.0}),
     fixed=("along_walls", "drawn", "turning"),
     needs={"component": ("drawn",), "rotation": ("turning",)},
     shown_against="wall",
