@@ -22,8 +22,8 @@ BINS = 33
 """Bins of speed in three zones that base fish reach."""
 
 
-@pytest.mark.parametrize("base", ["natural", "shifted"])
-@pytest.mark.parametrize("arena", ["two-rooms", "rectangle"])
+@pytest.mark.parametrize("base", ["natural", pytest.param("shifted", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("arena", ["two-rooms", pytest.param("rectangle", marks=pytest.mark.slow)])
 def test_base_fish_are_worth_no_nats(base, arena):
     """The best fit beats the truth, by half a nat a parameter on average.
 

@@ -56,6 +56,7 @@ def at_wall(arena):
     return found
 
 
+@pytest.mark.slow
 def test_a_band_along_a_wall_is_a_place(banded):
     """A preference with an edge: no tilt toward the wall sees half as much."""
     gains = gains_of(banded, all_effects())
@@ -127,19 +128,29 @@ def test_where_nobody_lands_is_shunned(base, worlds):
     assert fit.log_p.sum() > 5
 
 
-def test_what_all_walls_have_in_common_is_no_place(base, worlds):
-    """Middles of bodies keep off every wall: each wall is shunned by itself, and no more."""
+@pytest.fixture(scope="module")
+def bodies(base, worlds):
+    """Return the law of fish whose middles keep 25 mm off every wall."""
     scene, fitted = base
     ends = ends_of(scene)
     factor = np.where(scene.arena.wall_distance(ends) < 0.025, 1e-9, 1.0)
     drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
-    law = Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
-    walls = at_wall(law.scene.arena)
-    alone = Fits(law=law).gain("place-preference", walls)
-    beside = Fits(law=law, off_walls=True).gain("place-preference", walls)
+    return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+
+
+def test_what_all_walls_have_in_common_is_no_place(bodies):
+    """Each wall is shunned by itself, and no more than the others."""
+    walls = at_wall(bodies.scene.arena)
+    alone = Fits(law=bodies).gain("place-preference", walls)
+    beside = Fits(law=bodies, off_walls=True).gain("place-preference", walls)
     assert alone.nats > 10
     assert beside.nats < 2
-    told = tell(gains_of(law, all_effects()))
+
+
+@pytest.mark.slow
+def test_bodies_that_keep_off_walls_have_no_landing_named(bodies):
+    """All landings are asked beside what all walls have in common, where one stands out."""
+    told = tell(gains_of(bodies, all_effects()))
     assert told is None or "landing" not in told.gain.label
 
 
