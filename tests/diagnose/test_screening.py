@@ -116,6 +116,20 @@ def test_an_effect_in_the_model_is_silent(screen, tank, candidate):
     assert abs(left.z) < 0.5
 
 
+def test_components_are_asked_for_where_a_whole_turn_would_draw_them(base, candidate):
+    """The score of a component is what the model with it gains, in a model that turns all ways."""
+    given = {"strength": 4.0, "direction_rad": 1.0, "turning": 2.0}
+    model = with_effect(base.fitted.parameters, "directional-drift", given)
+    fitted = maximise(base.scene, model, start=base.fitted.x, rounds=0)
+    asked = candidate("alignment", kappa=20.0)
+    added = with_effect(fitted.parameters, "alignment", asked.values(asked.notable))
+    gained = maximise(base.scene, added, start=fitted.x, rounds=0).log_p - fitted.log_p
+    scores = Screen(scene=base.scene, fitted=fitted).heading_scores(base.scene, asked)
+    known = np.isfinite(gained)
+    likely = np.tanh(asked.notable * scores[known])
+    assert np.corrcoef(likely, np.tanh(gained[known]))[0, 1] > 0.8
+
+
 def test_a_mirrored_bias_has_the_other_sign(screen, candidate):
     """Left and right differ by nothing else: like sizes of z, other signs."""
     left = screen(23, {"turning-bias": {"strength": 0.4}}).ask(candidate("turning-bias"))

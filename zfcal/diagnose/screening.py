@@ -189,6 +189,8 @@ class Screen:
         shape = candidate.values(strong)
         if effect.calls("component", shape):
             parts = components_of(scene, at(strong), angle)
+            if len(fitted.view.whole_rad):
+                parts[:, :, 1:3] = turned_by(parts[:, :, 1:3], fitted.view.whole_rad[:, None])
             component_score(parts, scene.turns.taken, *tables.mixtures(), some)
             total += some / strong
         if effect.sight is not None:

@@ -14,6 +14,7 @@ from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
+from zfcal.model.effects.weights import attended, evenly
 from zfcal.model.extended import maximise, with_effect
 from zfcal.model.features import LAGS, Component, Sharper, Turned
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
@@ -283,3 +284,19 @@ def test_headings_of_steps_before_are_known_up_to_a_gap(base):
     assert not found[LAGS.index(2), :2].any()
     assert found[LAGS.index(4), 2].any()
     assert not found[LAGS.index(5), 2].any()
+
+
+def test_what_is_drawn_turns_with_the_whole_law(base):
+    """Where an effect turns all directions, features of attention are about these.
+
+    So what takes the place of neighbours takes away the very components that the law has of them.
+    """
+    scene, plain = base
+    given = {"strength": 4.0, "direction_rad": 1.0, "turning": 2.0}
+    model = with_effect(plain.parameters, "directional-drift", given)
+    law = Law(scene=scene, fitted=maximise(scene, model, start=plain.x, rounds=0))
+    own = Component(
+        label="as seen", toward="toward", weights=attended(evenly), kappa="neighbours"
+    )  # fmt: skip
+    for made, known in zip(law.component(own), law._neighbours(), strict=True):
+        np.testing.assert_allclose(made, known, rtol=1e-6, atol=1e-9)

@@ -327,11 +327,14 @@ def test_a_drift_may_be_off_the_walls_alone(ask, drawn, follows, weight):
 
 @pytest.mark.parametrize("strength", [0.7, -0.7])
 def test_fish_may_keep_the_wall_on_one_side(ask, strength):
-    """Beside a wall at its left a fish goes on, for a bias to the left; off the walls anywhere."""
+    """Along tau it has the wall on its left: so it goes for a bias to the right.
+
+    A fish that turns left goes round a tank with the wall on its right.
+    """
     given = {"strength": strength, "along_walls": 2.0}
     along = ask("turning-bias", given, FOLLOWS=1.0, TAU_X=0.0, TAU_Y=1.0)
     assert math.log(along.factor(math.pi / 2) / along.factor(-math.pi / 2)) == pytest.approx(
-        2 * strength
+        -2 * strength
     )
     off = ask("turning-bias", given)
     assert off.factor(1.0) == off.factor(-1.0) == 1.0
@@ -344,8 +347,9 @@ def test_along_the_wall_is_with_the_wall_on_the_left(two_rooms):
     assert right > left
     _, x, y = nearest_wall(0.22, top - 0.01, tank)
     assert (x, y) == pytest.approx((1.0, 0.0), abs=1e-6)
-    _, x, y = nearest_wall(left + 0.01, 0.75, tank)
-    assert (x, y) == pytest.approx((0.0, 1.0), abs=1e-6)
+    for off_m in (0.01, 1e-6, 1e-10):
+        _, x, y = nearest_wall(left + off_m, 0.75, tank)
+        assert (x, y) == pytest.approx((0.0, 1.0), abs=1e-6)
 
 
 def test_the_bold_may_swim_into_a_zone(ask):

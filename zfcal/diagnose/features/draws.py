@@ -96,12 +96,24 @@ class Draw:
         Directions of the base law; the second is zero where there is one.
     toward, angle_sr : ndarray, shape (step, source, 2) and (step, source)
         As the model draws to others, effects on sight and all.
+    whole_rad : ndarray, shape (step,)
+        Angle by which its effects turn all directions; empty for none.
     """
 
     seen: Seen
     base: Floats
     toward: Floats
     angle_sr: Floats
+    whole_rad: Floats
+
+    def as_drawn(self, ways: Floats) -> Floats:
+        """Return where a component is drawn to that is about some directions that were seen.
+
+        Parameters
+        ----------
+        ways : ndarray, shape (step, source, 2)
+        """
+        return turned_by(ways, self.whole_rad[:, None]) if len(self.whole_rad) else ways
 
 
 def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
@@ -183,13 +195,15 @@ def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
         spin = view.spin[steps.rows]
         base = turned_by(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
     toward, angle = view.toward[steps.rows], view.angle_sr[steps.rows]
+    whole = view.whole_rad[steps.rows] if len(view.whole_rad) else view.whole_rad
     if not back.any():
-        return Draw(seen=seen, base=base, toward=toward, angle_sr=angle)
+        return Draw(seen=seen, base=base, toward=toward, angle_sr=angle, whole_rad=whole)
     return Draw(
         seen=_turned_back(seen, back),
         base=turned_by(base, back[:, None]),
         toward=turned_by(toward, back[:, None]),
         angle_sr=angle,
+        whole_rad=whole,
     )
 
 

@@ -244,13 +244,14 @@ class Law:
 
     def _bells_of(self, feature: Component, draw: Draw) -> Columns:
         if not isinstance(feature.toward, str):
-            return self.bells(feature.toward(draw.seen), self._kappa(feature.kappa))
+            return self.bells(draw.as_drawn(feature.toward(draw.seen)), self._kappa(feature.kappa))
         return self._kept_bells(draw, feature.toward, feature.kappa)
 
     def _kept_bells(self, draw: Draw, toward: str, kappa: float | str) -> Columns:
         key = (id(draw), toward, kappa)
         if key not in self._kept:
-            self._kept[key] = self.bells(getattr(draw.seen, toward), self._kappa(kappa))
+            ways = draw.as_drawn(getattr(draw.seen, toward))
+            self._kept[key] = self.bells(ways, self._kappa(kappa))
         return self._kept[key]
 
     @cached_property

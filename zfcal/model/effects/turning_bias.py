@@ -32,7 +32,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     if parameters[1] > 1.0:
         if not state[FOLLOWS * n + i] > 0.0:
             return 1.0
-        return tilt(parameters[0], ux * state[TAU_X * n + i] + uy * state[TAU_Y * n + i], 1.0)
+        return tilt(parameters[0], -ux * state[TAU_X * n + i] - uy * state[TAU_Y * n + i], 1.0)
     return tilt(parameters[0], leftward(state, n, i, ux, uy, parameters[1]), 1.0)
 
 
@@ -121,7 +121,8 @@ EFFECT = Effect(
             high=2.0,
             default=0.0,
             says="0: left of the present heading everywhere; 1: where fish follow walls, left of "
-            "the way along the wall; 2: there alone, the way with the wall on the left.",
+            "the way along the wall; 2: there alone, the way with the wall on the right, which is "
+            "how fish go round that turn left.",
         ),
         EffectParameter(
             name="drawn",

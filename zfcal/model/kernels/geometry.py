@@ -24,6 +24,9 @@ FINE = 8
 ON_WALL_M = 1e-9
 """So near to the wall the direction along it is the segment's own."""
 
+_ASIDE_M = 1e-6
+"""So far from it one looks on which side the inside is."""
+
 _TOUCH_M = 1e-12
 """A point so near to the wall is on it, hence inside; rounding is far smaller."""
 
@@ -216,8 +219,8 @@ def nearest_wall(x: float, y: float, tank: Tank) -> tuple[float, float, float]:
     -------
     distance_m : float
     tau_x, tau_y : float
-        Unit vector perpendicular to the line to the nearest point of the wall;
-        the segment's own direction for a point on the wall.
+        Unit vector perpendicular to the line to the nearest point of the wall, which is at its
+        left, for a point on the wall as well.
     """
     near = tank.nearest[int((y - tank.y0_m) * tank.per_m), int((x - tank.x0_m) * tank.per_m)]
     if near < 0:
@@ -229,6 +232,8 @@ def nearest_wall(x: float, y: float, tank: Tank) -> tuple[float, float, float]:
     distance = math.sqrt(ex * ex + ey * ey)
     if distance < ON_WALL_M:
         tau_x, tau_y = along_x / tank.walls[near, 5], along_y / tank.walls[near, 5]
+        if zone_of(x - _ASIDE_M * tau_y, y + _ASIDE_M * tau_x, tank) > 0:
+            tau_x, tau_y = -tau_x, -tau_y
     else:
         tau_x, tau_y = -ey / distance, ex / distance
     return distance, tau_x, tau_y
