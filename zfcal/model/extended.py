@@ -331,8 +331,7 @@ def limits_of(x: Floats, turns: ZoneTurns, bounds: Bounds) -> tuple[Floats, Floa
 def _shifted(x: Floats, by: Floats, turns: ZoneTurns, bounds: Bounds) -> Floats:
     """Return a zone's parameters moved within their limits, the largest log gamma zero.
 
-    At a kappa or an alpha of zero the mixture's slope says nothing: they are approached step by
-    step, as effects are.
+    At a kappa or an alpha of zero the slope says nothing: as effects they come near it by steps.
     """
     moved = x + by
     moved[:3] = np.maximum(moved[:3], _SHRINK * x[:3])

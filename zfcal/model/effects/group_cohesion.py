@@ -104,28 +104,28 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     return tilt(parameters[0] * leaning * grown(away_m, parameters[2]), x * ux + y * uy, 1.0)
 
 
-@hook(ROTATION)
-def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Turn to that bearing by the sine of the angle to it; not along a wall."""
-    if not of_base(parameters[6]):
-        return 0.0
+@inlined
+def turned_rad(
+    state: Hooked, n: int, i: int, parameters: Hooked, along_walls: bool
+) -> float:  # fmt: skip
+    """Return by how much fish turn to that bearing: by the sine of the angle to it."""
     x, y, away_m = middle(state, n, i, parameters[5])
     if not away_m > 0.0:
         return 0.0
-    pull = parameters[0] * grown(away_m, parameters[2])
-    return RAD_PER_STRENGTH * pull * turn_to(state, n, i, x, y)
+    pull = RAD_PER_STRENGTH * parameters[0] * grown(away_m, parameters[2])
+    return pull * (sine_to(state, n, i, x, y) if along_walls else turn_to(state, n, i, x, y))
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn the base's directions to that bearing; not along a wall."""
+    return turned_rad(state, n, i, parameters, False) if of_base(parameters[6]) else 0.0
 
 
 @hook(ROTATION)
 def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn all directions to that bearing, along walls too."""
-    if not parameters[6] > 1.0:
-        return 0.0
-    x, y, away_m = middle(state, n, i, parameters[5])
-    if not away_m > 0.0:
-        return 0.0
-    pull = parameters[0] * grown(away_m, parameters[2])
-    return RAD_PER_STRENGTH * pull * sine_to(state, n, i, x, y)
+    return turned_rad(state, n, i, parameters, True) if parameters[6] > 1.0 else 0.0
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
