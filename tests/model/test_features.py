@@ -2,14 +2,16 @@
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapely
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.directions import left_of
+from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects import all_effects, find_effect
+from zfcal.model.effects.weights import each_fish
 from zfcal.model.features import (
     AWAY_M,
     LAGS,
@@ -23,6 +25,7 @@ from zfcal.model.features import (
     Turned,
 )
 from zfcal.model.hats import hats
+from zfcal.model.kernels.rooms import find_rooms
 
 N, OTHERS = 6, 3
 _OF_OTHERS = ("here", "speed_m_s", "lately_m_s", "distance_m", "off_axis_rad", "is_robot")
@@ -289,12 +292,17 @@ def test_what_all_do_alike_is_gained_over(arena, seen):
     for name, label in (
         ("boldness", "drawn to the way out, by who"),
         ("boldness", "turning to the way out, by who"),
+        ("boldness", "leaning to the way out, by who"),
         ("leader-following", "leaning to the fast"),
     ):  # fmt: skip
         own = labelled(name, label, arena)
         assert type(own.over) is type(own)
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     near = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
+    leaning = labelled("boldness", "leaning to the way out, by who", arena)
+    np.testing.assert_allclose(
+        leaning.vectors(near).sum(axis=1, keepdims=True), leaning.over.vectors(near)
+    )
     drawn = labelled("boldness", "drawn to the way out, by who", arena)
     np.testing.assert_allclose(
         drawn.weights(near).sum(axis=-1, keepdims=True), drawn.over.weights(near)
@@ -344,12 +352,14 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     """At a strength of one all attention goes to where the others were, or the fish itself too."""
     late = features_of("reaction-delay", arena)
     for each in late:
-        assert each.instead is True or each.instead(seen).sum() == pytest.approx(
-            seen.attention.sum()
-        )
+        if each.instead is not True:
+            taken, far = each.instead(seen), seen.distance_m[..., None] > 0.06
+            np.testing.assert_array_equal(taken, each.weights(seen))
+            assert (taken.sum(axis=-1) <= 2 * seen.attention + 1e-12).all()
+            assert (taken * far > 0).any()
         assert each.low == 0.0
         # Three tenths of a step are three times one.
-        assert each.high == (3.0 if each.label == "a tenth of a step" else 1.0)
+        assert each.high == (3.0 if each.label.startswith("a tenth of a step") else 1.0)
     for k, lag in enumerate(LAGS):
         here, there = late[4 + k], late[4 + len(LAGS) + k]
         assert (here.label, there.label) == (f"{lag} steps", f"{lag} steps, from there")
@@ -572,6 +582,7 @@ def test_who_is_alone_has_no_features_of_others(arena, seen):
         **{name: values[:, :0] for name, values in shapes.items()},
         attention=seen.attention[:, :0],
         bearing=seen.bearing[:, :0],
+        heading=seen.heading[:, :0],
         other=seen.other[:, :0],
     )
     assert none.nearest.shape == (N, 0, 1)
@@ -579,3 +590,137 @@ def test_who_is_alone_has_no_features_of_others(arena, seen):
         for some in each.features if isinstance(each, OneOf) else (each,):
             made = some.vectors(none) if isinstance(some, Tilt) else some.weights(none)
             assert not made.any()
+
+
+def test_all_that_are_no_long_track_are_one_fish(seen):
+    """Each step is of one fish, and the longest tracks have one each."""
+    many = dataclasses.replace(seen, track=np.array([7, 7, 7, 2, 2, 1], dtype=np.int32))
+    np.testing.assert_array_equal(
+        each_fish(many), [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    )
+    found = each_fish(SimpleNamespace(track=np.arange(40, dtype=np.int32)))
+    assert found.shape == (40, 12)
+    np.testing.assert_array_equal(found.sum(axis=1), 1.0)
+    np.testing.assert_array_equal(found.sum(axis=0), [1.0] * 11 + [29.0])
+
+
+def test_a_bias_may_be_each_ones_own(arena, seen):
+    """Some lean to the left, others to the right: no strength is shared."""
+    leaning = labelled("turning-bias", "leaning, by who", arena).vectors(seen)
+    for step, track in enumerate(seen.track):
+        own = np.flatnonzero(leaning[step].any(axis=1))
+        assert len(own) == 1
+        np.testing.assert_allclose(leaning[step, own[0]], left_of(seen.own_heading)[step])
+        others = leaning[seen.track != track]
+        assert not others[:, own[0]].any()
+
+
+def test_what_draws_may_wander_or_be_an_axis(arena, seen):
+    """Hat functions of the time with a direction each; twice the angle of an axis."""
+    wandering = labelled("directional-drift", "leaning, by the time", arena).vectors(seen)
+    assert wandering.shape == (N, 6, 2)
+    np.testing.assert_allclose(wandering[0], [[1, 0], [0, 1], *4 * [[0, 0]]])
+    np.testing.assert_allclose(wandering[-1], [*4 * [[0, 0]], [1, 0], [0, 1]])
+    axis = labelled("directional-drift", "leaning along an axis", arena)
+    assert axis.axial
+    turned = dataclasses.replace(seen, x_axis=np.tile([0.0, 1.0], (N, 1)))
+    np.testing.assert_allclose(axis.vectors(seen), -axis.vectors(turned), atol=1e-12)
+
+
+def test_half_way_is_between_the_own_heading_and_anothers(arena, seen):
+    """The same angle from both; nothing where nobody is."""
+    drawn = labelled("alignment", "drawn half-way", arena)
+    between = drawn.toward(seen)
+    by_own = np.einsum("sjd,sd->sj", between, seen.own_heading)
+    by_other = np.einsum("sjd,sjd->sj", between, seen.heading)
+    np.testing.assert_allclose(by_own, by_other)
+    np.testing.assert_allclose(np.linalg.norm(between, axis=-1), 1.0)
+    nobody = dataclasses.replace(seen, heading=np.zeros_like(seen.heading))
+    assert not drawn.toward(nobody).any()
+
+
+def test_along_a_wall_fish_may_go_as_others_do(arena, seen):
+    """By the mean of those in view; off the walls nothing, and what one sense gains one loses."""
+    feature = labelled("alignment", "along the wall as others do", arena)
+    with_wall = np.repeat(seen.along_wall[:, None], OTHERS, axis=1)
+    same = dataclasses.replace(seen, heading=with_wall, in_sight=np.ones((N, OTHERS), dtype=bool))
+    weights = feature.weights(same)
+    np.testing.assert_allclose(weights[:, 0, 1], np.where(seen.follows_walls, 0.5, 0.0))
+    np.testing.assert_array_equal(weights[:, 0], -weights[:, 1])
+    unseen = dataclasses.replace(same, in_sight=np.zeros((N, OTHERS), dtype=bool))
+    assert not feature.weights(unseen).any()
+
+
+def test_who_swims_the_way_of_the_fish_leads_it(arena, seen):
+    """Straight ahead with its heading all of it; behind, or against it, nothing."""
+    feature = labelled("leader-following", "who is ahead and swims its way", arena)
+    own = np.repeat(seen.own_heading[:, None], OTHERS, axis=1)
+    ahead = dataclasses.replace(seen, heading=own, off_axis_rad=np.zeros((N, OTHERS)))
+    np.testing.assert_allclose(feature.weights(ahead)[..., 0], seen.attention)
+    behind = dataclasses.replace(ahead, off_axis_rad=np.full((N, OTHERS), 2.0))
+    assert not feature.weights(behind).any()
+    assert not feature.weights(dataclasses.replace(ahead, heading=-own)).any()
+
+
+def test_the_fastest_in_view_draws_from_a_speed_on(arena, seen):
+    """One of those in view, and none where all are slow."""
+    feature = labelled("leader-following", "drawn to the fastest in view, from 0.09 m/s on", arena)
+    quick = dataclasses.replace(seen, speed_m_s=np.tile([0.1, 0.15, 0.12], (N, 1)))
+    np.testing.assert_array_equal(feature.weights(quick)[..., 0], np.tile([0.0, 1, 0], (N, 1)))
+    hidden = dataclasses.replace(quick, attention=np.tile([1.0, 0, 1], (N, 1)))
+    np.testing.assert_array_equal(feature.weights(hidden)[..., 0], np.tile([0.0, 0, 1], (N, 1)))
+    slow = dataclasses.replace(seen, speed_m_s=np.full((N, OTHERS), 0.08))
+    assert not feature.weights(slow).any()
+
+
+def test_old_headings_and_turns_to_one_side_draw(arena, seen):
+    """To where the fish was heading; on from where it heads, to the side of its last turn."""
+    old = labelled("turning-memory", "drawn to the heading 3 steps before, everywhere", arena)
+    np.testing.assert_array_equal(old.toward(seen)[:, 0], seen.ago_heading[2])
+    assert (old.weights(seen) == 1).all()
+    on = labelled("turning-memory", "drawn 50 degrees on, after two turns to one side", arena)
+    before = turned_by(seen.own_heading, -0.3)
+    for turn_before, weight in ((0.2, 1.0), (-0.2, 0.0), (0.01, 0.0)):
+        ago = seen.ago_heading.copy()
+        ago[0], ago[1] = before, turned_by(before, -turn_before)
+        known = dataclasses.replace(seen, ago_heading=ago, last_turn_rad=np.full(N, 0.3))
+        assert (on.weights(known) == weight).all()
+        np.testing.assert_allclose(
+            on.toward(known)[:, 0], turned_by(seen.own_heading, np.radians(50))
+        )
+
+
+def test_tenths_of_a_step_count_by_distance_time_and_turn(arena, seen):
+    """Each with a share of its own; those next to the fish are felt at once."""
+    near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.05))
+    far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
+    for label, cue in (("by the time", seen.time), ("by the last turn", abs(seen.last_turn_rad))):
+        feature = labelled("reaction-delay", f"a tenth of a step, {label}", arena)
+        assert not feature.weights(near).any()
+        weights = feature.weights(far)
+        np.testing.assert_allclose(weights[..., 0], seen.attention)
+        np.testing.assert_allclose(weights[..., 1], seen.attention * cue[:, None])
+        assert feature.instead is feature.weights
+    by_distance = labelled("reaction-delay", "a tenth of a step, by distance", arena)
+    near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.03))
+    np.testing.assert_allclose(by_distance.weights(near)[..., 0], seen.attention)
+
+
+def test_others_in_another_room_are_a_share(arena, seen):
+    """Two of three are in the other room; between the rooms nobody is elsewhere."""
+    feature = labelled("collective-departure", "others elsewhere", arena)
+    one, other = (room.representative_point() for room in find_rooms(arena)[1])
+    there = np.array([(one.x, one.y), (other.x, other.y), (other.x, other.y)])
+
+    def weights(x, y):
+        apart = there - (x, y)
+        far = np.linalg.norm(apart, axis=1)
+        moved = dataclasses.replace(
+            seen, xy_m=np.tile((x, y), (N, 1)), distance_m=np.tile(far, (N, 1)),
+            bearing=np.tile(apart / np.maximum(far, 1e-9)[:, None], (N, 1, 1)),
+        )  # fmt: skip
+        return feature.weights(moved)
+
+    np.testing.assert_allclose(weights(one.x, one.y), 2 / 3)
+    (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
+    assert not weights(*between.centroid.coords[0]).any()

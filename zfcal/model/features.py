@@ -219,6 +219,9 @@ class Tilt:
         Tells it from other features of the effect.
     vectors
         Direction times weight, shape (step, weight, 2).
+    axial
+        Whether the factor is exp(strength cos 2(heading - axis)): both ways of an axis alike.
+        Vectors then have twice the angle of the axis.
     low
         Lower bound of the strengths, where the opposite is no form of the effect.
     along
@@ -229,6 +232,7 @@ class Tilt:
 
     label: str
     vectors: Weights
+    axial: bool = False
     low: float | None = None
     along: Along | None = None
     over: Tilt | None = None

@@ -95,6 +95,20 @@ def test_a_tilt_is_told_as_well(base, hidden):
     assert told.gain.log_p.sum() > 20
 
 
+def test_a_tilt_along_an_axis_is_told(hidden):
+    """As many go one way as the other: no direction of its own is preferred."""
+    law = hidden(lambda angle: np.exp(0.25 * np.cos(2 * (angle - 0.8))))
+    told = tell(gains_of(law, all_effects()))
+    assert (told.gain.name, told.gain.label) == ("directional-drift", "leaning along an axis")
+    feature = Tilt(
+        label="x", vectors=lambda seen: np.broadcast_to(np.eye(2), (len(seen.zone), 2, 2)),
+        axial=True,
+    )  # fmt: skip
+    fit = Fits(law=law).tilt(feature)
+    expected = 0.25 * np.array([math.cos(1.6), math.sin(1.6)])
+    np.testing.assert_allclose(fit.strengths, expected, atol=0.09)
+
+
 def test_lapses_of_one_zone_are_no_effect(base, hidden):
     """Off the walls one heading in 20 is anything at all: features begin where the model ended.
 

@@ -8,9 +8,9 @@ import pytest
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.gains import Fits
-from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import tell
+from zfcal.diagnose.features.ways import leaned
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.features import Landing, OneOf, Tilt
@@ -166,7 +166,7 @@ def test_a_tilt_and_a_landing_bend_the_law_alike(nothing):
     """A factor on cells, by its logs there and at the heading taken."""
     law = nothing.law
     east = Tilt(label="east", vectors=lambda seen: seen.x_axis[:, None])
-    cells, taken = leaned(law, 0.3 * east.vectors(law.draws[0].seen)[:, 0])
+    cells, taken = leaned(law, east, 0.3 * east.vectors(law.draws[0].seen)[:, 0])
     bent = law.absorbing(bent=(cells, taken))
     np.testing.assert_allclose(taken, 0.3 * law.turns.taken[:, 0], rtol=1e-6)
     whole = (law.cells * np.exp(cells)).sum(axis=1)

@@ -9,14 +9,14 @@ from scipy.special import i0e, ndtr
 
 from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
-from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
+from zfcal.diagnose.features.ways import leaned
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
 from zfcal.model.effects.weights import attended, evenly
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.features import LAGS, Component, Sharper, Turned
+from zfcal.model.features import LAGS, Component, Sharper, Tilt, Turned
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -117,7 +117,7 @@ def test_tilts_by_plain_numpy():
     ways = np.stack([np.cos(grid), np.sin(grid)], axis=-1)
     plain = density * np.exp(vector @ ways.T)
     whole, mean = np.empty(3), np.empty((3, 2))
-    tilted(density, vector, whole, mean)
+    tilted(density, ways, vector, whole, mean)
     np.testing.assert_allclose(whole, plain.sum(axis=1))
     np.testing.assert_allclose(mean, plain @ ways / plain.sum(axis=1)[:, None])
 
@@ -244,10 +244,11 @@ def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
     scene, fitted = base
     law = Law(scene=scene, fitted=fitted, noise_m=5e-4, n_draws=2)
     rng = np.random.default_rng(2)
+    tilt = Tilt(label="x", vectors=lambda seen: seen.own_heading[:, None])
     leaning, leaving = rng.normal(0, 0.1, (len(law.rows), 2)), rng.normal(0, 0.1, len(law.rows))
-    once = law.absorbing(bent=leaned(law, leaning), leaving=(law.between, leaving))
-    half = law.absorbing(bent=leaned(law, leaning / 2))
-    twice = half.absorbing(bent=leaned(law, leaning / 2), leaving=(law.between, leaving))
+    once = law.absorbing(bent=leaned(law, tilt, leaning), leaving=(law.between, leaving))
+    half = law.absorbing(bent=leaned(law, tilt, leaning / 2))
+    twice = half.absorbing(bent=leaned(law, tilt, leaning / 2), leaving=(law.between, leaving))
     assert twice.draws is law.draws
     np.testing.assert_allclose(once.cells, twice.cells)
     np.testing.assert_allclose(once.log_here, twice.log_here)

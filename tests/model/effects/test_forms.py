@@ -376,3 +376,73 @@ def test_the_mean_heading_may_be_of_those_within_another_reach(ask, reach_m, cou
     assert ratio == pytest.approx(math.exp(1.2) if counts else 1.0)
     turning = ask("alignment", {"weight": 20.0, "turning": 1.0, "reach_m": reach_m}, **rows)
     assert turning.rotation() == pytest.approx(0.2 * math.pi / 2 if counts else 0.0)
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, 2.0, -2.5])
+def test_headings_may_lean_along_an_axis(ask, theta):
+    """The direction and its opposite alike, by the cosine of twice the angle, and nothing else."""
+    given = {"strength": 0.6, "direction_rad": 0.5, "axial": 1.0, "drawn": 1.0, "turning": 2.0}
+    asked = ask("directional-drift", given)
+    expected = math.exp(0.6 * math.cos(2 * (theta - 0.5)))
+    assert asked.factor(theta) / asked.factor(0.5 + math.pi / 4) == pytest.approx(expected)
+    assert asked.factor(theta + math.pi) == pytest.approx(asked.factor(theta))
+    assert asked.rotation() == asked.whole_rotation() == asked.component()[0] == 0.0
+
+
+@pytest.mark.parametrize("follows", [0.0, 1.0])
+def test_all_directions_may_turn_as_others_swim(ask, follows):
+    """A hundredth of the way per weight, along walls too; in the other form the base's alone."""
+    rows = {"X": [0.0, 0.1], "Y": 0.0, "HX": [1.0, 0.0], "HY": [0.0, 1.0], "FOLLOWS": follows}
+    whole = ask("alignment", {"weight": 8.0, "turning": 2.0}, **rows)
+    assert whole.whole_rotation() == pytest.approx(0.08 * math.pi / 2)
+    assert whole.rotation() == 0.0
+    assert whole.factor(1.0) == whole.factor(-1.0) == 1.0
+    base = ask("alignment", {"weight": 8.0, "turning": 1.0}, **rows)
+    assert base.whole_rotation() == 0.0
+    assert base.rotation() == pytest.approx(0.0 if follows else 0.08 * math.pi / 2)
+
+
+def test_fish_may_be_drawn_to_the_fastest_in_view(ask):
+    """Not to a faster one that is not seen."""
+    asked = ask(
+        "leader-following", {"strength": 1.5, "drawn": 1.0, "fastest": 1.0},
+        X=[0.0, 0.1, 0.0, -0.1], Y=[0.0, 0.0, 0.2, 0.0], SPEED=[0.05, 0.08, 0.12, 0.2],
+    )  # fmt: skip
+    asked.sight[0, 3] = 0.0
+    weight, out = asked.component()
+    assert weight == pytest.approx(0.15)
+    np.testing.assert_allclose(out, [0.0, 1.0, 5.0], atol=1e-12)
+    asked.sight[0] = 0.0
+    assert asked.component()[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("other", "heading", "cosines"),
+    [
+        ((0.1, 0.0), 0.0, 1.0),
+        ((0.1, 0.1), 0.6, math.cos(math.pi / 4) * math.cos(0.6)),
+        ((-0.1, 0.0), 0.0, 0.0),
+        ((0.1, 0.0), math.pi, 0.0),
+    ],
+)
+def test_who_is_ahead_and_swims_the_same_way_gets_attention(ask, other, heading, cosines):
+    """As much as both angles are small; whatever its speed."""
+    asked = ask(
+        "leader-following", {"strength": 0.8, "same_way": 1.0}, X=[0.0, other[0]],
+        Y=[0.0, other[1]], HX=[1.0, math.cos(heading)], HY=[0.0, math.sin(heading)],
+    )  # fmt: skip
+    assert asked.sight_of(1) == pytest.approx(math.exp(0.8 * cosines))
+    assert asked.component()[0] == 0.0
+
+
+def test_fish_may_leave_for_where_others_are(ask):
+    """Two of three are in the other room; whenever they went."""
+    given = {"strength": 1.2, "elsewhere": 1.0, "drawn": 1.0, "turning": 1.0}
+    rows = {"X": [0.0, 0.1, 0.2, 0.3], "EXIT": 2.0, "MOUTH_X": 1.0, "MOUTH_Y": 0.0}
+    asked = ask("collective-departure", given, ROOM=[1.0, 2.0, 2.0, 1.0], **rows)
+    assert asked.factor(0.0) / asked.factor(math.pi) == pytest.approx(math.exp(2 * 1.2 * 2 / 3))
+    assert asked.rotation() == asked.component()[0] == 0.0
+    alone = ask("collective-departure", given, ROOM=1.0, **rows)
+    assert alone.factor(0.0) == alone.factor(math.pi)
+    between = ask("collective-departure", given, ROOM=[0.0, 2.0, 2.0, 1.0], **rows)
+    assert between.factor(0.0) == 1.0

@@ -10,9 +10,9 @@ from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Fits, Gain
-from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
+from zfcal.diagnose.features.ways import leaned
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
 from zfcal.model.features import (
@@ -184,7 +184,7 @@ def _absorbed(law: Law, feature: Tilt | Leaving | Landing) -> Law:
     if chdtrc(len(made.strengths), 2 * max(float(made.log_p.sum()), 0.0)) > LEVEL:
         return law
     if isinstance(feature, Tilt):
-        return law.absorbing(bent=leaned(law, made.factor))
+        return law.absorbing(bent=leaned(law, feature, made.factor))
     if isinstance(feature, Landing):
         return law.absorbing(bent=fits.landings.bent(feature, made))
     return law.absorbing(leaving=(law.zone_into(feature.into), made.factor))

@@ -9,7 +9,6 @@ more (513.5 nats, for 514.7).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,9 +28,10 @@ from zfcal.diagnose.features.climbing import (
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
-from zfcal.diagnose.features.landings import Landings, leaned
+from zfcal.diagnose.features.landings import Landings
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import MOST_SHARPER, Law
+from zfcal.diagnose.features.ways import leaned, ways_of_cells, ways_taken
 from zfcal.model.features import (
     Component,
     Landing,
@@ -43,7 +43,6 @@ from zfcal.model.features import (
     Tilt,
     Turned,
 )
-from zfcal.model.kernels.landing import ANGLES
 
 _LEAST = 1e-9
 """Share of the base's density at the heading taken below which a mixture cannot be pushed."""
@@ -214,7 +213,7 @@ class Fits:
 
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
         """Return what a tilt adds with the base's parameters fitted once more beside it."""
-        bent = leaned(self.law, self.tilt(feature).factor)
+        bent = leaned(self.law, feature, self.tilt(feature).factor)
         beside = Fits(law=self.law.absorbing(bent=bent), also=self.also)
         made = beside.null_log_p - (self.null_log_p if self.beyond is None else self.beyond)
         return replace(gain, log_p=made) if made.sum() > gain.log_p.sum() else gain
@@ -241,7 +240,8 @@ class Fits:
             (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
             scores = self._no_lapse[:, None] * (at / base_at - over / base_over)
         else:
-            apart = self.law.turns.taken - self._mean_heading
+            taken = ways_taken(self.law, axial=feature.axial)
+            apart = taken - self._mean_heading[int(feature.axial)]
             scores = np.einsum("sbd,sd->sb", feature.vectors(self.law.draws[0].seen), apart)
         total = scores.sum(axis=0)
         if not np.isfinite(total).all():
@@ -273,11 +273,10 @@ class Fits:
         return np.asarray(density / (density + lapse * UNIFORM))
 
     @cached_property
-    def _mean_heading(self) -> Floats:
-        angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
-        whole = self.law.cells.sum(axis=1, keepdims=True)
-        ways = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        return np.asarray(self.law.cells @ ways / whole)
+    def _mean_heading(self) -> tuple[Floats, Floats]:
+        """Mean headings under the law, and those of twice their angle, shapes (step, 2)."""
+        chances = self.law.cells / self.law.cells.sum(axis=1, keepdims=True)
+        return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
 
     def _linear(
         self, added: Sequence[Columns], bounds: Sequence[Bounds], start: Floats | None
@@ -322,14 +321,15 @@ class Fits:
     def tilt(self, feature: Tilt) -> Fit:
         """Return what a tilt adds to each step."""
         vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
-        taken, base = self.law.turns.taken, self._untilted
+        taken, base = ways_taken(self.law, axial=feature.axial), self._untilted
+        ways = ways_of_cells(axial=feature.axial)
         n, lapses = vectors.shape[1], self.law.lapses
         whole, mean = np.empty(len(taken)), np.empty((len(taken), 2))
         cells, at = self.law.cells, np.exp(self.law.log_here) * self.law.base[0][:, 0]
 
         def density(x: Floats) -> Floats:
             vector = np.ascontiguousarray(np.einsum("sbd,b->sd", vectors, x[:n]))
-            tilted(cells, vector, whole, mean)
+            tilted(cells, ways, vector, whole, mean)
             return np.asarray(at * np.exp((vector * taken).sum(axis=1)) / whole)
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:

@@ -91,20 +91,20 @@ def bells_on_cells(toward: Floats, kappa: Floats, weight: Floats, cells: Floats)
 
 
 @kernel
-def tilted(density: Floats, vector: Floats, whole: Floats, mean: Floats) -> None:
+def tilted(density: Floats, ways: Floats, vector: Floats, whole: Floats, mean: Floats) -> None:
     """Write the integral of a density times exp(vector . heading), and the mean heading under it.
 
     Parameters
     ----------
     density : ndarray, shape (step, cell)
+    ways : ndarray, shape (cell, 2)
+        Headings of the cells.
     vector : ndarray, shape (step, 2)
     whole : ndarray, shape (step,)
     mean : ndarray, shape (step, 2)
     """
     n = density.shape[1]
-    gx, gy = np.empty(n), np.empty(n)
-    for g in range(n):
-        gx[g], gy[g] = math.cos(2 * math.pi * g / n), math.sin(2 * math.pi * g / n)
+    gx, gy = ways[:, 0].copy(), ways[:, 1].copy()
     for s in range(density.shape[0]):
         a, b = vector[s, 0], vector[s, 1]
         total, x, y = 0.0, 0.0, 0.0

@@ -10,7 +10,6 @@ walls have in common is fitted first, and a landing is what there is beyond it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,10 +24,10 @@ from zfcal.diagnose.features.climbing import Fit, climb, lapses_alone
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.ways import ways_of_cells
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.features import Landing, Seen
 from zfcal.model.hats import hats
-from zfcal.model.kernels.landing import ANGLES
 from zfcal.model.kernels.state import X, Y
 
 _MOST = 6.0
@@ -112,7 +111,7 @@ class Landings:
     def _ends(self) -> Floats:
         """Where the heading of each cell would lead, shape (step, cell, 2)."""
         xy, reach = self._places
-        return np.asarray(xy[:, None] + reach[:, None, None] * _ways())
+        return np.asarray(xy[:, None] + reach[:, None, None] * ways_of_cells())
 
     def _near(self, feature: Landing) -> _Near:
         """Return the steps that may end near what a feature is about."""
@@ -199,22 +198,3 @@ def _at_any_wall(arena: Arena) -> Landing:
         return arena.wall_distance(xy_m)
 
     return Landing(label="landing at any wall", away_m=away_m, knots_m=_OFF_WALLS_M)
-
-
-def leaned(law: Law, vectors: Floats) -> tuple[Floats, Floats]:
-    """Return the log of the factor of a tilt on each cell, and at the heading taken.
-
-    Parameters
-    ----------
-    law
-        Of the steps.
-    vectors : ndarray, shape (step, 2)
-        Of the tilt.
-    """
-    return vectors @ _ways().T, (vectors * law.turns.taken).sum(axis=1)
-
-
-def _ways() -> Floats:
-    """Return the headings of the cells, shape (cell, 2)."""
-    angle = 2 * math.pi * np.arange(ANGLES) / ANGLES
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)

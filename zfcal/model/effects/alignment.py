@@ -14,10 +14,17 @@ from zfcal.model.effects.forms import (
     foremost_agent,
     nearest_agent,
     needs_neighbour,
+    of_base,
     seen_by_rank,
     tilt,
 )
-from zfcal.model.effects.weights import attended, evenly
+from zfcal.model.effects.weights import (
+    aside_of,
+    attended,
+    evenly,
+    halfway,
+    seen_and_nearest,
+)
 from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
 from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
@@ -97,7 +104,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     Or by the heading of the nearest, or of the foremost.
     """
     leaning = _PER_WEIGHT * parameters[3]
-    if parameters[4] > 0.0 and state[FOLLOWS * n + i] > 0.0:
+    if of_base(parameters[4]) and state[FOLLOWS * n + i] > 0.0:
         leaning = _WAY_PER_WEIGHT * parameters[4]
     if not leaning > 0.0:
         return 1.0
@@ -113,21 +120,31 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     return tilt(leaning * parameters[0], (x * ux + y * uy) / near, most)
 
 
-@hook(ROTATION)
-def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Turn a share of the way to the mean heading of all that are near; not along a wall."""
-    if not parameters[4] > 0.0 or state[FOLLOWS * n + i] > 0.0:
-        return 0.0
+@inlined
+def turn_to_mean(state: Hooked, n: int, i: int, parameters: Hooked) -> float:
+    """Return a share of the angle to the mean heading of all that are near."""
     x, y, near = near_heading(state, n, i, parameters[6])
     hx, hy = state[HX * n + i], state[HY * n + i]
     if not near > 0.0:
         return 0.0
     return (
-        _WAY_PER_WEIGHT
-        * parameters[0]
-        * parameters[4]
+        _WAY_PER_WEIGHT * parameters[0] * min(parameters[4], 1.0)
         * math.atan2(hx * y - hy * x, hx * x + hy * y)
-    )
+    )  # fmt: skip
+
+
+@hook(ROTATION)
+def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn a share of the way to the mean heading of all that are near; not along a wall."""
+    if not of_base(parameters[4]) or state[FOLLOWS * n + i] > 0.0:
+        return 0.0
+    return turn_to_mean(state, n, i, parameters)
+
+
+@hook(ROTATION)
+def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    """Turn all directions that way, along walls too."""
+    return turn_to_mean(state, n, i, parameters) if parameters[4] > 1.0 else 0.0
 
 
 LATE_S = 12.0
@@ -206,10 +223,32 @@ def _mean(seen: Seen) -> Floats:
     return (total / np.maximum(length, 1e-9)[:, None])[:, None]
 
 
+_SEEN_M = (0.2, 9.0)
+
+
+def _both_ways(seen: Seen) -> Floats:
+    return np.stack([seen.along_wall, -seen.along_wall], axis=1)
+
+
+def _as_others_along(seen: Seen) -> Floats:
+    """Return how much those in view swim along a wall, shape (step, sense, reach)."""
+    along = np.einsum("sjd,sd->sj", seen.heading, seen.along_wall)
+    count = [seen.in_sight & seen.here & (seen.distance_m < reach_m) for reach_m in _SEEN_M]
+    mean = np.stack([(along * c).sum(axis=1) / np.maximum(c.sum(axis=1), 1) for c in count], axis=1)
+    half = 0.5 * seen.follows_walls[:, None] * mean
+    return np.stack([half, -half], axis=1)
+
+
 def _toward_mean(seen: Seen) -> Floats:
     """Return the sine of the angle from the own heading to the others' mean one."""
-    mean, own = _mean(seen)[:, 0], seen.own_heading
-    return np.asarray(own[:, 0] * mean[:, 1] - own[:, 1] * mean[:, 0])
+    return aside_of(seen, _mean(seen), along_walls=True)
+
+
+def _toward_nearest(seen: Seen) -> Floats:
+    """Return that sine of the heading of the nearest, by distance, shape (step, distance)."""
+    by = aside_of(seen, seen.heading, along_walls=True)
+    near = hats_where(seen.here, seen.distance_m, _AHEAD_M)[..., :-1] * seen.nearest
+    return np.asarray(np.einsum("sjb,sj->sb", near, by))
 
 
 _FEATURES: tuple[Feature, ...] = (
@@ -230,7 +269,22 @@ _FEATURES: tuple[Feature, ...] = (
         kappa=9.0,
         along=_TO_FOREMOST,
     ),
+    Component(
+        label="along the wall as others do",
+        toward=_both_ways,
+        weights=_as_others_along,
+        kappa="own",
+        high=0.98,
+    ),
+    Component(
+        label="drawn half-way",
+        toward=lambda seen: halfway(seen, seen.heading),
+        weights=seen_and_nearest,
+        kappa=9.0,
+    ),
     Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0),
+    Turned(label="turning as a whole", by=_toward_mean, neighbours=True, low=0.0),
+    Turned(label="turning as the nearest", by=_toward_nearest, neighbours=True, low=0.0),
 )
 
 
@@ -272,10 +326,11 @@ EFFECT = Effect(
         EffectParameter(
             name="turning",
             low=0.0,
-            high=1.0,
+            high=2.0,
             default=0.0,
             says="1: all turn toward the mean heading of those within reach, by a hundredth of "
-            "the way per weight; along a wall they prefer the sense that is nearer to it.",
+            "the way per weight; along a wall they prefer the sense that is nearer to it. 2: so "
+            "do the directions to neighbours and those along walls.",
         ),
         EffectParameter(
             name="among",
@@ -302,6 +357,7 @@ EFFECT = Effect(
     factor=factor,
     harmonics=1,
     rotation=rotation,
+    whole_rotation=whole_rotation,
     shapes=lambda _arena: (
         {"kappa": 3.0, "grading": 1.0},
         {"kappa": 12.0, "grading": 1.0},
@@ -322,11 +378,16 @@ EFFECT = Effect(
         {"among": 3.0, "reach_m": _FOREMOST_M[-1]},
         *({"leaning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
         *({"turning": 1.0, "reach_m": reach_m} for reach_m in _REACHES_M),
+        *({"turning": 2.0, "reach_m": reach_m} for reach_m in (*_REACHES_M, _NEAR_M)),
     ),
     lacks=needs_neighbour,
     fixed=("grading", "leaning", "turning", "among", "reach_m"),
     idle=lambda values: ("kappa",) if values["leaning"] + values["turning"] > 0 else (),
-    needs={"factor": ("leaning", "turning"), "rotation": ("turning",)},
+    needs={
+        "factor": ("leaning", "turning"),
+        "rotation": ("turning",),
+        "whole_rotation": ("turning",),
+    },
     other_forms=("generic:heading:neighbour-heading",),
     control=Control(name="neighbours' heading 12 s ago", states=_late),
     features=lambda _arena: _FEATURES,

@@ -9,7 +9,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.effects.weights import aside_of, each_fish, only
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
@@ -39,9 +39,6 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 _KAPPA = 4.0
 _NEAR_M = 0.2
 
-_MOST_TRACKS = 12
-"""Of so many fish each is held apart; short pieces of tracks count as the others."""
-
 
 def _shapes(arena: Arena) -> Shapes:
     shares = (1.0, 0.0) if find_rooms(arena)[0] else (1.0,)
@@ -62,14 +59,12 @@ _TIMES = (0.0, 0.5, 1.0)
 
 
 def _who(seen: Seen) -> Floats:
-    """Return one for each of the longest tracks but one, shape (step, track)."""
-    tracks, n_steps = np.unique(seen.track, return_counts=True)
-    longest = tracks[np.argsort(-n_steps, kind="stable")][1:_MOST_TRACKS]
-    return (seen.track[:, None] == np.sort(longest)).astype(np.float64)
+    """Return one for each fish but one, shape (step, fish): what that one has, all have."""
+    return each_fish(seen)[:, :-1]
 
 
 def _leaning(seen: Seen) -> Floats:
-    return np.asarray(_who(seen)[..., None] * seen.way_out[:, None])
+    return np.asarray(each_fish(seen)[..., None] * seen.way_out[:, None])
 
 
 def _who_by_time(seen: Seen) -> Floats:
@@ -94,8 +89,7 @@ def _near_way_out(between: shapely.Geometry) -> Weights:
     def weights(seen: Seen) -> Floats:
         away_m = shapely.distance(between, shapely.points(seen.xy_m))
         near = np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * (seen.way_out != 0).any(axis=1)
-        rest = 1.0 - _who(seen).sum(axis=1, keepdims=True)
-        return np.asarray(np.concatenate([_who(seen), rest], axis=1) * near[:, None])
+        return np.asarray(each_fish(seen) * near[:, None])
 
     return weights
 
@@ -136,9 +130,7 @@ def _crossing(between: shapely.Geometry) -> Tilt:
         return inside[:, None] * seen.own_heading
 
     def by_who(seen: Seen) -> Floats:
-        rest = 1.0 - _who(seen).sum(axis=1, keepdims=True)
-        each = np.concatenate([_who(seen), rest], axis=1)
-        return np.asarray(each[..., None] * ahead(seen)[:, None])
+        return np.asarray(each_fish(seen)[..., None] * ahead(seen)[:, None])
 
     return Tilt(
         label="going on between the rooms, by who", vectors=by_who,
@@ -156,8 +148,11 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
             over=Leaving(label="by the time", weights=_all_by_time),
         ),
         Leaving(label="who, into the open", weights=_who, into="open"),
-        Tilt(label="leaning to the way out", vectors=_leaning),
-    ]
+        Tilt(
+            label="leaning to the way out, by who", vectors=_leaning,
+            over=Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None]),
+        ),
+    ]  # fmt: skip
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:

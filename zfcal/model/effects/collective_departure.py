@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
+import numpy as np
+import shapely
+
+from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import (
@@ -16,10 +20,20 @@ from zfcal.model.effects.forms import (
     way_out,
 )
 from zfcal.model.effects.weights import aside_of, only
-from zfcal.model.features import Along, Component, Feature, Leaving, Seen, Tilt, Turned
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+    Weights,
+)
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
+from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import (
     FOLLOWS,
     LEFT_AT_S,
@@ -50,11 +64,23 @@ def since(state: Hooked, n: int, i: int, back: float) -> float:
     return found
 
 
+@inlined
+def elsewhere(state: Hooked, n: int, i: int) -> float:
+    """Return which share of the others is in another room than the agent."""
+    away, others = 0.0, 0.0
+    for j in range(n):
+        if j != i and state[ZONE * n + j] > 0.0:
+            others += 1.0
+            if state[ROOM * n + j] > 0.0 and state[ROOM * n + j] != state[ROOM * n + i]:
+                away += 1.0
+    return away / max(others, 1.0)
+
+
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Add a component about the direction of the way out while another's leaving is fresh."""
     since_s = since(state, n, i, parameters[4])
-    if parameters[5] > 0.0:
+    if parameters[5] + parameters[6] > 0.0:
         return 0.0
     if not state[ROOM * n + i] > 0.0 or since_s > 4.0 * parameters[1]:
         return 0.0
@@ -65,7 +91,15 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the way out while another's leaving is fresh."""
+    """Weigh headings by the way out while another's leaving is fresh.
+
+    Or by it as much as others are in another room.
+    """
+    if parameters[6] > 0.0:
+        if not state[ROOM * n + i] > 0.0:
+            return 1.0
+        strength = parameters[0] * elsewhere(state, n, i)
+        return tilt(strength, way_out(state, n, i, (ux, uy, landing), parameters[2]), 1.0)
     if parameters[5] > 0.0:
         if not state[FOLLOWS * n + i] > 0.0:
             return 1.0
@@ -83,7 +117,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(ROTATION)
 def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn to the way out while another's leaving is fresh; not along a wall."""
-    if not parameters[5] > 0.0 or not state[ROOM * n + i] > 0.0:
+    if not parameters[5] > 0.0 or parameters[6] > 0.0 or not state[ROOM * n + i] > 0.0:
         return 0.0
     since_s = since(state, n, i, parameters[4])
     if since_s > 4.0 * parameters[1]:
@@ -91,6 +125,13 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     fresh = 1.0 - beyond(since_s, parameters[1])
     out = turn_to(state, n, i, state[MOUTH_X * n + i], state[MOUTH_Y * n + i])
     return RAD_PER_STRENGTH * parameters[0] * fresh * out
+
+
+def _features(arena: Arena) -> tuple[Feature, ...]:
+    rooms = find_rooms(arena)[1]
+    if not rooms:
+        return _FEATURES
+    return (*_FEATURES, Leaving(label="others elsewhere", weights=_elsewhere(rooms)))
 
 
 def _lacks(company: Company) -> str | None:
@@ -127,6 +168,22 @@ def _leaning(seen: Seen) -> Floats:
 
 def _turning(seen: Seen) -> Floats:
     return np.asarray(aside_of(seen, only(seen.way_out)) * _freshly_left(seen))
+
+
+def _elsewhere(rooms: Sequence[shapely.Geometry]) -> Weights:
+    """Return which share of the others is in another room than the fish, shape (step, 1)."""
+
+    def weights(seen: Seen) -> Floats:
+        others = seen.xy_m[:, None] + seen.distance_m[..., None] * seen.bearing
+        mine = np.stack([shapely.contains_xy(room, seen.xy_m) for room in rooms], axis=-1)
+        theirs = np.stack(
+            [shapely.contains_xy(room, others[..., 0], others[..., 1]) for room in rooms], axis=-1
+        )
+        in_room = mine.any(axis=-1, keepdims=True)
+        away = in_room & (theirs & ~mine[:, None]).any(axis=-1) & seen.here
+        return np.asarray(away.sum(axis=1) / np.maximum(seen.here.sum(axis=1), 1))[:, None]
+
+    return weights
 
 
 _BY_TIME = Along(cue="time since the other left (s)", knots=_KNOTS_S[:-1])
@@ -194,6 +251,14 @@ EFFECT = Effect(
             says="1: all turn to the way out, by a tenth of a radian per strength times the sine "
             "of the angle to it; along a wall they prefer the sense that is nearer to it.",
         ),
+        EffectParameter(
+            name="elsewhere",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: headings lean by the share of the others that is in another room, whenever "
+            "these left.",
+        ),
     ),
     probe=0.01,
     component=component,
@@ -206,20 +271,24 @@ EFFECT = Effect(
         for share in (1.0, 0.0)
         for memory_s in (2.0, 5.0, 12.0)
     ),
-    further_shapes=lambda _arena: tuple(
-        {"memory_s": memory_s, **form}
-        for form in (
-            {"drawn": 1.0},
-            {"drawn": 1.0, "back": 1.0},
-            {"heading_share": 0.0, "back": 1.0},
-            {"back": 1.0},
-            {"turning": 1.0},
-        )
-        for memory_s in (1.0, 2.0, 4.0, 8.0)
+    further_shapes=lambda _arena: (
+        *(
+            {"memory_s": memory_s, **form}
+            for form in (
+                {"drawn": 1.0},
+                {"drawn": 1.0, "back": 1.0},
+                {"heading_share": 0.0, "back": 1.0},
+                {"back": 1.0},
+                {"turning": 1.0},
+            )
+            for memory_s in (1.0, 2.0, 4.0, 8.0)
+        ),
+        *({"elsewhere": 1.0, "heading_share": share} for share in (1.0, 0.0)),
     ),
+    idle=lambda values: ("memory_s",) if values["elsewhere"] > 0 else (),
     lacks=_lacks,
     identity_s=10.0,
-    fixed=("heading_share", "drawn", "back", "turning"),
+    fixed=("heading_share", "drawn", "back", "turning", "elsewhere"),
     needs={"component": ("drawn",), "rotation": ("turning",)},
-    features=lambda _arena: _FEATURES,
+    features=_features,
 )

@@ -23,6 +23,7 @@ from zfcal.model.effects.forms import (
 )
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
+from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS
@@ -36,15 +37,19 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
     out[0], out[1], out[2] = math.cos(parameters[1]), math.sin(parameters[1]), parameters[4]
     if parameters[3] > 1.0 and state[FOLLOWS * n + i] > 0.0:
         return 0.0
-    return parameters[0] if parameters[3] > 0.0 and not parameters[5] > 0.0 else 0.0
+    is_drawn = parameters[3] > 0.0 and not parameters[5] + parameters[6] > 0.0
+    return parameters[0] if is_drawn else 0.0
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings by their component along the direction, those of slow steps more.
 
-    Where fish turn to it, those along walls alone.
+    Where fish turn to it, those along walls alone. Along an axis both ways count alike.
     """
+    if parameters[6] > 0.0:
+        ahead = ux * math.cos(parameters[1]) + uy * math.sin(parameters[1])
+        return tilt(parameters[0], 2.0 * ahead * ahead - 1.0, 1.0)
     if parameters[5] > 0.0:
         if parameters[5] > 1.0 or not state[FOLLOWS * n + i] > 0.0:
             return 1.0
@@ -60,7 +65,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
 @hook(ROTATION)
 def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn to the direction by the sine of the angle to it; not along a wall."""
-    if not of_base(parameters[5]):
+    if not of_base(parameters[5]) or parameters[6] > 0.0:
         return 0.0
     aside = turn_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
     return RAD_PER_STRENGTH * parameters[0] * aside
@@ -69,7 +74,7 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
 @hook(ROTATION)
 def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Turn all directions to it, along walls too."""
-    if not parameters[5] > 1.0:
+    if not parameters[5] > 1.0 or parameters[6] > 0.0:
         return 0.0
     aside = sine_to(state, n, i, math.cos(parameters[1]), math.sin(parameters[1]))
     return RAD_PER_STRENGTH * parameters[0] * aside
@@ -77,8 +82,8 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
 
 def _idle(values: Mapping[str, float]) -> tuple[str, ...]:
     """Return what does nothing: slowness where fish do not lean, kappa where none are drawn."""
-    is_drawn = values["drawn"] > 0 and not values["turning"] > 0
-    leans = not values["drawn"] + values["turning"] > 0
+    is_drawn = values["drawn"] > 0 and not values["turning"] + values["axial"] > 0
+    leans = not values["drawn"] + values["turning"] + values["axial"] > 0
     return (*(() if leans else ("by_slowness",)), *(() if is_drawn else ("kappa",)))
 
 
@@ -98,6 +103,22 @@ def _each(seen: Seen) -> Floats:
 
 def _axes(seen: Seen) -> Floats:
     return of_tank(seen.x_axis, np.eye(2)[None])
+
+
+def _doubled(seen: Seen) -> Floats:
+    """Return unit vectors at twice the angle of axes of the tank, shape (step, 2, 2)."""
+    x, y = seen.x_axis.T
+    double = np.stack([x * x - y * y, 2 * x * y], axis=1)
+    return of_tank(double, np.eye(2)[None])
+
+
+_TIMES = (0.0, 0.5, 1.0)
+
+
+def _axes_by_time(seen: Seen) -> Floats:
+    """Return the axes by the time, shape (step, time and axis, 2): what draws them may move."""
+    by = hats(seen.time, _TIMES)[:, :, None, None] * _axes(seen)[:, None]
+    return by.reshape(len(seen.time), -1, 2)
 
 
 def _aside(seen: Seen, *, along_walls: bool = False) -> Floats:
@@ -158,6 +179,8 @@ _FEATURES: tuple[Feature, ...] = (
         kind="drawn along an axis", features=tuple(_both_ways(k * math.pi / 6) for k in range(6))
     ),
     Tilt(label="leaning", vectors=_axes),
+    Tilt(label="leaning, by the time", vectors=_axes_by_time),
+    Tilt(label="leaning along an axis", vectors=_doubled, axial=True),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),
     OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
@@ -219,20 +242,31 @@ EFFECT = Effect(
             "sine of the angle to it; along a wall they prefer the sense that is nearer to it. 2: "
             "so do the directions to neighbours and those along walls.",
         ),
+        EffectParameter(
+            name="axial",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: headings lean along the direction and against it alike, by the strength times "
+            "the cosine of twice the angle; nothing else.",
+        ),
     ),
     probe=0.01,
     component=component,
     factor=factor,
-    harmonics=1,
+    harmonics=2,
     shapes=lambda _arena: tuple({"direction_rad": eighth * math.pi / 4} for eighth in range(-3, 5)),
     rotation=rotation,
     whole_rotation=whole_rotation,
-    further_shapes=lambda _arena: tuple(
-        {"direction_rad": eighth * math.pi / 4, **form}
-        for form in ({"drawn": 1.0}, {"drawn": 2.0}, {"turning": 1.0}, {"turning": 2.0})
-        for eighth in range(-3, 5)
+    further_shapes=lambda _arena: (
+        *(
+            {"direction_rad": eighth * math.pi / 4, **form}
+            for form in ({"drawn": 1.0}, {"drawn": 2.0}, {"turning": 1.0}, {"turning": 2.0})
+            for eighth in range(-3, 5)
+        ),
+        *({"direction_rad": eighth * math.pi / 4, "axial": 1.0} for eighth in range(4)),
     ),
-    fixed=("drawn", "turning"),
+    fixed=("drawn", "turning", "axial"),
     idle=_idle,
     needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     shown_against="wall",

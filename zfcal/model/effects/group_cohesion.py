@@ -20,7 +20,7 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.effects.weights import aside_of, halfway, only, seen_and_nearest
 from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
 from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
@@ -201,6 +201,10 @@ _FEATURES: tuple[Feature, ...] = (
     Component(
         label="drawn to the nearest", toward="bearing", weights=_of_nearest, kappa=5.0,
         along=_TO_NEAREST,
+    ),
+    Component(
+        label="drawn half-way", toward=lambda seen: halfway(seen, seen.bearing),
+        weights=seen_and_nearest, kappa=9.0,
     ),
     Tilt(label="leaning", vectors=_leaning, low=0.0, along=_TO_MIDDLE),
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0, along=_TO_EACH),

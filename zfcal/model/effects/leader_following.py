@@ -14,7 +14,7 @@ from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, W
 from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT
-from zfcal.model.kernels.state import SPEED, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
 
 _PER_STRENGTH = 0.1
 
@@ -30,14 +30,30 @@ def fastest_within(state: Hooked, n: int, i: int, reach_m: float) -> int:
     return found
 
 
+@inlined
+def fastest_in_view(state: Hooked, sight: Hooked, n: int, i: int) -> int:
+    """Return the fastest other agent in view; -1 without one of known speed."""
+    found, most = -1, -1.0
+    for j in range(n):
+        if sight[i * n + j] > 0.0 and state[SPEED * n + j] > most:
+            found, most = j, state[SPEED * n + j]
+    return found
+
+
 @hook(COMPONENT)
-def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Add a component about the bearing of the fastest within reach, or of a certain agent."""
+def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
+    """Add a component about the bearing of the fastest within reach, or in view.
+
+    Or about that of a certain agent.
+    """
     if not parameters[3] > 0.0:
         return 0.0
     k = int(parameters[2])
     if k < 0:
-        k = fastest_within(state, n, i, parameters[4])
+        if parameters[1] > 0.0:
+            k = fastest_in_view(state, sight, n, i)
+        else:
+            k = fastest_within(state, n, i, parameters[4])
     if k < 0 or k >= n or k == i or not state[ZONE * n + k] > 0.0:
         return 0.0
     far_m = max(apart(state, n, i, k), 1e-9)
@@ -49,9 +65,19 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
 @hook(SIGHT)
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
-    """Weigh a neighbour by how much faster than 0.07 m/s it swims, or one of them alone."""
+    """Weigh a neighbour by how much faster than 0.07 m/s it swims, or one of them alone.
+
+    Or by how much it is ahead and swims the way that the fish does.
+    """
     if parameters[3] > 0.0:
         return 1.0
+    if parameters[6] > 0.0:
+        far_m = max(apart(state, n, i, j), 1e-9)
+        hx, hy = state[HX * n + i], state[HY * n + i]
+        x, y = state[X * n + j] - state[X * n + i], state[Y * n + j] - state[Y * n + i]
+        alike = hx * state[HX * n + j] + hy * state[HY * n + j]
+        led = max(0.0, hx * x + hy * y) / far_m * max(0.0, alike)
+        return math.exp(parameters[0] * led)
     if parameters[2] >= 0.0:
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
@@ -88,6 +114,20 @@ def _fastest(seen: Seen) -> Floats:
 
 def _fastest_lately(seen: Seen) -> Floats:
     return seen.chosen(seen.lately_m_s, seen.attention > 0)
+
+
+def _going_its_way(seen: Seen) -> Floats:
+    """Return how much each other one is ahead and swims the way that the fish does."""
+    ahead = np.cos(seen.off_axis_rad)
+    alike = np.einsum("sjd,sd->sj", seen.heading, seen.own_heading)
+    return np.asarray(np.maximum(ahead, 0.0) * np.maximum(alike, 0.0))[..., None]
+
+
+def _fast_in_view(least_m_s: float) -> Weights:
+    """Return one for the fastest other one in view, if it is faster than that."""
+    return lambda seen: seen.chosen(
+        seen.speed_m_s, (seen.attention > 0) & (seen.speed_m_s > least_m_s)
+    )
 
 
 def _who(seen: Seen) -> Floats:
@@ -127,6 +167,7 @@ def _leaning_within(reach_m: float) -> Weights:
 
 _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
 _REACH_M = (0.1, 0.2, 9.0)
+_FAST_M_S = (0.0, 0.07, 0.09, 0.11)
 
 
 def _near(seen: Seen) -> Floats:
@@ -158,7 +199,16 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     factor_on_attention(_fastest_lately, label="the fastest in view, over two seconds"),
     factor_on_attention(lambda seen: seen.foremost, label="the foremost"),
+    factor_on_attention(_going_its_way, label="who is ahead and swims its way"),
     factor_on_attention(_who, label="who"),
+    OneOf(
+        kind="drawn to the fastest in view",
+        features=tuple(
+            Component(label=f"drawn to the fastest in view, from {least_m_s:g} m/s on",
+                      toward="bearing", weights=_fast_in_view(least_m_s), kappa=6.0)
+            for least_m_s in _FAST_M_S
+        ),
+    ),
     OneOf(
         kind=_DRAWN,
         features=tuple(
@@ -211,7 +261,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: the fastest of those that are seen gets all of it, as one 0.05 m/s faster.",
+            says="1: the fastest of those that are seen gets all of it, as one 0.05 m/s faster; "
+            "where some are drawn, they are to that one.",
         ),
         EffectParameter(
             name="who",
@@ -243,17 +294,27 @@ EFFECT = Effect(
             default=5.0,
             says="Von Mises concentration about that bearing.",
         ),
+        EffectParameter(
+            name="same_way",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: who is straight ahead and has the fish's own heading gets all of it, whatever "
+            "its speed; others by the cosines of both angles, and none beyond a right angle.",
+        ),
     ),
     probe=0.01,
     component=component,
     sight=sight,
     further_shapes=lambda _arena: (
         {"fastest": 1.0},
+        {"same_way": 1.0},
+        {"drawn": 1.0, "fastest": 1.0},
         *({"who": float(who)} for who in range(_MOST_LED)),
         *({"drawn": 1.0, "reach_m": reach_m} for reach_m in (0.1, 0.15, 0.2, 2.0)),
         *({"drawn": 1.0, "who": float(who)} for who in range(_MOST_LED)),
     ),
-    fixed=("fastest", "who", "drawn", "reach_m", "kappa"),
+    fixed=("fastest", "who", "drawn", "reach_m", "kappa", "same_way"),
     needs={"component": ("drawn",)},
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,

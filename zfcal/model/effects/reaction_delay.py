@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
@@ -59,6 +61,36 @@ def _by_distance(k: int) -> Component:
     )
 
 
+_SOON_M = (0.03, 0.06, 0.15, 0.4)
+_FAR_M = 0.06
+
+
+def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
+    """Return a response that is late by tenths of a step, of weights of each other one."""
+
+    def weights(seen: Seen) -> Floats:
+        return seen.attention[..., None] * by(seen)
+
+    return Component(
+        label=f"a tenth of a step, {label}", toward=lambda seen: seen.soon_toward,
+        weights=weights, instead=weights, high=3.0,
+    )  # fmt: skip
+
+
+def _soon_by_distance(seen: Seen) -> Floats:
+    return hats_where(seen.here, seen.distance_m, _SOON_M)
+
+
+def _soon_if(cue: Callable[[Seen], Floats]) -> Callable[[Seen], Floats]:
+    """Return what those that are not next to the fish have by a number of each step."""
+
+    def weights(seen: Seen) -> Floats:
+        far = seen.distance_m > _FAR_M
+        return np.stack([far, far * cue(seen)[:, None]], axis=2)
+
+    return weights
+
+
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
     _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
@@ -67,6 +99,9 @@ _FEATURES: tuple[Feature, ...] = (
     *(_ago(k) for k in range(len(LAGS))),
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
+    _soon("by distance", _soon_by_distance),
+    _soon("by the time", _soon_if(lambda seen: seen.time)),
+    _soon("by the last turn", _soon_if(lambda seen: np.abs(seen.last_turn_rad))),
 )
 
 
@@ -119,9 +154,12 @@ EFFECT = Effect(
         for felt_m, whole in ((0.0, 1.0), (0.05, 0.0))
         for delay_s in (0.2, 0.4, 0.6, 1.0, 1.6)
     ),
-    further_shapes=lambda _arena: tuple(
-        {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
-        for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
+    further_shapes=lambda _arena: (
+        *(
+            {"delay_s": delay_s, "felt_m": 0.0, "whole": 1.0}
+            for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
+        ),
+        *({"delay_s": delay_s, "felt_m": 0.05, "whole": 0.0} for delay_s in (0.02, 0.05, 0.1)),
     ),
     lacks=needs_neighbour,
     identity_s=2.4,

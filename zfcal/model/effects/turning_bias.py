@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.effects.weights import only
+from zfcal.model.effects.weights import each_fish, only
 from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -74,6 +74,10 @@ def _left(seen: Seen) -> Floats:
     return np.asarray((seen.zone[:, None] == zones)[..., None] * left[:, None])
 
 
+def _left_by_who(seen: Seen) -> Floats:
+    return np.asarray(each_fish(seen)[..., None] * left_of(seen.own_heading)[:, None])
+
+
 def _both_ways(seen: Seen) -> Floats:
     return np.stack([seen.along_wall, -seen.along_wall], axis=1)
 
@@ -95,6 +99,9 @@ _FEATURES: tuple[Feature, ...] = (
         ),
     ),
     Tilt(label="leaning", vectors=_left),
+    # Some turn left, others right, as individuals do that have a side of their own.
+    Turned(label="offset, by who", by=each_fish, neighbours=True),
+    Tilt(label="leaning, by who", vectors=_left_by_who),
     Component(
         label="along the wall", toward=_both_ways, weights=_half, kappa="own", low=-0.98, high=0.98
     ),

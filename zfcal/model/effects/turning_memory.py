@@ -19,6 +19,9 @@ from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
 
 _PER_STRENGTH = 0.1
 _KAPPA = 9.0
+_SLIGHT = 0.09
+"""Sine of a turn that is none."""
+
 _KNOTS_RAD = (0.0, 0.4, 0.8, 1.6, math.pi)
 
 
@@ -128,6 +131,46 @@ def _by_last_turn_off_walls(seen: Seen) -> Floats:
     return _by_last_turn(seen) * _remembers(seen)[:, None]
 
 
+def _old(k: int, *, off_walls: bool) -> Component:
+    """Return headings drawn to the one of some steps before, as `LAGS` has them."""
+
+    def weights(seen: Seen) -> Floats:
+        return _one(seen) if off_walls else np.ones((len(seen.zone), 1, 1))
+
+    where = "off the walls" if off_walls else "everywhere"
+    return Component(
+        label=f"drawn to the heading {LAGS[k]} steps before, {where}",
+        toward=lambda seen: only(seen.ago_heading[k]),
+        weights=weights,
+        kappa=_KAPPA,
+    )
+
+
+def _last_two(seen: Seen) -> tuple[Floats, Floats]:
+    """Return the sines of the last turn and of the one before it; left is positive."""
+    last, before = seen.ago_heading[0], seen.ago_heading[1]
+    return np.sin(seen.last_turn_rad), (before * -left_of(last)).sum(axis=1)
+
+
+def _on_that_side(degrees: int, *, twice: bool) -> Component:
+    """Return headings drawn to the side of the last turn, or where two were to one side."""
+
+    def toward(seen: Seen) -> Floats:
+        return only(
+            turned_by(seen.own_heading, np.sign(_last_two(seen)[0]) * math.radians(degrees))
+        )
+
+    def weights(seen: Seen) -> Floats:
+        last, before = _last_two(seen)
+        counts = last * before > _SLIGHT**2 if twice else last != 0.0
+        return only(counts.astype(np.float64)[:, None])
+
+    where = "after two turns to one side" if twice else "after a turn"
+    return Component(
+        label=f"drawn {degrees} degrees on, {where}", toward=toward, weights=weights, kappa=_KAPPA
+    )
+
+
 def _course(n: int) -> Component:
     """Return headings drawn to the mean of the present one and some before, as `LAGS` has them."""
 
@@ -146,6 +189,20 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
     Component(label="drawn on as it turned", toward=_on, weights=_one, kappa=_KAPPA),
     OneOf(kind="drawn to the course", features=tuple(_course(n) for n in (2, 4, 6))),
+    OneOf(
+        kind="drawn to an earlier heading",
+        features=tuple(
+            _old(k, off_walls=off_walls) for k in range(1, len(LAGS)) for off_walls in (False, True)
+        ),
+    ),
+    OneOf(
+        kind="drawn to that side",
+        features=tuple(
+            _on_that_side(degrees, twice=twice)
+            for degrees in (30, 50, 80)
+            for twice in (False, True)
+        ),
+    ),
     Sharper(label="sharper by the last turn", by=_by_last_turn),
     Sharper(label="sharper by the last turn, off the walls", by=_by_last_turn_off_walls),
     Tilt(label="leaning to the heading before", vectors=_leaning),

@@ -7,6 +7,9 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.features import Along, Component, Seen, Weights
 
+_MOST_TRACKS = 12
+"""Of so many fish each is held apart; short pieces of tracks count as one more."""
+
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
 
@@ -20,6 +23,36 @@ def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats
     own = seen.own_heading[:, None]
     sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
     return sine if along_walls else np.where(seen.follows_walls[:, None], 0.0, sine)
+
+
+def each_fish(seen: Seen) -> Floats:
+    """Return one for each fish whose step it is, shape (step, fish).
+
+    The longest track is the last one; with it are all beyond the next `_MOST_TRACKS` - 1.
+    """
+    tracks, n_steps = np.unique(seen.track, return_counts=True)
+    longest = np.sort(tracks[np.argsort(-n_steps, kind="stable")][1:_MOST_TRACKS])
+    rest = ~np.isin(seen.track, longest)
+    return np.column_stack([seen.track[:, None] == longest, rest]).astype(np.float64)
+
+
+def halfway(seen: Seen, toward: Floats) -> Floats:
+    """Return unit vectors half-way between the own heading and others, shape (step, vector, 2).
+
+    Parameters
+    ----------
+    toward : ndarray, shape (step, vector, 2)
+        Unit vectors; zeros stay zeros.
+    """
+    between = seen.own_heading[:, None] + toward
+    length = np.linalg.norm(between, axis=-1, keepdims=True)
+    known = (length > 0) & (toward != 0).any(axis=-1, keepdims=True)
+    return np.asarray(np.divide(between, length, out=np.zeros_like(between), where=known))
+
+
+def seen_and_nearest(seen: Seen) -> Floats:
+    """Return weights for each that is seen, and for the nearest, shape (step, other, 2)."""
+    return np.concatenate([(seen.in_sight & seen.here)[..., None], seen.nearest], axis=2)
 
 
 def only(weights: Floats) -> Floats:
