@@ -15,6 +15,7 @@ from zfcal.diagnose.candidates import (
     company_of,
     not_forms_of,
 )
+from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.noise import likely_noise_m
 from zfcal.diagnose.heldout import own_speeds
 from zfcal.diagnose.located import Residuals, residuals
@@ -71,6 +72,11 @@ class Case:
 
     def _lots(self, number: int) -> np.random.Generator:
         return np.random.default_rng([self.question.seed, 5, number])
+
+    @cached_property
+    def laws(self) -> dict[tuple[Screen, float], Law]:
+        """Laws of models of this scene that features were asked of, by the noise of positions."""
+        return {}
 
     @cached_property
     def chain(self) -> Chain:

@@ -174,13 +174,15 @@ def _diagnosis(
 ) -> Diagnosis:
     steps, question = found.steps, case.question
     final = found.screen(case.screen)
-    (confirmed, halves), own = together(
+    (confirmed, halves), (own, curves) = together(
         lambda: confirm(case.screen, steps, n_workers=question.n_workers),
-        lambda: case.ranks(0, final),
+        lambda: (
+            case.ranks(0, final),
+            curves_of(case, steps, without_noise=found.without_noise),
+        ),
         n_workers=question.n_workers,
     )
     omnibus = _omnibus(question, own, rows)
-    curves = curves_of(case, steps, without_noise=found.without_noise)
     made = [
         effect_found(step, held, ties_of(step.choice, [each.choice for each in steps[n:]]), curve)
         for n, (step, held, curve) in enumerate(zip(steps, confirmed, curves, strict=True), start=1)

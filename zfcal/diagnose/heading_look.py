@@ -289,6 +289,13 @@ def _is_steady(step: Step) -> bool:
 
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
+    """Return the law of a model; the same one again for who asks again."""
+    if (screen, noise_m) not in case.laws:
+        case.laws[screen, noise_m] = _new_law(case, screen, noise_m)
+    return case.laws[screen, noise_m]
+
+
+def _new_law(case: Case, screen: Screen, noise_m: float) -> Law:
     return Law(scene=screen.scene, fitted=screen.fitted, noise_m=noise_m, seed=case.question.seed)
 
 
@@ -300,7 +307,7 @@ def _noise_of(case: Case, clear: Sequence[Gain], beside: Sequence[Effect]) -> li
     keys = {gain.key for gain in clear}
 
     def gains(other: Screen, effects: list[Effect]) -> list[Gain]:
-        law = _law(case, other, noise_of(case.question))
+        law = _new_law(case, other, noise_of(case.question))
         return gains_of(law, effects, kinds=keys, beside=beside)
 
     return noise_of_features(case, clear, gains)

@@ -23,6 +23,19 @@ def weighed(columns: Columns, weights: Floats) -> Columns:
     return at, over
 
 
+def both(one: Columns | None, other: Columns | None) -> Columns | None:
+    """Return the sum of columns; None for none.
+
+    Parameters
+    ----------
+    one, other
+        Of one shape.
+    """
+    if one is None or other is None:
+        return other if one is None else one
+    return one[0] + other[0], one[1] + other[1]
+
+
 def less(one: Columns, other: Columns) -> Columns:
     """Return the difference of columns.
 

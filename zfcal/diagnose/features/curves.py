@@ -127,8 +127,9 @@ def redrawn(law: Law, screen: Screen, random: np.random.Generator) -> Law:
         scene=replace(scene, turns=replace(scene.turns, taken=taken, landing=landing)),
         fitted=replace(law.fitted, view=view),
     )
-    # Where everybody was stays as it was.
-    made.__dict__.update(draws=law.draws, _weights=law._weights)  # noqa: SLF001
+    # Where everybody was stays as it was, and so does what a heading is drawn from.
+    kept = ("draws", "_weights", "weight", "_waves", "cells")
+    made.__dict__.update({name: getattr(law, name) for name in kept})
     return made
 
 

@@ -15,13 +15,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.columns import Columns, less, weighed
+from zfcal.diagnose.features.columns import Columns, both, less, weighed
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import bells, bells_on_cells
 from zfcal.diagnose.features.lapses import Lapses
@@ -88,11 +89,16 @@ class Law:
         """
         made = replace(
             self,
-            bent=_sum(self.bent, bent),
+            bent=both(self.bent, bent),
             leaving=self.leaving if leaving is None else (*self.leaving, leaving),
         )
         made.__dict__.update(turns=self.turns, draws=self.draws, _weights=self._weights)
         return made
+
+    @cached_property
+    def beside(self) -> dict[tuple[str, ...], Any]:
+        """Fits beside effects, by their names: see `fits_beside`."""
+        return {}
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
@@ -392,9 +398,3 @@ class Law:
             scaled = (own[:, 0] / (2 * math.pi * i0e(k)))[:, None]
             bells_on_cells(np.ascontiguousarray(own[:, None, 1:3]), k, scaled, whole)
         return np.asarray(whole * self.weight)
-
-
-def _sum(one: Columns | None, other: Columns | None) -> Columns | None:
-    if one is None or other is None:
-        return other if one is None else one
-    return one[0] + other[0], one[1] + other[1]

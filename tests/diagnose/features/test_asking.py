@@ -1,0 +1,50 @@
+"""Fits beside effects are made once for each law, and the same as if they were made anew."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from zfcal.diagnose.features.asking import fits_beside
+from zfcal.diagnose.features.curves import redrawn
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.screening import Screen
+from zfcal.model.effects import find_effect
+
+BIAS, DRIFT, COHESION = map(find_effect, ("turning-bias", "directional-drift", "group-cohesion"))
+
+
+@pytest.fixture
+def law(base):
+    """Return a law of its own of ten minutes of fish that do as the base model does."""
+    scene, fitted = base
+    return Law(scene=scene, fitted=fitted)
+
+
+def test_who_asks_again_gets_the_same_fits(law):
+    """Those of one effect are not those of two; those of none are kept beside any others."""
+    none, one = fits_beside(law, ()), fits_beside(law, [BIAS])
+    assert fits_beside(law, [BIAS]) is one
+    assert fits_beside(law, [BIAS, DRIFT]) is not one
+    assert fits_beside(law, ()) is none
+
+
+def test_fits_that_were_forgotten_are_made_again_as_they_were(law):
+    """A law keeps two of them."""
+    before = fits_beside(law, ()), fits_beside(law, [BIAS])
+    fits_beside(law, [COHESION])
+    again = fits_beside(law, [BIAS])
+    assert again is not before[1]
+    np.testing.assert_array_equal(again.null_log_p, before[1].null_log_p)
+
+
+def test_what_a_redrawn_law_takes_along_is_what_it_would_work_out(law, base):
+    """Its weights, their waves and its cells do not know which headings were drawn."""
+    scene, fitted = base
+    screen = Screen(scene=scene, fitted=fitted)
+    made = redrawn(law, screen, np.random.default_rng(1))
+    anew = dataclasses.replace(made)
+    assert (made.turns.taken != law.turns.taken).any()
+    np.testing.assert_array_equal(made.cells, anew.cells)
+    np.testing.assert_array_equal(made.weight, anew.weight)
+    np.testing.assert_array_equal(made.base, anew.base)
