@@ -24,7 +24,7 @@ from zfcal.model.features import (
     Tilt,
     Turned,
 )
-from zfcal.model.hats import hats
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.rooms import find_rooms
 
 N, OTHERS = 6, 3
@@ -98,6 +98,15 @@ def test_hat_functions_by_hand():
     """A quarter of the way from 1 to 3; at a knot; beyond both ends."""
     found = hats([1.5, 1.0, -2.0, 9.0], (0.0, 1.0, 3.0))
     np.testing.assert_allclose(found, [[0, 0.75, 0.25], [0, 1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+def test_hat_functions_of_what_is_not_known_are_not_known():
+    """And have the shape of the values, with one more axis."""
+    found = hats(np.array([[np.nan, 0.5], [1.0, 2.0]]), (0.0, 1.0, 3.0))
+    assert found.shape == (2, 2, 3)
+    assert np.isnan(found[0, 0]).any()
+    np.testing.assert_array_equal(found[0, 1], [0.5, 0.5, 0.0])
+    np.testing.assert_array_equal(found[1], [[0.0, 1.0, 0.0], [0.0, 0.5, 0.5]])
 
 
 def test_hat_functions_add_up_to_one():

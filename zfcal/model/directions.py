@@ -18,6 +18,19 @@ def left_of(ways: Floats) -> Floats:
     return np.stack([-ways[..., 1], ways[..., 0]], axis=-1)
 
 
+def lengths(ways: Floats) -> Floats:
+    """Return how long vectors are, shape (...).
+
+    As `numpy.linalg.norm`, which takes several times as long over an axis of two.
+
+    Parameters
+    ----------
+    ways : ndarray, shape (..., 2)
+    """
+    x, y = ways[..., 0], ways[..., 1]
+    return np.asarray(np.sqrt(x * x + y * y))
+
+
 def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
     """Return vectors turned to the left, shape (..., 2).
 

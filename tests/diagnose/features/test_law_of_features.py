@@ -8,7 +8,7 @@ import pytest
 from scipy.special import i0e, ndtr
 
 from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
-from zfcal.diagnose.features.kernels import bells, bells_on_cells, tilted
+from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.diagnose.features.ways import leaned
@@ -120,6 +120,26 @@ def test_tilts_by_plain_numpy():
     tilted(density, ways, vector, whole, mean)
     np.testing.assert_allclose(whole, plain.sum(axis=1))
     np.testing.assert_allclose(mean, plain @ ways / plain.sum(axis=1)[:, None])
+
+
+def test_strong_tilts_are_as_exact_as_weak_ones():
+    """Of none the integral is that of the density itself; of forty nats it is still exact."""
+    density, grid = np.random.default_rng(4).random((3, 64)), 2 * np.pi * np.arange(64) / 64
+    vector = np.array([[0.0, 0.0], [0.0, -20.0], [-24.0, 32.0]])
+    whole, mean = np.empty(3), np.empty((3, 2))
+    tilted(density, vector, whole, mean)
+    plain = density * np.exp(vector @ np.stack([np.cos(grid), np.sin(grid)]))
+    np.testing.assert_allclose(whole, plain.sum(axis=1), rtol=1e-6)
+    assert whole[0] == pytest.approx(density[0].sum(), rel=1e-14)
+
+
+def test_the_attraction_of_a_cell_by_plain_numpy():
+    """Of all zones that it lands in, and of the one that is asked for."""
+    rng = np.random.default_rng(5)
+    share, gamma = rng.integers(0, 5, (4, 64, 3), dtype=np.uint8), rng.random((4, 3))
+    whole, own = attractions(share, gamma, 2)
+    np.testing.assert_allclose(whole, np.einsum("sgz,sz->sg", share, gamma))
+    np.testing.assert_allclose(own, share[..., 2] * gamma[:, 2:])
 
 
 def test_a_component_over_an_even_tank_integrates_to_its_weight(law):

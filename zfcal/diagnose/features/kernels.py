@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import kernel
@@ -94,6 +95,8 @@ def bells_on_cells(toward: Floats, kappa: Floats, weight: Floats, cells: Floats)
 def tilted(density: Floats, ways: Floats, vector: Floats, whole: Floats, mean: Floats) -> None:
     """Write the integral of a density times exp(vector . heading), and the mean heading under it.
 
+    Exponents are taken beside the largest one there may be, and are never above it.
+
     Parameters
     ----------
     density : ndarray, shape (step, cell)
@@ -105,10 +108,41 @@ def tilted(density: Floats, ways: Floats, vector: Floats, whole: Floats, mean: F
     """
     n = density.shape[1]
     gx, gy = ways[:, 0].copy(), ways[:, 1].copy()
+    each = np.empty(n)
     for s in range(density.shape[0]):
         a, b = vector[s, 0], vector[s, 1]
+        most = math.sqrt(a * a + b * b)
+        # Only this array is written in this loop: with more the compiler gives up on vectors.
+        for g in range(n):
+            each[g] = density[s, g] * exponential(a * gx[g] + b * gy[g] - most)
         total, x, y = 0.0, 0.0, 0.0
         for g in range(n):
-            w = density[s, g] * math.exp(a * gx[g] + b * gy[g])
-            total, x, y = total + w, x + w * gx[g], y + w * gy[g]
-        whole[s], mean[s, 0], mean[s, 1] = total, x / total, y / total
+            total, x, y = total + each[g], x + each[g] * gx[g], y + each[g] * gy[g]
+        whole[s], mean[s, 0], mean[s, 1] = total * math.exp(most), x / total, y / total
+
+
+@kernel
+def attractions(share: NDArray[np.uint8], gamma: Floats, zone: int) -> tuple[Floats, Floats]:
+    """Return the attraction of all that each cell of headings lands in, and that of one zone.
+
+    Parameters
+    ----------
+    share : ndarray of uint8, shape (step, cell, zone)
+        How much of a cell lands in each zone.
+    gamma : ndarray, shape (step, zone)
+        Attraction of each zone.
+    zone
+        Column of the one that is asked for.
+
+    Returns
+    -------
+    whole, own : ndarray, shape (step, cell)
+    """
+    whole, own = np.empty(share.shape[:2]), np.empty(share.shape[:2])
+    for s in range(share.shape[0]):
+        for g in range(share.shape[1]):
+            total = 0.0
+            for z in range(share.shape[2]):
+                total += share[s, g, z] * gamma[s, z]
+            whole[s, g], own[s, g] = total, share[s, g, zone] * gamma[s, zone]
+    return whole, own

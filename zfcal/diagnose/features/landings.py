@@ -27,7 +27,7 @@ from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.ways import ways_of_cells
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.features import Landing, Seen
-from zfcal.model.hats import hats
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.state import X, Y
 
 _MOST = 6.0

@@ -24,7 +24,7 @@ from scipy.special import i0e
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.columns import Columns, both, less, weighed
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
-from zfcal.diagnose.features.kernels import bells, bells_on_cells
+from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells
 from zfcal.diagnose.features.lapses import Lapses
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.directions import turned_by
@@ -138,7 +138,7 @@ class Law:
     def weight(self) -> Floats:
         """Attraction of what each cell of headings lands in, tilts included, shape (step, cell)."""
         per = 2 * math.pi / ANGLES / PER_CELL
-        made = per * (self.turns.share * self._gamma[:, None]).sum(axis=2)
+        made = per * attractions(self.turns.share, self._gamma, 0)[0]
         tilt = self.fitted.view.tilt
         made = made * tilt[self.rows] if len(tilt) else made
         if self.bent is not None:
@@ -171,8 +171,8 @@ class Law:
 
     def share_of(self, zone: int) -> Floats:
         """Share of each cell's attraction that is of landing in a zone, shape (step, cell)."""
-        share = self.turns.share * self._gamma[:, None]
-        return np.asarray(share[:, :, zone - 1] / np.maximum(share.sum(axis=2), 1e-300))
+        whole, own = attractions(self.turns.share, self._gamma, zone - 1)
+        return np.asarray(own / np.maximum(whole, 1e-300))
 
     @cached_property
     def log_here(self) -> Floats:

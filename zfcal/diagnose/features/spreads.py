@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import climb_within
-from zfcal.model.hats import hats
+from zfcal.model.kernels.hats import hats
 
 _GRID = np.linspace(-5.0, 5.0, 51)
 """Scores at which laws are known; between them they are linear."""

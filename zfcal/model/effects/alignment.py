@@ -26,8 +26,8 @@ from zfcal.model.effects.weights import (
     seen_and_nearest,
 )
 from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
-from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hats import hats, hats_where
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
 

@@ -11,8 +11,8 @@ from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.effects.weights import aside_of, each_fish, only
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.rooms import find_rooms, open_zone
 from zfcal.model.kernels.state import CLEAR, DT_S, EXIT, ROOM, TRAIT, ZONE

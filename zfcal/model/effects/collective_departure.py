@@ -30,8 +30,8 @@ from zfcal.model.features import (
     Turned,
     Weights,
 )
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import (

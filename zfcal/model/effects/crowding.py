@@ -7,8 +7,8 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import ZONE
 from zfcal.model.paces import Pace, Spread, Swum

@@ -23,8 +23,8 @@ from zfcal.model.effects.forms import (
 )
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS
 

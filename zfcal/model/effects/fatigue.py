@@ -5,8 +5,8 @@ from __future__ import annotations
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import times_faster
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import TIME
 from zfcal.model.paces import Pace, Swum

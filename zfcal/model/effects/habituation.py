@@ -11,8 +11,8 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import cut, needs_neighbour
 from zfcal.model.effects.weights import factor_on_attention
 from zfcal.model.features import Along, Feature, Seen
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import KIND, TIME
 

@@ -9,8 +9,8 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour
 from zfcal.model.effects.weights import factor_on_attention
 from zfcal.model.features import Along, Feature, Seen
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import ZONE
 

@@ -11,8 +11,8 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
 from zfcal.model.effects.weights import factor_on_attention
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Weights
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.directions import of_tank
+from zfcal.model.directions import lengths, of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import FOLLOWS, X, Y
@@ -166,7 +166,7 @@ def _at_wall(wall: Floats) -> Landing:
 
     def away_m(_seen: Seen, _rows: NDArray[np.intp], xy_m: Floats) -> Floats:
         share = np.clip((xy_m - start) @ way / (way @ way), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(xy_m - start - share[..., None] * way, axis=-1))
+        return lengths(xy_m - start - share[..., None] * way)
 
     middle = start + way / 2
     return Landing(
@@ -178,7 +178,7 @@ def _at_wall(wall: Floats) -> Landing:
 def _at_spot(spot: Floats) -> Landing:
     return Landing(
         label=f"landing at {spot[0]:.2f}, {spot[1]:.2f}",
-        away_m=lambda _seen, _rows, xy_m: np.linalg.norm(xy_m - spot, axis=-1),
+        away_m=lambda _seen, _rows, xy_m: lengths(xy_m - spot),
         knots_m=_SPOT_M,
         along=Along(cue="distance to the place (m)", knots=_SPOT_M[:-1]),
     )
@@ -186,7 +186,7 @@ def _at_spot(spot: Floats) -> Landing:
 
 def _toward(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
     way = spot - seen.xy_m
-    far = np.linalg.norm(way, axis=1)
+    far = lengths(way)
     toward = of_tank(seen.x_axis, (way / np.maximum(far, 1e-9)[:, None])[:, None])
     return toward[:, 0], hats(far, _KNOTS_M)
 

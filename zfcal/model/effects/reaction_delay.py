@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen
-from zfcal.model.hats import hats_where
+from zfcal.model.kernels.hats import hats_where
 
 
 def _late(

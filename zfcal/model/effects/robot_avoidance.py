@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
@@ -22,8 +23,8 @@ from zfcal.model.effects.forms import (
 )
 from zfcal.model.effects.weights import aside_of, factor_on_attention
 from zfcal.model.features import AWAY_M, Along, Component, Feature, Landing, Seen, Tilt, Turned
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook, inlined
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
 from zfcal.model.kernels.state import FOLLOWS, KIND, X, Y
 
@@ -137,10 +138,15 @@ def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
 
 def _from_robot(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
     """Return how far positions are from the nearest robot; far away without one."""
-    away = seen.bearing[rows] * seen.distance_m[rows, :, None]
-    robots = seen.xy_m[rows, None] + away
-    far = np.linalg.norm(xy_m[:, :, None] - robots[:, None], axis=-1)
-    return np.where(seen.is_robot[rows, None], far, AWAY_M).min(axis=2, initial=AWAY_M)
+    nearest = np.full(xy_m.shape[:2], AWAY_M)
+    # One other after the other: few of them are robots, if any.
+    for other in np.flatnonzero(seen.is_robot[rows].any(axis=0)):
+        away = seen.bearing[rows, other] * seen.distance_m[rows, other, None]
+        robot = seen.xy_m[rows] + away
+        far = lengths(xy_m - robot[:, None])
+        is_robot = seen.is_robot[rows, other, None]
+        nearest = np.where(is_robot, np.minimum(nearest, far), nearest)
+    return nearest
 
 
 _LANDS_M = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)

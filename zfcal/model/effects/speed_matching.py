@@ -14,8 +14,8 @@ from zfcal.model.effects.forms import (
     quickness,
     times_faster,
 )
-from zfcal.model.hats import hats, hats_where
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats, hats_where
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED, ZONE
 from zfcal.model.paces import Copied, Pace, Spread, Swum

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.features import Along, Feature, Landing, Seen, Sharper, Tilt
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import FACTOR
 from zfcal.model.kernels.state import HX, HY
 from zfcal.model.paces import Pace, Spread, Swum
@@ -61,7 +62,7 @@ def _turn_rad(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
 
 def _aside_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
     """Return how long an arc is that leads to positions: their distance times the turn."""
-    far_m = np.linalg.norm(xy_m - seen.xy_m[rows, None], axis=-1)
+    far_m = lengths(xy_m - seen.xy_m[rows, None])
     return np.asarray(_turn_rad(seen, rows, xy_m) * far_m)
 
 

@@ -12,8 +12,8 @@ from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.effects.weights import only
 from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Sharper, Tilt, Turned
-from zfcal.model.hats import hats
 from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
 
