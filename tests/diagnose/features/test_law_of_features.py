@@ -10,7 +10,7 @@ from scipy.special import i0e, ndtr
 from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
 from zfcal.diagnose.features.law import DRAWS, Law
-from zfcal.diagnose.features.waves import series_of, waves_of
+from zfcal.diagnose.features.waves import WAVES, series_of, waves_of
 from zfcal.diagnose.features.ways import leaned
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
@@ -107,6 +107,16 @@ def test_what_hardly_lands_inside_is_as_exact(kappa):
     expected = (weight * np.exp(kappa * (np.cos(apart) - 1))).sum(axis=1)
     np.testing.assert_allclose(over[:, 0], expected, rtol=1e-4)
     assert (over > 0).all()
+
+
+@pytest.mark.parametrize("cells", [64, 7])
+def test_waves_by_plain_numpy(cells):
+    """Also where there are more waves than cells, of any number of these."""
+    weight = np.random.default_rng(6).random((3, cells))
+    angle = 2 * np.pi * np.outer(np.arange(WAVES), np.arange(cells)) / cells
+    found = waves_of(weight)
+    np.testing.assert_allclose(found[..., 0], weight @ np.cos(angle).T, atol=1e-12)
+    np.testing.assert_allclose(found[..., 1], weight @ np.sin(angle).T, atol=1e-12)
 
 
 def test_tilts_by_plain_numpy():

@@ -48,5 +48,11 @@ def waves_of(weight: Floats) -> Floats:
     -------
     ndarray, shape (step, wave, 2)
     """
-    whole = np.fft.fft(weight, axis=1)[:, np.arange(WAVES) % weight.shape[1]]
-    return np.ascontiguousarray(np.stack([whole.real, -whole.imag], axis=-1))
+    n = weight.shape[1]
+    whole, m = np.fft.rfft(weight, axis=1), np.arange(WAVES) % n
+    # From half of the cells on waves are those before it again, the other way round.
+    own, sign = np.minimum(m, n - m), np.where(m <= n // 2, -1.0, 1.0)
+    made = np.empty((len(weight), WAVES, 2))
+    made[..., 0] = whole.real[:, own]
+    made[..., 1] = whole.imag[:, own] * sign
+    return made
