@@ -733,3 +733,14 @@ def test_others_in_another_room_are_a_share(arena, seen):
     np.testing.assert_allclose(weights(one.x, one.y), 2 / 3)
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     assert not weights(*between.centroid.coords[0]).any()
+
+
+def test_slow_steps_may_be_scattered(arena, seen):
+    """About the own heading, by the speed, and beyond what is so at all speeds."""
+    feature = labelled("speed-turn-coupling", "scattered, by speed", arena)
+    np.testing.assert_array_equal(feature.toward(seen)[:, 0], seen.own_heading)
+    np.testing.assert_allclose(
+        feature.weights(seen).sum(axis=-1), feature.over.weights(seen)[..., 0]
+    )
+    slow = dataclasses.replace(seen, own_speed_m_s=np.zeros(N))
+    np.testing.assert_allclose(feature.weights(slow)[:, 0], np.tile([1.0, 0, 0, 0, 0], (N, 1)))

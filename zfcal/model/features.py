@@ -296,9 +296,9 @@ class Leaving:
     weights
         Shape (step, weight): the log of the factor at a strength of one.
     into
-        ``between`` the rooms; or into the ``open``,
-        the last other zone that does not follow walls. Steps that begin between the rooms do not
-        count.
+        ``between`` the rooms; or into the ``open``, the last other zone that does not follow
+        walls. Steps that begin between the rooms do not count. ``again``: between the rooms, of
+        those that begin there.
     along
         What its weights go by, where that is one number: they are a curve then.
     over
@@ -307,7 +307,7 @@ class Leaving:
 
     label: str
     weights: Weights
-    into: Literal["between", "open"] = "between"
+    into: Literal["between", "open", "again"] = "between"
     along: Along | None = None
     over: Leaving | None = None
 

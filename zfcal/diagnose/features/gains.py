@@ -355,7 +355,8 @@ class Fits:
         inside = (law.cells * law.share_of(into)).sum(axis=1) / law.cells.sum(axis=1)
         landed = (law.turns.landing == into).astype(np.float64)
         base = np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1)
-        may = (law.turns.zone != law.between) & (inside > 0)
+        from_between = law.turns.zone == law.between
+        may = (from_between == (feature.into == "again")) & (inside > 0)
         zones = np.unique(law.turns.zone[may])
         each = (law.turns.zone[:, None] == zones).astype(np.float64)
         weights = feature.weights(law.draws[0].seen)

@@ -165,9 +165,7 @@ class Law:
 
     def zone_into(self, into: str) -> int:
         """Return the id of a zone that fish may leave into, as `Leaving` has it; 0 without one."""
-        if into == "between":
-            return self.between
-        return open_zone(self.scene.arena)
+        return open_zone(self.scene.arena) if into == "open" else self.between
 
     def share_of(self, zone: int) -> Floats:
         """Share of each cell's attraction that is of landing in a zone, shape (step, cell)."""

@@ -156,6 +156,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:
+        made += [Leaving(label="who, between the rooms", weights=_who, into="again")]
         made += [*_by_who(between), _crossing(between)]
     return tuple(made)
 

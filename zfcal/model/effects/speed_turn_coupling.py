@@ -13,7 +13,8 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.features import Along, Feature, Landing, Seen, Sharper, Tilt
+from zfcal.model.effects.weights import only
+from zfcal.model.features import Along, Component, Feature, Landing, Seen, Sharper, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import FACTOR
@@ -69,9 +70,34 @@ def _aside_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
 _TURN_RAD = (0.0, 0.4, 0.8, 1.2, 1.8, 2.8)
 _ASIDE_M = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07)
 
+_SCATTERED = 1.0
+"""Concentration of headings that are hardly those of the fish."""
+
+
+def _ahead(seen: Seen) -> Floats:
+    return only(seen.own_heading)
+
+
+def _each_speed(seen: Seen) -> Floats:
+    return only(hats(seen.own_speed_m_s, _KNOTS_M_S))
+
+
+def _alike(seen: Seen) -> Floats:
+    return np.ones((len(seen.zone), 1, 1))
+
+
 _FEATURES: tuple[Feature, ...] = (
     Tilt(label="by speed", vectors=_by_speed),
     Sharper(label="sharper by speed", by=_quicker),
+    # More than at all speeds alike, which would be another law of turns.
+    Component(
+        label="scattered, by speed",
+        toward=_ahead,
+        weights=_each_speed,
+        kappa=_SCATTERED,
+        along=Along(cue="speed of the step (m/s)", knots=_KNOTS_M_S),
+        over=Component(label="scattered", toward=_ahead, weights=_alike, kappa=_SCATTERED),
+    ),
     Landing(
         label="landing aside",
         away_m=_aside_m,
