@@ -74,8 +74,8 @@ class Case:
         return np.random.default_rng([self.question.seed, 5, number])
 
     @cached_property
-    def laws(self) -> dict[tuple[Screen, float], Law]:
-        """Laws of models of this scene that features were asked of, by the noise of positions."""
+    def laws(self) -> dict[Screen, Law]:
+        """Laws of exact positions that features were asked of, by model."""
         return {}
 
     @cached_property

@@ -289,10 +289,15 @@ def _is_steady(step: Step) -> bool:
 
 
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
-    """Return the law of a model; the same one again for who asks again."""
-    if (screen, noise_m) not in case.laws:
-        case.laws[screen, noise_m] = _new_law(case, screen, noise_m)
-    return case.laws[screen, noise_m]
+    """Return the law of a model; of exact positions the same one again for who asks again.
+
+    That of noisy ones has many draws, which would fill the memory if they were kept.
+    """
+    if noise_m > 0:
+        return _new_law(case, screen, noise_m)
+    if screen not in case.laws:
+        case.laws[screen] = _new_law(case, screen, noise_m)
+    return case.laws[screen]
 
 
 def _new_law(case: Case, screen: Screen, noise_m: float) -> Law:

@@ -38,6 +38,12 @@ def test_fits_that_were_forgotten_are_made_again_as_they_were(law):
     np.testing.assert_array_equal(again.null_log_p, before[1].null_log_p)
 
 
+def test_a_law_of_noisy_positions_keeps_no_fits(law):
+    """Each would hold what all of its draws need."""
+    noisy = dataclasses.replace(law, noise_m=5e-4, n_draws=2)
+    assert fits_beside(noisy, [BIAS]) is not fits_beside(noisy, [BIAS])
+
+
 def test_what_a_redrawn_law_takes_along_is_what_it_would_work_out(law, base):
     """Its weights, their waves and its cells do not know which headings were drawn."""
     scene, fitted = base

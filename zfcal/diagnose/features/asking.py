@@ -144,7 +144,8 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
     """Return fits in which effects are there, in whatever form their features can have.
 
     What adds to the mixture is fitted with the base's parameters, each time; a tilt or a factor on
-    leaving once, where it gains more than chance. The law keeps them for who asks again.
+    leaving once, where it gains more than chance. A law of exact positions keeps them for who asks
+    again; that of noisy ones has many draws, each with what it needs of its own.
 
     Parameters
     ----------
@@ -153,6 +154,8 @@ def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
     effects
         Those without features are left out.
     """
+    if law.noise_m > 0:
+        return _beside(law, effects)
     names = tuple(effect.name for effect in effects)
     if names not in law.beside:
         if len(law.beside) >= _KEPT:
