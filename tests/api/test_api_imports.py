@@ -126,14 +126,6 @@ def test_the_package_exports_these_alone():
     assert done.stdout.strip() == "[] True"
 
 
-@pytest.mark.parametrize("module", ["zfcal.diagnose.diagnose", "zfcal.report.diagnosis.drawing"])
-def test_a_diagnosis_does_not_wait_for_what_it_does_not_need(module):
-    """scipy.stats takes half a second to load, in each of the three processes of a diagnosis."""
-    code = f"import sys, {module}; print('scipy.stats' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
-
-
 def test_type_checkers_see_what_is_loaded_later():
     """Each lazy name stands once more where a checker looks, from the same module."""
     tree = ast.parse((REPOSITORY / "zfcal" / "__init__.py").read_text())

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import false_discovery_control
 
 from zfcal.diagnose.battery import UNITS, heading_statistics, speed_statistics
 from zfcal.diagnose.kernels import (
@@ -18,13 +17,7 @@ from zfcal.diagnose.kernels import (
     landing_chances,
     surroundings_of,
 )
-from zfcal.diagnose.located import (
-    Residuals,
-    centre_and_spread,
-    false_discoveries,
-    located,
-    residuals,
-)
+from zfcal.diagnose.located import Residuals, centre_and_spread, located, residuals
 from zfcal.diagnose.standing import standing_of
 from zfcal.diagnose.surroundings import probabilities
 from zfcal.model.kernels.state import HX, HY, SPEED, STATES, ZONE, X, Y
@@ -238,13 +231,6 @@ def test_the_share_of_false_discoveries_by_hand():
     found = located(table_of([3.290527, 0.6744898, 2.326348]))
 
     assert [each.q for each in found] == pytest.approx([0.003, 0.03], rel=1e-4)
-
-
-def test_the_rate_of_false_discoveries_is_that_of_scipy():
-    """Ties included."""
-    p = np.random.default_rng(1).uniform(size=200) ** 3
-    p[7] = p[3]
-    np.testing.assert_allclose(false_discoveries(p), false_discovery_control(p), rtol=1e-12)
 
 
 def test_centre_and_spread_of_the_null_are_taken_off():

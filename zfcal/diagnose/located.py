@@ -238,10 +238,13 @@ def located(
     most
         At most so many.
     """
+    # Slow to import, and needed here alone.
+    from scipy.stats import false_discovery_control
+
     if not len(table):
         return ()
     z = (table.z - centre) / spread
-    q = false_discoveries(2 * ndtr(-np.abs(z)))
+    q = false_discovery_control(2 * ndtr(-np.abs(z)))
     found = [_merge(table, rows, z, q) for rows in _runs(table, z, q)]
     found.sort(key=lambda each: -abs(each[0].z))
     kept: list[tuple[Located, _Place]] = []
@@ -311,15 +314,3 @@ def _merge(table: Residuals, rows: Ints, z: Floats, q: Floats) -> tuple[Located,
         q=float(q[rows].min()),
     )
     return found, _Place(zone, block if timed else None, agent)
-
-
-def false_discoveries(p: Floats) -> Floats:
-    """Return the rate of false discoveries among all that are as clear or clearer, shape (part,).
-
-    As scipy.stats has it, whose import takes longer than what it is needed for.
-    """
-    order = np.argsort(p)
-    rate = p[order] * (len(p) / np.arange(1, len(p) + 1))
-    made = np.empty_like(p)
-    made[order] = np.minimum.accumulate(rate[::-1])[::-1]
-    return np.clip(made, 0.0, 1.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from zfcal.arrays import Bools, Floats
 from zfcal.units import WINDOW_S
@@ -155,8 +156,6 @@ def mean_interval(values: Floats, *, least: float = 2) -> tuple[float, float]:
     """
     if len(values) < least:
         return np.nan, np.nan
-    from scipy import stats  # Slow to import, and whoever draws a page needs it seldom.
-
     half = float(stats.t.ppf(0.975, len(values) - 1)) * float(stats.sem(values))
     mean = float(values.mean())
     return mean - half, mean + half

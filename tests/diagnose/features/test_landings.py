@@ -8,9 +8,9 @@ import pytest
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import tell
-from zfcal.diagnose.features.ways import leaned
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.extended import maximise
 from zfcal.model.features import Landing, OneOf, Tilt

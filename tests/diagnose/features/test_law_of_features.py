@@ -9,9 +9,9 @@ from scipy.special import i0e, ndtr
 
 from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
+from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import WAVES, series_of, waves_of
-from zfcal.diagnose.features.ways import leaned
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
 from zfcal.model.effects.weights import attended, evenly
@@ -137,7 +137,7 @@ def test_strong_tilts_are_as_exact_as_weak_ones():
     density, grid = np.random.default_rng(4).random((3, 64)), 2 * np.pi * np.arange(64) / 64
     vector = np.array([[0.0, 0.0], [0.0, -20.0], [-24.0, 32.0]])
     whole, mean = np.empty(3), np.empty((3, 2))
-    tilted(density, vector, whole, mean)
+    tilted(density, ways, vector, whole, mean)
     plain = density * np.exp(vector @ np.stack([np.cos(grid), np.sin(grid)]))
     np.testing.assert_allclose(whole, plain.sum(axis=1), rtol=1e-6)
     assert whole[0] == pytest.approx(density[0].sum(), rel=1e-14)

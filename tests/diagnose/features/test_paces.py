@@ -5,11 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from scipy.stats import rankdata
 
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
-from zfcal.diagnose.features.swum import mid_ranks
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.kernels.state import SPEED
@@ -308,10 +306,3 @@ def test_who_is_known_for_a_short_time_has_no_past(nothing):
     for ago, values in enumerate((swum.last, swum.before_last, swum.third), start=1):
         assert (values[turns.at < ago] == 0).all()
         assert (values[turns.at > 50] != 0).mean() > 0.7
-
-
-def test_ranks_of_ties_are_their_mean_as_scipy_has_it():
-    """By hand, and of five hundred values with many ties."""
-    assert mid_ranks(np.array([2.0, 1.0, 2.0])).tolist() == [2.5, 1.0, 2.5]
-    values = np.round(np.random.default_rng(1).normal(size=500), 1)
-    assert (mid_ranks(values) == rankdata(values)).all()

@@ -10,9 +10,9 @@ from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.gains import Fits, Gain
+from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
-from zfcal.diagnose.features.ways import leaned
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import Effect
 from zfcal.model.features import (

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
@@ -131,9 +132,6 @@ def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
     random
         Source of the orders.
     """
-    # Slow to import, and needed where there is noise.
-    from scipy.stats.qmc import LatinHypercube
-
     samples, _, agents = scene.states.shape
     latin = LatinHypercube(samples * agents * 2, rng=random)
     return np.asarray(ndtri(latin.random(n))).reshape(n, samples, agents, 2)

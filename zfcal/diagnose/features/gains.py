@@ -28,10 +28,10 @@ from zfcal.diagnose.features.climbing import (
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.kernels import tilted
-from zfcal.diagnose.features.landings import Landings
+from zfcal.diagnose.features.landings import Landings, leaned
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import MOST_SHARPER, Law
-from zfcal.diagnose.features.ways import leaned, ways_of_cells, ways_taken
+from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
     Component,
     Landing,
@@ -240,7 +240,7 @@ class Fits:
             (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
             scores = self._no_lapse[:, None] * (at / base_at - over / base_over)
         else:
-            taken = ways_taken(self.law, axial=feature.axial)
+            taken = ways_of(self.law.turns.taken, axial=feature.axial)
             apart = taken - self._mean_heading[int(feature.axial)]
             scores = np.einsum("sbd,sd->sb", feature.vectors(self.law.draws[0].seen), apart)
         total = scores.sum(axis=0)
@@ -321,7 +321,7 @@ class Fits:
     def tilt(self, feature: Tilt) -> Fit:
         """Return what a tilt adds to each step."""
         vectors = np.mean([feature.vectors(d.seen) for d in self.law.draws], axis=0)
-        taken, base = ways_taken(self.law, axial=feature.axial), self._untilted
+        taken, base = ways_of(self.law.turns.taken, axial=feature.axial), self._untilted
         ways = ways_of_cells(axial=feature.axial)
         n, lapses = vectors.shape[1], self.law.lapses
         whole, mean = np.empty(len(taken)), np.empty((len(taken), 2))

@@ -24,9 +24,9 @@ from zfcal.diagnose.features.climbing import Fit, climb, lapses_alone
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.ways import ways_of_cells
+from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.diagnose.selection import LEVEL
-from zfcal.model.features import Landing, Seen
+from zfcal.model.features import Landing, Seen, Tilt
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.state import X, Y
 
@@ -198,3 +198,19 @@ def _at_any_wall(arena: Arena) -> Landing:
         return arena.wall_distance(xy_m)
 
     return Landing(label="landing at any wall", away_m=away_m, knots_m=_OFF_WALLS_M)
+
+
+def leaned(law: Law, feature: Tilt, vectors: Floats) -> tuple[Floats, Floats]:
+    """Return the log of the factor of a tilt on each cell, and at the heading taken.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    feature
+        The tilt.
+    vectors : ndarray, shape (step, 2)
+        Of it, all its weights together.
+    """
+    taken = ways_of(law.turns.taken, axial=feature.axial)
+    return vectors @ ways_of_cells(axial=feature.axial).T, (vectors * taken).sum(axis=1)

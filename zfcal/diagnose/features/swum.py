@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+from scipy.stats import rankdata
 
 from zfcal.arrays import Floats
 from zfcal.model.features import AWAY_M
@@ -105,18 +106,8 @@ def normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
     made = np.zeros_like(values)
     for number in np.unique(group):
         rows = group == number
-        made[rows] = ndtri(mid_ranks(values[rows]) / (rows.sum() + 1))
+        made[rows] = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
     return made
-
-
-def mid_ranks(values: Floats) -> Floats:
-    """Return ranks from one on, the mean of their places for those that are equal, shape (value,).
-
-    As scipy.stats has it, whose import takes as long as a look at speeds.
-    """
-    place, counts = np.unique(values, return_inverse=True, return_counts=True)[1:]
-    last = np.cumsum(counts)
-    return np.asarray((last - (counts - 1) / 2)[place])
 
 
 def _table(scene: Scene, moves: Moves, values: Floats) -> Floats:
