@@ -135,10 +135,11 @@ def test_tilts_by_plain_numpy():
 def test_strong_tilts_are_as_exact_as_weak_ones():
     """Of none the integral is that of the density itself; of forty nats it is still exact."""
     density, grid = np.random.default_rng(4).random((3, 64)), 2 * np.pi * np.arange(64) / 64
+    ways = np.stack([np.cos(grid), np.sin(grid)], axis=-1)
     vector = np.array([[0.0, 0.0], [0.0, -20.0], [-24.0, 32.0]])
     whole, mean = np.empty(3), np.empty((3, 2))
     tilted(density, ways, vector, whole, mean)
-    plain = density * np.exp(vector @ np.stack([np.cos(grid), np.sin(grid)]))
+    plain = density * np.exp(vector @ ways.T)
     np.testing.assert_allclose(whole, plain.sum(axis=1), rtol=1e-6)
     assert whole[0] == pytest.approx(density[0].sum(), rel=1e-14)
 
