@@ -45,6 +45,9 @@ from zfcal.diagnose.selection import MOST_EFFECTS, Step
 from zfcal.diagnose.steadiness import MINUTES_S, Course, Of, has_pulses, is_steady
 from zfcal.model.effects import Effect, find_effect
 
+_KEPT = 2
+"""Laws of exact positions that are kept: each holds hundreds of megabytes of half an hour."""
+
 
 def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
     """Return what is missing once headings were asked for what their law lacks.
@@ -291,11 +294,14 @@ def _is_steady(step: Step) -> bool:
 def _law(case: Case, screen: Screen, noise_m: float) -> Law:
     """Return the law of a model; of exact positions the same one again for who asks again.
 
-    That of noisy ones has many draws, which would fill the memory if they were kept.
+    So many are kept that the curve of one effect finds the law that named it. That of noisy ones
+    has many draws, which would fill the memory.
     """
     if noise_m > 0:
         return _new_law(case, screen, noise_m)
     if screen not in case.laws:
+        if len(case.laws) >= _KEPT:
+            case.laws.pop(next(iter(case.laws)))
         case.laws[screen] = _new_law(case, screen, noise_m)
     return case.laws[screen]
 

@@ -264,8 +264,10 @@ def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
         forms.setdefault(form_of(score.candidate), score)
     tried = list(forms.values())[:_FORMS]
     # Side by side: each by itself leaves workers idle between its steps.
-    with ThreadPoolExecutor(case.question.n_workers) as pool:
-        made = list(pool.map(lambda score: refit(screen, score), tried))
+    n_workers = case.question.n_workers
+    with ThreadPoolExecutor(n_workers) as pool:
+        each = max(1, n_workers // len(tried))
+        made = list(pool.map(lambda score: refit(screen, score, n_workers=each), tried))
     k = int(np.argmax([each.worth for each in made]))
     return made[k], tried[k]
 

@@ -44,6 +44,20 @@ def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
     return np.asarray(c * ways + s * left_of(ways))
 
 
+def in_tank(x_axis: Floats, ways: Floats) -> Floats:
+    """Return directions that are seen as those of the tank, shape (step, way, 2).
+
+    Parameters
+    ----------
+    x_axis : ndarray, shape (step, 2)
+        Where that of the tank is seen.
+    ways : ndarray, shape (step, way, 2)
+        As seen.
+    """
+    own = x_axis[:, None]
+    return np.stack([(ways * own).sum(axis=-1), (ways * left_of(own)).sum(axis=-1)], axis=-1)
+
+
 def of_tank(x_axis: Floats, ways: Floats) -> Floats:
     """Return directions of the tank as they are seen, shape (step, way, 2).
 

@@ -2,7 +2,8 @@
 
 Components and turns are fitted with the base's parameters and the lapses (Wilks 1938, Annals of
 Mathematical Statistics 9: 60-62); tilts and leaving with the lapse, against the base as it is. A
-tilt that may be named has the base's parameters fitted beside it. These are taken as linear: where
+tilt that may be named has the base's parameters fitted beside it, unless it is counted over what
+all have alike, for which they do the same. These are taken as linear: where
 30 % of all headings had a cause of their own, fits about where the parameters had gone gained no
 more (513.5 nats, for 514.7).
 """

@@ -25,7 +25,7 @@ from zfcal.model.effects.weights import (
     halfway,
     seen_and_nearest,
 )
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
+from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats, hats_where
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -230,13 +230,20 @@ def _both_ways(seen: Seen) -> Floats:
     return np.stack([seen.along_wall, -seen.along_wall], axis=1)
 
 
-def _as_others_along(seen: Seen) -> Floats:
-    """Return how much those in view swim along a wall, shape (step, sense, reach)."""
-    along = np.einsum("sjd,sd->sj", seen.heading, seen.along_wall)
-    count = [seen.in_sight & seen.here & (seen.distance_m < reach_m) for reach_m in _SEEN_M]
-    mean = np.stack([(along * c).sum(axis=1) / np.maximum(c.sum(axis=1), 1) for c in count], axis=1)
-    half = 0.5 * seen.follows_walls[:, None] * mean
-    return np.stack([half, -half], axis=1)
+def _along(reach_m: float) -> Component:
+    """Return that along a wall fish go the way that those in view within reach do."""
+
+    def weights(seen: Seen) -> Floats:
+        along = np.einsum("sjd,sd->sj", seen.heading, seen.along_wall)
+        counts = seen.in_sight & seen.here & (seen.distance_m < reach_m)
+        mean = (along * counts).sum(axis=1) / np.maximum(counts.sum(axis=1), 1)
+        half = 0.5 * seen.follows_walls * mean
+        return np.stack([half, -half], axis=1)[..., None]
+
+    return Component(
+        label=f"along the wall as others within {reach_m:g} m do", toward=_both_ways,
+        weights=weights, kappa="own", high=0.98,
+    )  # fmt: skip
 
 
 def _toward_mean(seen: Seen) -> Floats:
@@ -269,13 +276,7 @@ _FEATURES: tuple[Feature, ...] = (
         kappa=9.0,
         along=_TO_FOREMOST,
     ),
-    Component(
-        label="along the wall as others do",
-        toward=_both_ways,
-        weights=_as_others_along,
-        kappa="own",
-        high=0.98,
-    ),
+    OneOf(kind="along the wall as others do", features=tuple(map(_along, _SEEN_M))),
     Component(
         label="drawn half-way",
         toward=lambda seen: halfway(seen, seen.heading),

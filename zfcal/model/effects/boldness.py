@@ -9,7 +9,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.effects.weights import aside_of, each_fish, only
+from zfcal.model.effects.weights import aside_of, each_fish, only, who
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -58,11 +58,6 @@ def _lacks(company: Company) -> str | None:
 _TIMES = (0.0, 0.5, 1.0)
 
 
-def _who(seen: Seen) -> Floats:
-    """Return one for each fish but one, shape (step, fish): what that one has, all have."""
-    return each_fish(seen)[:, :-1]
-
-
 def _leaning(seen: Seen) -> Floats:
     return np.asarray(each_fish(seen)[..., None] * seen.way_out[:, None])
 
@@ -73,9 +68,9 @@ def _who_by_time(seen: Seen) -> Floats:
     Beside what all do alike by the time: where one is seldom asked, what all do would be gained
     by the others having less of it.
     """
-    who = _who(seen)
-    first = 1.0 - who.sum(axis=1, keepdims=True)
-    weights = (who - first)[..., None] * hats(seen.time, _TIMES)[:, None]
+    each = who(seen)
+    first = 1.0 - each.sum(axis=1, keepdims=True)
+    weights = (each - first)[..., None] * hats(seen.time, _TIMES)[:, None]
     return np.concatenate([_all_by_time(seen), weights.reshape(len(seen.time), -1)], axis=1)
 
 
@@ -141,13 +136,13 @@ def _crossing(between: shapely.Geometry) -> Tilt:
 def _features(arena: Arena) -> tuple[Feature, ...]:
     """Return features of leaving, and of headings toward the way out where there is one."""
     made: list[Feature] = [
-        Leaving(label="who", weights=_who),
+        Leaving(label="who", weights=who),
         Leaving(
             label="who, by the time",
             weights=_who_by_time,
             over=Leaving(label="by the time", weights=_all_by_time),
         ),
-        Leaving(label="who, into the open", weights=_who, into="open"),
+        Leaving(label="who, into the open", weights=who, into="open"),
         Tilt(
             label="leaning to the way out, by who", vectors=_leaning,
             over=Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None]),
@@ -156,7 +151,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:
-        made += [Leaving(label="who, between the rooms", weights=_who, into="again")]
+        made += [Leaving(label="who, between the rooms", weights=who, into="again")]
         made += [*_by_who(between), _crossing(between)]
     return tuple(made)
 

@@ -9,6 +9,7 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
+from zfcal.model.directions import in_tank
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
@@ -19,7 +20,7 @@ from zfcal.model.effects.forms import (
     turn_to,
     way_out,
 )
-from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.effects.weights import aside_of, only, who
 from zfcal.model.features import (
     Along,
     Component,
@@ -131,7 +132,10 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     rooms = find_rooms(arena)[1]
     if not rooms:
         return _FEATURES
-    return (*_FEATURES, Leaving(label="others elsewhere", weights=_elsewhere(rooms)))
+    alone = Leaving(label="who", weights=who)
+    return (
+        *_FEATURES, Leaving(label="others elsewhere", weights=_elsewhere(rooms), over=alone),
+    )  # fmt: skip
 
 
 def _lacks(company: Company) -> str | None:
@@ -171,17 +175,22 @@ def _turning(seen: Seen) -> Floats:
 
 
 def _elsewhere(rooms: Sequence[shapely.Geometry]) -> Weights:
-    """Return which share of the others is in another room than the fish, shape (step, 1)."""
+    """Return which share of the others is in another room than the fish, after who each fish is.
+
+    Shape (step, fish): one who leaves seldom has others elsewhere more often, and that is its own.
+    """
 
     def weights(seen: Seen) -> Floats:
-        others = seen.xy_m[:, None] + seen.distance_m[..., None] * seen.bearing
+        bearing = in_tank(seen.x_axis, seen.bearing)
+        others = seen.xy_m[:, None] + seen.distance_m[..., None] * bearing
         mine = np.stack([shapely.contains_xy(room, seen.xy_m) for room in rooms], axis=-1)
         theirs = np.stack(
             [shapely.contains_xy(room, others[..., 0], others[..., 1]) for room in rooms], axis=-1
         )
         in_room = mine.any(axis=-1, keepdims=True)
         away = in_room & (theirs & ~mine[:, None]).any(axis=-1) & seen.here
-        return np.asarray(away.sum(axis=1) / np.maximum(seen.here.sum(axis=1), 1))[:, None]
+        share = away.sum(axis=1) / np.maximum(seen.here.sum(axis=1), 1)
+        return np.column_stack([who(seen), share])
 
     return weights
 
@@ -202,8 +211,8 @@ _FEATURES: tuple[Feature, ...] = (
 
 EFFECT = Effect(
     name="collective-departure",
-    says="A fish leaves a room when another one has just left it.",
-    opposite="A fish stays in a room when another one has just left it.",
+    says="A fish leaves a room when others have left it.",
+    opposite="A fish stays in a room when others have left it.",
     reference="Pillot et al. 2011, PLoS ONE 6: e14487",
     parameters=(
         EffectParameter(

@@ -191,8 +191,8 @@ _FEATURES: tuple[Feature, ...] = (
 
 EFFECT = Effect(
     name="directional-drift",
-    says="All over the tank fish prefer one compass direction, as with a current, a light or a "
-    "slope.",
+    says="All over the tank fish prefer one compass direction, or one axis, as with a current, a "
+    "light or a slope.",
     reference="Montgomery et al. 1997, Nature 389: 960-963",
     parameters=(
         EffectParameter(

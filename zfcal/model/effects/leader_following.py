@@ -126,7 +126,7 @@ def _going_its_way(seen: Seen) -> Floats:
 def _fast_in_view(least_m_s: float) -> Weights:
     """Return one for the fastest other one in view, if it is faster than that."""
     return lambda seen: seen.chosen(
-        seen.speed_m_s, (seen.attention > 0) & (seen.speed_m_s > least_m_s)
+        seen.speed_m_s, seen.in_sight & seen.here & (seen.speed_m_s > least_m_s)
     )
 
 
@@ -244,7 +244,7 @@ _FEATURES: tuple[Feature, ...] = (
 
 EFFECT = Effect(
     name="leader-following",
-    says="Fish attend more to neighbours that swim fast.",
+    says="Fish attend more to neighbours that lead: that swim fast, or ahead of them.",
     opposite="Fish attend more to neighbours that swim slowly.",
     reference="Pettit et al. 2015, Current Biology 25: 3132-3137",
     parameters=(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +11,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen
-from zfcal.model.kernels.hats import hats_where
+from zfcal.model.kernels.hats import hats, hats_where
 
 
 def _late(
@@ -63,6 +64,7 @@ def _by_distance(k: int) -> Component:
 
 _SOON_M = (0.03, 0.06, 0.15, 0.4)
 _FAR_M = 0.06
+_TURN_RAD = (0.0, 0.8, math.pi)
 
 
 def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
@@ -81,12 +83,12 @@ def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
 
-def _soon_if(cue: Callable[[Seen], Floats]) -> Callable[[Seen], Floats]:
-    """Return what those that are not next to the fish have by a number of each step."""
+def _soon_by(cue: Callable[[Seen], Floats], knots: tuple[float, ...]) -> Callable[[Seen], Floats]:
+    """Return hat functions of a number of each step, of those that are not next to the fish."""
 
     def weights(seen: Seen) -> Floats:
-        far = seen.distance_m > _FAR_M
-        return np.stack([far, far * cue(seen)[:, None]], axis=2)
+        far = seen.here & (seen.distance_m > _FAR_M)
+        return np.asarray(far[..., None] * hats(cue(seen), knots)[:, None])
 
     return weights
 
@@ -100,8 +102,10 @@ _FEATURES: tuple[Feature, ...] = (
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
-    _soon("by the time", _soon_if(lambda seen: seen.time)),
-    _soon("by the last turn", _soon_if(lambda seen: np.abs(seen.last_turn_rad))),
+    _soon("by the time", _soon_by(lambda seen: seen.time, (0.0, 1.0))),
+    _soon(
+        "by the last turn", _soon_by(lambda seen: np.abs(seen.last_turn_rad), (0.0, 0.8, math.pi))
+    ),
 )
 
 

@@ -162,7 +162,8 @@ def _on_that_side(degrees: int, *, twice: bool) -> Component:
 
     def weights(seen: Seen) -> Floats:
         last, before = _last_two(seen)
-        counts = last * before > _SLIGHT**2 if twice else last != 0.0
+        least = np.minimum(np.abs(last), np.abs(before))
+        counts = (last * before > 0) & (least > _SLIGHT) if twice else last != 0.0
         return only(counts.astype(np.float64)[:, None])
 
     where = "after two turns to one side" if twice else "after a turn"

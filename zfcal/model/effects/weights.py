@@ -36,6 +36,11 @@ def each_fish(seen: Seen) -> Floats:
     return np.column_stack([seen.track[:, None] == longest, rest]).astype(np.float64)
 
 
+def who(seen: Seen) -> Floats:
+    """Return one for each fish but one, shape (step, fish): what that one has, all have."""
+    return each_fish(seen)[:, :-1]
+
+
 def halfway(seen: Seen, toward: Floats) -> Floats:
     """Return unit vectors half-way between the own heading and others, shape (step, vector, 2).
 
