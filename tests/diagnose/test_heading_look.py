@@ -465,10 +465,11 @@ def test_effects_of_the_law_with_the_clearest_one_are_told_first():
     assert clearest_first([]) == []
 
 
-def test_laws_of_the_last_two_models_are_kept(screen):
+def test_laws_of_the_last_two_models_are_kept(base):
     """The curve of a named effect finds the law that named it; of noisy positions none is kept."""
     case = SimpleNamespace(laws={}, question=SimpleNamespace(seed=1))
-    models = [Screen(scene=screen.scene, fitted=screen.fitted) for _ in range(3)]
+    scene, fitted = base
+    models = [Screen(scene=scene, fitted=fitted) for _ in range(3)]
     made = [looking._law(case, model, 0.0) for model in models]
     assert looking._law(case, models[2], 0.0) is made[2]
     assert looking._law(case, models[1], 0.0) is made[1]
