@@ -202,6 +202,17 @@ def test_every_sort_of_feature_has_its_fit(base):
     assert sorts == {Component, Tilt, Turned, Sharper, Leaving, Landing, OneOf}
 
 
+def test_of_what_no_step_asks_for_nothing_is_known(nothing):
+    """A strength has no bound but that there is not less than none, and nothing warns of it."""
+    never = Component(
+        label="never", toward="toward", weights=lambda seen: 0.0 * seen.attention[..., None]
+    )
+    with np.errstate(all="raise", under="ignore"):
+        fit = nothing.fit(never)
+        assert fit.log_p.sum() == pytest.approx(0.0, abs=1e-9)
+        np.testing.assert_array_equal(fit.interval, [[0.0, np.inf]])
+
+
 STEPS = np.random.default_rng(8).normal(0.02, 0.1, 4000)
 
 

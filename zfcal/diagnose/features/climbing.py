@@ -126,7 +126,8 @@ class Fit:
     @property
     def interval(self) -> Floats:
         """95 % of each strength, shape (strength, 2)."""
-        return (self.peak.interval() / self.scale[:, None])[self._own]
+        with np.errstate(over="ignore"):  # Of a strength that no step asks for nothing is known.
+            return (self.peak.interval() / self.scale[:, None])[self._own]
 
 
 def climb(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> Peak:
