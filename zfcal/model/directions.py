@@ -44,6 +44,18 @@ def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
     return np.asarray(c * ways + s * left_of(ways))
 
 
+def doubled(ways: Floats) -> Floats:
+    """Return unit vectors at twice the angle, which those of an axis share, shape (..., 2).
+
+    Parameters
+    ----------
+    ways : ndarray, shape (..., 2)
+        Unit vectors.
+    """
+    x, y = ways[..., 0], ways[..., 1]
+    return np.stack([x * x - y * y, 2 * x * y], axis=-1)
+
+
 def in_tank(x_axis: Floats, ways: Floats) -> Floats:
     """Return directions that are seen as those of the tank, shape (step, way, 2).
 
@@ -54,8 +66,7 @@ def in_tank(x_axis: Floats, ways: Floats) -> Floats:
     ways : ndarray, shape (step, way, 2)
         As seen.
     """
-    own = x_axis[:, None]
-    return np.stack([(ways * own).sum(axis=-1), (ways * left_of(own)).sum(axis=-1)], axis=-1)
+    return of_tank(x_axis * [1.0, -1.0], ways)
 
 
 def of_tank(x_axis: Floats, ways: Floats) -> Floats:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import doubled
 from zfcal.model.kernels.landing import ANGLES
 
 
@@ -32,7 +33,4 @@ def ways_of(taken: Floats, *, axial: bool = False) -> Floats:
     axial
         As of `ways_of_cells`.
     """
-    if not axial:
-        return taken
-    x, y = taken.T
-    return np.stack([x * x - y * y, 2 * x * y], axis=1)
+    return doubled(taken) if axial else taken

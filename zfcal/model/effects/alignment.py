@@ -21,9 +21,11 @@ from zfcal.model.effects.forms import (
 from zfcal.model.effects.weights import (
     aside_of,
     attended,
+    both_senses,
     evenly,
     halfway,
     seen_and_nearest,
+    to_one_sense,
 )
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
@@ -226,10 +228,6 @@ def _mean(seen: Seen) -> Floats:
 _SEEN_M = (0.2, 9.0)
 
 
-def _both_ways(seen: Seen) -> Floats:
-    return np.stack([seen.along_wall, -seen.along_wall], axis=1)
-
-
 def _along(reach_m: float) -> Component:
     """Return that along a wall fish go the way that those in view within reach do."""
 
@@ -237,11 +235,10 @@ def _along(reach_m: float) -> Component:
         along = np.einsum("sjd,sd->sj", seen.heading, seen.along_wall)
         counts = seen.in_sight & seen.here & (seen.distance_m < reach_m)
         mean = (along * counts).sum(axis=1) / np.maximum(counts.sum(axis=1), 1)
-        half = 0.5 * seen.follows_walls * mean
-        return np.stack([half, -half], axis=1)[..., None]
+        return to_one_sense(seen, mean)
 
     return Component(
-        label=f"along the wall as others within {reach_m:g} m do", toward=_both_ways,
+        label=f"along the wall as others within {reach_m:g} m do", toward=both_senses,
         weights=weights, kappa="own", high=0.98,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.directions import of_tank
+from zfcal.model.directions import doubled, of_tank
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
@@ -107,9 +107,7 @@ def _axes(seen: Seen) -> Floats:
 
 def _doubled(seen: Seen) -> Floats:
     """Return unit vectors at twice the angle of axes of the tank, shape (step, 2, 2)."""
-    x, y = seen.x_axis.T
-    double = np.stack([x * x - y * y, 2 * x * y], axis=1)
-    return of_tank(double, np.eye(2)[None])
+    return of_tank(doubled(seen.x_axis), np.eye(2)[None])
 
 
 _TIMES = (0.0, 0.5, 1.0)

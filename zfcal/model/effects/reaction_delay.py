@@ -103,9 +103,7 @@ _FEATURES: tuple[Feature, ...] = (
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
     _soon("by the time", _soon_by(lambda seen: seen.time, (0.0, 1.0))),
-    _soon(
-        "by the last turn", _soon_by(lambda seen: np.abs(seen.last_turn_rad), (0.0, 0.8, math.pi))
-    ),
+    _soon("by the last turn", _soon_by(lambda seen: np.abs(seen.last_turn_rad), _TURN_RAD)),
 )
 
 

@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.effects.weights import each_fish, only
+from zfcal.model.effects.weights import both_senses, each_fish, only, to_one_sense
 from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -78,15 +78,6 @@ def _left_by_who(seen: Seen) -> Floats:
     return np.asarray(each_fish(seen)[..., None] * left_of(seen.own_heading)[:, None])
 
 
-def _both_ways(seen: Seen) -> Floats:
-    return np.stack([seen.along_wall, -seen.along_wall], axis=1)
-
-
-def _half(seen: Seen) -> Floats:
-    half = np.where(seen.follows_walls, 0.5, 0.0)
-    return np.stack([half, -half], axis=1)[..., None]
-
-
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
     OneOf(
@@ -103,7 +94,12 @@ _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset, by who", by=each_fish, neighbours=True),
     Tilt(label="leaning, by who", vectors=_left_by_who),
     Component(
-        label="along the wall", toward=_both_ways, weights=_half, kappa="own", low=-0.98, high=0.98
+        label="along the wall",
+        toward=both_senses,
+        weights=to_one_sense,
+        kappa="own",
+        low=-0.98,
+        high=0.98,
     ),
 )
 

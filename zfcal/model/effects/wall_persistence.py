@@ -10,6 +10,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.forms import sense_along, tilt
+from zfcal.model.effects.weights import to_one_sense
 from zfcal.model.features import Component, Feature, Seen, Tilt
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import FACTOR
@@ -38,11 +39,6 @@ def _both_ways(seen: Seen) -> Floats:
     return np.stack([ahead, -ahead], axis=1)
 
 
-def _share(seen: Seen) -> Floats:
-    half = np.where(seen.follows_walls, 0.5, 0.0)
-    return np.stack([half, -half], axis=1)[..., None]
-
-
 def _leaning(seen: Seen) -> Floats:
     return np.asarray((seen.follows_walls[:, None] * seen.own_heading)[:, None])
 
@@ -54,7 +50,9 @@ def _earlier(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(label="share", toward=_both_ways, weights=_share, kappa="own", low=-0.98, high=0.98),
+    Component(
+        label="share", toward=_both_ways, weights=to_one_sense, kappa="own", low=-0.98, high=0.98
+    ),
     Tilt(label="leaning", vectors=_leaning),
     Tilt(label="leaning, by earlier headings", vectors=_earlier),
 )

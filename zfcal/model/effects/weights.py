@@ -41,6 +41,23 @@ def who(seen: Seen) -> Floats:
     return each_fish(seen)[:, :-1]
 
 
+def both_senses(seen: Seen) -> Floats:
+    """Return the two ways along a wall, shape (step, sense, 2)."""
+    return np.stack([seen.along_wall, -seen.along_wall], axis=1)
+
+
+def to_one_sense(seen: Seen, share: Floats | float = 1.0) -> Floats:
+    """Return half of the way along walls, taken from the second sense, shape (step, sense, 1).
+
+    Parameters
+    ----------
+    share : float or ndarray, shape (step,)
+        How much of it.
+    """
+    half = 0.5 * seen.follows_walls * share
+    return np.stack([half, -half], axis=1)[..., None]
+
+
 def halfway(seen: Seen, toward: Floats) -> Floats:
     """Return unit vectors half-way between the own heading and others, shape (step, vector, 2).
 
