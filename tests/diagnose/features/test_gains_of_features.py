@@ -202,6 +202,21 @@ def test_every_sort_of_feature_has_its_fit(base):
     assert sorts == {Component, Tilt, Turned, Sharper, Leaving, Landing, OneOf}
 
 
+@pytest.mark.parametrize(("into", "from_between"), [("between", False), ("again", True)])
+def test_steps_count_by_where_they_begin(nothing, into, from_between):
+    """A factor on those that begin elsewhere has no strength, whatever half of them it is on."""
+    between = nothing.law.between
+
+    def weights(seen):
+        half, is_there = np.arange(len(seen.zone)) % 2, seen.zone == between
+        return np.stack([half * is_there, half * ~is_there], axis=1).astype(float)
+
+    fit = nothing.fit(Leaving(label="half of the steps", weights=weights, into=into))
+    there, elsewhere = fit.strengths
+    assert (abs(there) > 1e-3, abs(elsewhere) > 1e-3) == (from_between, not from_between)
+    assert fit.log_p.sum() >= 0
+
+
 def test_of_what_no_step_asks_for_nothing_is_known(nothing):
     """A strength has no bound but that there is not less than none, and nothing warns of it."""
     never = Component(
