@@ -204,17 +204,20 @@ def test_every_sort_of_feature_has_its_fit(base):
 
 @pytest.mark.parametrize(("into", "from_between"), [("between", False), ("again", True)])
 def test_steps_count_by_where_they_begin(nothing, into, from_between):
-    """A factor on those that begin elsewhere has no strength, whatever half of them it is on."""
-    between = nothing.law.between
+    """Half of those that land between the rooms are marked: it tells of steps that begin there.
 
-    def weights(seen):
-        half, is_there = np.arange(len(seen.zone)) % 2, seen.zone == between
-        return np.stack([half * is_there, half * ~is_there], axis=1).astype(float)
+    Or of those that do not; of the others it tells nothing.
+    """
+    turns, between = nothing.law.turns, nothing.law.between
+    marked = (turns.landing == between) & (np.arange(len(turns.zone)) % 2 == 0)
 
-    fit = nothing.fit(Leaving(label="half of the steps", weights=weights, into=into))
-    there, elsewhere = fit.strengths
-    assert (abs(there) > 1e-3, abs(elsewhere) > 1e-3) == (from_between, not from_between)
-    assert fit.log_p.sum() >= 0
+    def gained(begins):
+        feature = Leaving(label="x", weights=lambda _: 1.0 * (marked & begins)[:, None], into=into)
+        return nothing.fit(feature).log_p.sum()
+
+    there = turns.zone == between
+    assert gained(there if from_between else ~there) > 20
+    assert gained(~there if from_between else there) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_of_what_no_step_asks_for_nothing_is_known(nothing):
