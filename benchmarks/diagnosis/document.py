@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.diagnosis.answers import DESCRIBES, FATES, NAMELESS, NOTHING
-from benchmarks.diagnosis.plan import FURTHER_NOISE_MM, SECTIONS, VIDEO
+from benchmarks.diagnosis.plan import FIRST_SEED, FURTHER_NOISE_MM, FURTHER_SEED, SECTIONS, VIDEO
 from benchmarks.shared.measuring import table
 
 MODES = {"full": "39 replicates", "quick": "`--quick`"}
@@ -91,10 +91,10 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             each is written as CSV at 15 Hz, imported and diagnosed as the commands do it, with the
             position noise estimated from the tracks, not given. Strength is in oracle nats: the
             sum over steps of log f_true minus log f_base, the base law at its own maximum
-            likelihood. Seeds begin at 20000; rules are chosen on others, though trials of earlier
-            runs have been looked at, and two of them (20901, 50801) are a part of why a place
-            beside a current must gain half of it. Intervals are Wilson's, 95 %. Code
-            {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
+            likelihood. Seeds begin at {FIRST_SEED}, of further forms at
+            {FURTHER_SEED}; they were written down before any was run, and no rule was chosen on
+            them. Intervals are Wilson's, 95 %. Code {_codes(found)}. Machine: {found["machine"]},
+            shared with other work."""
         ),
         _completeness(found),
         table(("section", "trials", "planned", *MODES.values()), rows),
