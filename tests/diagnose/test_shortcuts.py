@@ -36,7 +36,7 @@ def packed_with(own, effect, arena, **given):
     # Leaning, where some headings may be drawn or turned instead: that is no factor.
     place = {"x_m": here[X] + 0.05, "y_m": here[Y], "drawn": 0.0}
     place |= {"turning": 0.0} if effect.name in {"turning-memory", "turning-bias"} else {}
-    place |= {"into_zone": 0.0}
+    place |= {"into_zone": 0.0, effect.not_harmonic: 0.0}
     middling |= {name: at for name, at in place.items() if name in middling} | given
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return pack([model], arena)
@@ -49,11 +49,20 @@ def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, few, tank
     packed = packed_with(own, effect, tank)
     angle_sr = view_of(scene, own.fitted.parameters).angle_sr
     whole, at_taken = factors_of(scene, packed, angle_sr)
-    form = polynomial_of([effect])
+    form = polynomial_of({effect.name: {}})
     few_points, at_taken_again = smooth_factors_of(scene, packed, angle_sr, form)
     lands = scene.turns.share.any(axis=2)
     np.testing.assert_allclose(few_points[lands], whole[lands], rtol=1e-5)
     np.testing.assert_allclose(at_taken_again, at_taken, rtol=1e-9)
+
+
+def test_a_form_that_is_no_polynomial_says_so():
+    """Nor is a product with one; else its degree is that of the highest."""
+    local = {"local": 1.0}
+    assert polynomial_of({"speed-turn-coupling": {}}).degree == 1
+    assert polynomial_of({"speed-turn-coupling": local}) is None
+    assert polynomial_of({"turning-bias": {}, "speed-turn-coupling": local}) is None
+    assert polynomial_of({"turning-bias": {}, "speed-turn-coupling": {}}).degree == 2
 
 
 def test_a_factor_of_the_landing_zone_is_given_for_each(few, tank):
@@ -62,7 +71,7 @@ def test_a_factor_of_the_landing_zone_is_given_for_each(few, tank):
     effect = find_effect("boldness")
     packed = packed_with(own, effect, tank, heading_share=0.0)
     angle_sr = view_of(scene, own.fitted.parameters).angle_sr
-    form = polynomial_of([effect])
+    form = polynomial_of({effect.name: {}})
     waves, zones, log_taken = harmonics(scene, packed, angle_sr, form)
     _, at_taken = factors_of(scene, packed, angle_sr)
     np.testing.assert_allclose(waves[:, 1:], 0.0, atol=1e-12)
@@ -76,7 +85,7 @@ def test_a_factor_of_one_zone_is_given_for_it(few, tank):
     effect = find_effect("boldness")
     packed = packed_with(own, effect, tank, heading_share=0.0, into_zone=3.0)
     angle_sr = view_of(scene, own.fitted.parameters).angle_sr
-    _, zones, _ = harmonics(scene, packed, angle_sr, polynomial_of([effect]))
+    _, zones, _ = harmonics(scene, packed, angle_sr, polynomial_of({effect.name: {}}))
     np.testing.assert_allclose(zones[:, 2:] - zones[:, :2], 1.4)
 
 

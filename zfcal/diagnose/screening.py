@@ -198,7 +198,8 @@ class Screen:
         if any(effect.calls(kind, shape) for kind in ("rotation", "whole_rotation")):
             total += self._turned_scores(scene, at(effect.probe)) / effect.probe
         if effect.calls("factor", shape):
-            tilted = self._tilted_scores(scene, at(effect.probe), polynomial_of([effect]))
+            form = polynomial_of({effect.name: shape})
+            tilted = self._tilted_scores(scene, at(effect.probe), form)
             total += tilted * fitted.weight / effect.probe
         return total
 

@@ -6,7 +6,7 @@ It comes from the very functions that a simulation calls; the base's parameters 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -15,7 +15,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.blocks import in_blocks
 from zfcal.model.directions import turned_by
-from zfcal.model.effects import Effect, find_effect
+from zfcal.model.effects import find_effect
 from zfcal.model.kernels.effect_evaluation import (
     PART,
     ask_components,
@@ -103,7 +103,7 @@ def view_of(
         toward = np.concatenate([toward, late_toward], axis=1)
         angle = np.concatenate([(1 - share) * angle, share * late_angle], axis=1)
     parts = components_of(scene, packed, own)
-    form = polynomial_of([find_effect(name) for name in parameters.effects])
+    form = polynomial_of(parameters.effects)
     if form is None:
         tilt, tilt_taken = factors_of(scene, packed, own, n_workers=n_workers)
     else:
@@ -310,14 +310,21 @@ class Polynomial:
     by_landing: bool
 
 
-def polynomial_of(effects: Sequence[Effect]) -> Polynomial | None:
-    """Return what the log of the product of effects' factors is; None where one is none."""
-    factors = [effect for effect in effects if effect.factor is not None]
-    degrees = [effect.harmonics for effect in factors]
+def polynomial_of(effects: Mapping[str, Mapping[str, float]]) -> Polynomial | None:
+    """Return what the log of the product of effects' factors is; None where one is none.
+
+    Parameters
+    ----------
+    effects
+        Parameters of each, by its name.
+    """
+    factors = {name: find_effect(name) for name in effects if find_effect(name).factor is not None}
+    degrees = [effect.degree(effects[name]) for name, effect in factors.items()]
     known = [degree for degree in degrees if degree is not None]
     if len(known) < len(degrees):
         return None
-    return Polynomial(max(known, default=0), any(effect.by_landing for effect in factors))
+    by_landing = any(effect.by_landing for effect in factors.values())
+    return Polynomial(max(known, default=0), by_landing)
 
 
 def harmonics(

@@ -162,6 +162,43 @@ def test_fast_steps_are_straight(ask):
         assert ratio == pytest.approx(math.exp(1.4 * sign))
 
 
+def test_fast_steps_can_be_closer_to_the_own_direction(ask):
+    """A turn of two widths is less preferred than a wide one; steps at 0.12 m/s are one unit quick.
+
+    By the chord of the turn over the width, squared: c, the log is 0.7 (1 - c) exp(-c / 2).
+    """
+    asked = ask("speed-turn-coupling", {"strength": 0.7, "local": 1.0, "width_rad": 0.2})
+
+    def above(angle):
+        return math.log(asked.factor(0.0, speed=0.12) / asked.factor(angle, speed=0.12))
+
+    chord = 2 * math.sin(0.2) / 0.2
+    assert above(0.4) == pytest.approx(0.7 * (1 + (chord**2 - 1) * math.exp(-(chord**2) / 2)))
+    assert above(-0.4) == pytest.approx(above(0.4))
+    assert above(2.0) == pytest.approx(0.7, abs=1e-6)
+    slow = asked.factor(0.0, speed=0.02) / asked.factor(0.4, speed=0.02)
+    assert math.log(slow) == pytest.approx(-above(0.4))
+
+
+def test_along_a_wall_either_way_is_the_own_direction(ask):
+    """The wall runs along y: headings up and down are alike, those beside them less."""
+    rows = {"HX": [1.0], "HY": [0.0], "TAU_X": [0.0], "TAU_Y": [1.0], "FOLLOWS": [1.0]}
+    given = {"strength": 0.7, "local": 1.0, "width_rad": 0.2}
+    asked = ask("speed-turn-coupling", given, **rows)
+    up, down = (asked.factor(sign * math.pi / 2, speed=0.12) for sign in (1, -1))
+    assert up == pytest.approx(1.0)
+    assert down == pytest.approx(up)
+    assert asked.factor(math.pi / 2 + 0.4, speed=0.12) < 0.5
+
+
+def test_a_kick_is_a_step_faster_than_the_last(ask):
+    """At 0.12 m/s after 0.12 m/s nothing is preferred, after 0.07 m/s as one unit quicker."""
+    for last, log_ratio in ((0.12, 0.0), (0.07, 1.4)):
+        asked = ask("speed-turn-coupling", {"strength": 0.7, "kick": 1.0}, SPEED=[last])
+        ratio = asked.factor(0.0, speed=0.12) / asked.factor(math.pi, speed=0.12)
+        assert math.log(ratio) == pytest.approx(log_ratio)
+
+
 def test_fish_slow_down_in_turns(swim):
     """Correlation of a step's speed with the cosine of its turn, beyond the base model's."""
 

@@ -172,6 +172,8 @@ class Effect:
         The log of its factor is a trigonometric polynomial of the heading, of this degree,
         plus a number of the landing zone; None where it is not, or where there is no factor.
         So few headings are asked instead of all.
+    not_harmonic
+        Name of a shape, empty for most: where it is not zero, the log is no such polynomial.
     by_landing
         Whether that number differs between zones.
     each
@@ -246,6 +248,7 @@ class Effect:
     rotation: Any = None
     whole_rotation: Any = None
     harmonics: int | None = None
+    not_harmonic: str = ""
     by_landing: bool = False
     each: str = ""
     lag: str | None = None
@@ -308,6 +311,11 @@ class Effect:
         """Return the parameters that a fit moves in a form: those that are smooth and not idle."""
         idle = self.idle(dict(zip(self.names, self.values(shape), strict=True)))
         return tuple(name for name in self.names if name not in {*self.fixed, *idle})
+
+    def degree(self, given: Mapping[str, float]) -> int | None:
+        """Return the degree of the polynomial that the log of its factor is, None if it is none."""
+        values = dict(zip(self.names, self.values(given), strict=True))
+        return None if values.get(self.not_harmonic) else self.harmonics
 
     def calls(self, kind: str, given: Mapping[str, float]) -> bool:
         """Return whether a function of a kind has anything to do at these parameters."""

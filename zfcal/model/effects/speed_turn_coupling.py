@@ -6,6 +6,8 @@ turning less at speed for the model: the same joint law.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,15 +20,24 @@ from zfcal.model.features import Along, Component, Feature, Landing, Seen, Sharp
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import FACTOR
-from zfcal.model.kernels.state import HX, HY
+from zfcal.model.kernels.state import FOLLOWS, HX, HY, SPEED, TAU_X, TAU_Y
 from zfcal.model.paces import Pace, Spread, Swum
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the cosine of their turn times how quick the step is."""
+    """Weigh headings by how straight on they are times how quick the step is."""
     straight = state[HX * n + i] * ux + state[HY * n + i] * uy
-    quick = quickness(speed + SPEED_M_S - parameters[1])
+    if parameters[2] > 0.0:
+        off = 2.0 * (1.0 - straight)
+        if state[FOLLOWS * n + i] > 0.0:
+            # The base law has both senses of the wall there, whatever the heading before was.
+            across = state[TAU_X * n + i] * uy - state[TAU_Y * n + i] * ux
+            off = across * across
+        off /= parameters[4] * parameters[4]
+        straight = (1.0 - off) * math.exp(-0.5 * off)
+    usual_m_s = state[SPEED * n + i] if parameters[3] > 0.0 else parameters[1]
+    quick = quickness(speed + SPEED_M_S - usual_m_s)
     return tilt(parameters[0], quick * straight, abs(quick))
 
 
@@ -130,11 +141,37 @@ EFFECT = Effect(
             default=SPEED_M_S,
             says="Speed at which turns are as the base model has them, in m/s.",
         ),
+        EffectParameter(
+            name="local",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="0: all headings are preferred by the cosine of their turn. 1: those close to the "
+            "own direction, either way along the wall where fish follow walls, over those beside "
+            "it alone: the own direction is more concentrated.",
+        ),
+        EffectParameter(
+            name="kick",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: steps count as fast that are faster than the one before, whatever its speed.",
+        ),
+        EffectParameter(
+            name="width_rad",
+            low=0.1,
+            high=1.0,
+            default=0.35,
+            says="Where local: turns beyond which headings are less preferred, in radians.",
+        ),
     ),
     probe=0.01,
     factor=factor,
     harmonics=1,
-    fixed=("usual_m_s",),
+    not_harmonic="local",
+    further_shapes=lambda _arena: ({"local": 1.0}, {"local": 1.0, "kick": 1.0}),
+    fixed=("usual_m_s", "local", "kick"),
+    idle=lambda values: () if values["local"] else ("width_rad",),
     shown_against="speed",
     other_forms=("generic:speed:own-turn",),
     features=lambda _arena: _FEATURES,
