@@ -73,6 +73,18 @@ def test_darts_and_lamps_are_no_effect_on_speeds_in_company(found, form):
     assert not names & {"burst-and-coast", "speed-matching", "crowding", "fatigue"}
 
 
+def test_slow_turns_are_no_crowding(found):
+    """Fish that are near another turn, and are slow in turns: that has one name."""
+    told = found("speed-turn-coupling", "strong", 12)
+    assert [each.name for each in told.effects] == ["speed-turn-coupling"]
+
+
+def test_a_sharp_range_has_the_listed_name(found):
+    """Also where another form of what is beyond the list is nearer to it."""
+    told = found("interaction-range", "clear", 12)
+    assert [each.name for each in told.effects] == ["interaction-range"]
+
+
 def test_nothing_is_named_where_nothing_is_missing(found):
     """Fish of the base law alone."""
     assert found(None, "clear", 4).verdict is Verdict.NO_EFFECT

@@ -26,7 +26,7 @@ from zfcal.diagnose.controls import ask_controls
 from zfcal.diagnose.findings import Diagnosis, Located
 from zfcal.diagnose.heading_look import curves_of, heading_look
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
-from zfcal.diagnose.looks import Found, clearest_first
+from zfcal.diagnose.looks import Found, clearest_first, on_headings
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.notes import noise_note, notes_of
 from zfcal.diagnose.null import Null, from_replicates, run_null, theory
@@ -100,13 +100,27 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 
 
 def _looked(case: Case, unfeatured: Unfeatured, tell: Tell) -> Found:
-    """Return what is missing of the law of speeds, and then of that of headings."""
+    """Return what is missing of the law of speeds, and then of that of headings.
+
+    Where headings turn out to depend on the speed, speeds depend on all that turns fish. What they
+    show no more once the turn is given is not named.
+    """
     tell("asking features", 0, 2)
     on_speeds = speed_look(case, unfeatured)
     tell("asking features", 1, 2)
     found = heading_look(case, on_speeds, unfeatured)
+    named = [step.choice.best.candidate.effect for step in found.steps if on_headings(step)]
+    joint = [effect for effect in named if effect.paces_given]
+    if joint and on_speeds.steps:
+        given_turn = speed_look(case, unfeatured, joint)
+        if _names(given_turn) != _names(on_speeds):
+            found = heading_look(case, given_turn, unfeatured)
     tell("asking features", 2, 2)
     return found
+
+
+def _names(found: Found) -> list[str]:
+    return [step.choice.best.name for step in found.steps]
 
 
 def _omnibus(question: Question, own: Mapping[str, float], rows: Sequence[_Row]) -> Omnibus:

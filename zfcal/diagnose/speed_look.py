@@ -38,7 +38,7 @@ from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
 
 
-def speed_look(case: Case, unfeatured: Unfeatured) -> Found:
+def speed_look(case: Case, unfeatured: Unfeatured, beside: Sequence[Effect] = ()) -> Found:
     """Return what is missing once speeds were asked for what their law lacks.
 
     Parameters
@@ -47,6 +47,8 @@ def speed_look(case: Case, unfeatured: Unfeatured) -> Found:
         The question, its scene and what is asked for.
     unfeatured
         What has no features.
+    beside
+        Effects on headings that are there, though the model lacks them.
     """
     given = tuple(each.effect for each in in_model(case.screen.fitted.parameters))
     found = Found()
@@ -55,7 +57,7 @@ def speed_look(case: Case, unfeatured: Unfeatured) -> Found:
         looks = _Looks(
             case=case,
             screen=found.screen(case.screen),
-            beside=(*given, *(each.candidate.effect for each in there)),
+            beside=(*given, *beside, *(each.candidate.effect for each in there)),
             number=len(there),
         )
         added = further(looks, unfeatured, there)

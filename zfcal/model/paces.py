@@ -23,7 +23,7 @@ LATELY_S = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Swum:
-    """What there was before some steps of fish.
+    """What there was before some steps of fish, and how these turned.
 
     Parameters
     ----------
@@ -37,6 +37,8 @@ class Swum:
         The own speed one step ago, and about a second before that; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
+    turn_rad : ndarray, shape (step,)
+        Of the step itself, to either side: no cause of its speed where the law draws that first.
     others : ndarray, shape (step, other)
         Normal scores of the others' last speeds; 0 where they are not known.
     others_lately : ndarray, shape (step, other)
@@ -64,6 +66,7 @@ class Swum:
     last_m_s: Floats
     last_ago_m_s: Floats
     last_turn_rad: Floats
+    turn_rad: Floats
     others: Floats
     others_lately: Floats
     others_m_s: Floats

@@ -70,6 +70,24 @@ def by_company(paces):
     return np.where((paces.swum.distance_m < 0.09).sum(axis=1) >= 2, 1.25, 1.0)
 
 
+def test_beside_a_coupling_speeds_are_asked_given_the_turn(nothing, changed):
+    """Slower in turns, and fish turn where others are: no name, once the turn is given.
+
+    The turn itself names nothing: whatever turns fish would.
+    """
+    turn = nothing.swum.turn_rad
+    assert np.ptp(turn) > 3
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = 1 - 0.25 * turn / np.pi
+    slow = changed(times)
+    coupling = find_effect("speed-turn-coupling")
+    given, turn = slow.and_beside(coupling), slow.swum.turn_rad
+    assert abs(np.corrcoef(slow._left, turn)[0, 1]) > 0.1
+    assert abs(np.corrcoef(given._left, turn)[0, 1]) < 0.01
+    alone = [each.label for each in pace_gains(slow, [coupling])]
+    assert "by the turn" not in alone
+
+
 def late(paces):
     """Slower for the last third of the recording."""
     return np.where(paces.swum.time > 0.65, 0.85, 1.0)

@@ -83,6 +83,16 @@ def test_at_the_range_half_of_the_attention_is_left(ask):
     assert half.sight_of(1) == pytest.approx(0.75)
 
 
+def test_a_sharp_range_ends_within_a_centimetre(ask):
+    """Half of what is ignored is lost at the range, hardly anything or nearly all 1 cm off it."""
+    given = {"range_m": 0.12, "ignored": 0.5, "sharp": 1.0}
+    left = [
+        ask("interaction-range", given, X=[0.0, away_m]).sight_of(1)
+        for away_m in (0.11, 0.12, 0.13, 9.0)
+    ]
+    assert left == pytest.approx([1.0, 0.75, 0.5, 0.5], abs=0.01)
+
+
 def test_behind_the_narrower_field_a_neighbour_is_not_seen(density):
     """Field of 90 degrees: at 115 degrees the fish swims as if alone, at 60 as without it."""
     effect = {"rear-blind-zone": {"ignored": 1.0, "fov_rad": math.pi / 2}}

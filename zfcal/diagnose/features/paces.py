@@ -160,7 +160,7 @@ class Paces:
         made = [
             self._less_means(feature.weights(self.swum))
             for effect in self.beside
-            for feature in effect.paces
+            for feature in (*effect.paces, *effect.paces_given)
             if isinstance(feature, Pace)
         ]
         return _span([np.zeros((len(self.rows), 0)), *made])

@@ -28,7 +28,7 @@ _LEAST_RANK = 0.3
 
 
 def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
-    """Return what was there before some moves.
+    """Return what was there before some moves, and how these turned.
 
     Parameters
     ----------
@@ -67,6 +67,7 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
         last_turn_rad=_last_turn(states, at, who),
+        turn_rad=_last_turn(states, at + 1, who),
         others=np.where(here, np.nan_to_num(paces), 0.0),
         others_lately=np.where(here, np.mean(theirs_lately, axis=0), 0.0),
         others_m_s=_ago(speed, scene, *all_others, 1),

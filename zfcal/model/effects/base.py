@@ -39,7 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
-from zfcal.model.paces import PaceFeature
+from zfcal.model.paces import Pace, PaceFeature
 
 MAX_PARAMETERS = 8
 
@@ -225,6 +225,10 @@ class Effect:
         speed.
     paces
         What its name means for speeds, whatever its form.
+    paces_given
+        Of an effect on headings that depends on the speed of the step: what speeds show of it,
+        given the heading. The joint law is the same, but these speeds may answer to all that turns
+        fish. So with the effect there they count beside others' features; they do not name it.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     idle
@@ -268,6 +272,7 @@ class Effect:
     control: Control | None = None
     features: Callable[[Arena], tuple[Feature, ...]] = _no_features
     paces: tuple[PaceFeature, ...] = ()
+    paces_given: tuple[Pace, ...] = ()
     fixed: tuple[str, ...] = ()
     idle: Callable[[Mapping[str, float]], tuple[str, ...]] = _none_idle
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)

@@ -83,6 +83,7 @@ EFFECT = Effect(
     ),
     strength="per_neighbour",
     probe=0.01,
+    other_forms=("generic:speed:neighbour-distance",),
     speed=speed,
     shapes=lambda _arena: tuple({"radius_m": radius} for radius in (0.05, 0.08, 0.12, 0.2, 0.35)),
     lacks=needs_neighbour,

@@ -130,6 +130,17 @@ def _from(begin: float) -> Tilt:
     )
 
 
+def _swinging(cycles: float) -> Tilt:
+    """Return that what draws along the axes swings so often in the recording."""
+
+    def vectors(seen: Seen) -> Floats:
+        angle = 2 * math.pi * cycles * seen.time
+        by = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None, None]
+        return np.asarray((by * _axes(seen)[:, None]).reshape(len(seen.time), -1, 2))
+
+    return Tilt(label=f"leaning, {cycles:g} times to and fro", vectors=vectors)
+
+
 def _carried(seen: Seen) -> Floats:
     """Return the axes, heavier for slow steps: a current carries fish that swim."""
     by = 1.0 / np.maximum(seen.own_speed_m_s, _SLOW_M_S)
@@ -180,6 +191,8 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning, by the time", vectors=_axes_by_time),
     Tilt(label="leaning along an axis", vectors=_doubled, axial=True),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),
+    # Half a cycle apart: what is between two of these still shows four fifths in one.
+    OneOf(kind="leaning to and fro", features=tuple(_swinging(k / 2) for k in range(2, 25))),
     OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
     Turned(label="turning as a whole", by=partial(_aside, along_walls=True), neighbours=True),

@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.effects.weights import each_fish, factor_on_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -28,6 +28,7 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     return math.exp(cut(-parameters[0] * later, -_MOST, _MOST))
 
 
+_FEW = (0.0, 0.5, 1.0)
 _KNOTS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -35,6 +36,13 @@ def _attention(seen: Seen) -> Floats:
     return np.broadcast_to(
         hats(seen.time, _KNOTS)[:, None, 1:], (*seen.here.shape, len(_KNOTS) - 1)
     )
+
+
+def _attention_of_each(seen: Seen) -> Floats:
+    """Return hat functions of the time for each fish: some may habituate, others not."""
+    by = hats(seen.time, _FEW)[:, 1:, None] * each_fish(seen)[:, None]
+    by = by.reshape(len(by), 1, -1)
+    return np.broadcast_to(by, (*seen.here.shape, by.shape[2]))
 
 
 def _attention_to_robots(seen: Seen) -> Floats:
@@ -45,6 +53,7 @@ _BY_TIME = Along(cue="share of the recording that has passed", knots=_KNOTS[1:],
 
 _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention, along=_BY_TIME),
+    factor_on_attention(_attention_of_each, label="attention, each fish"),
     factor_on_attention(_attention_to_robots, label="attention to robots", along=_BY_TIME),
 )
 

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.forms import apart, beyond, needs_neighbour
+from zfcal.model.effects.forms import apart, beyond, cut, needs_neighbour
 from zfcal.model.effects.weights import factor_on_attention
 from zfcal.model.features import Along, Feature, Seen
-from zfcal.model.kernels.compiled import hook
+from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SIGHT
 from zfcal.model.kernels.state import ZONE
+
+_EDGE_M = 0.0025
+_SHARP_M = tuple(0.05 * 1.15**k for k in range(17))
+
+
+@inlined
+def edge(beyond_m: float) -> float:
+    """Return a step from 0 to 1 within a centimetre, so that a fit finds it by its slope."""
+    return 1.0 / (1.0 + math.exp(cut(-beyond_m / _EDGE_M, -60.0, 60.0)))
 
 
 @hook(SIGHT)
 def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Take away from what is farther than the range, or from who is not among the nearest."""
     away_m = apart(state, n, i, j)
+    if parameters[3] > 0.0:
+        return 1.0 - parameters[0] * edge(away_m - parameters[1])
     if not parameters[2] > 0.0:
         return 1.0 - parameters[0] * beyond(away_m, parameters[1])
     nearer = 0.0
@@ -77,6 +90,14 @@ EFFECT = Effect(
             default=0.0,
             says="So many of the nearest count, however far they are; 0: the range counts.",
         ),
+        EffectParameter(
+            name="sharp",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: all of that share is lost within a centimetre about the range; 0: little by "
+            "little.",
+        ),
     ),
     strength="ignored",
     probe=0.01,
@@ -84,8 +105,13 @@ EFFECT = Effect(
     shapes=lambda _arena: tuple(
         {"range_m": range_m} for range_m in (0.06, 0.09, 0.13, 0.19, 0.28, 0.4)
     ),
-    further_shapes=lambda _arena: ({"nearest": 1.0}, {"nearest": 2.0}),
-    fixed=("nearest",),
+    further_shapes=lambda _arena: (
+        {"nearest": 1.0},
+        {"nearest": 2.0},
+        *({"sharp": 1.0, "range_m": range_m} for range_m in _SHARP_M),
+    ),
+    fixed=("nearest", "sharp"),
+    other_forms=("generic:attention:neighbour-distance",),
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,
 )

@@ -10,6 +10,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.forms import needs_neighbour
+from zfcal.model.effects.weights import each_fish
 from zfcal.model.features import LAGS, Component, Feature, Seen
 from zfcal.model.kernels.hats import hats, hats_where
 
@@ -83,14 +84,19 @@ def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
 
-def _soon_by(cue: Callable[[Seen], Floats], knots: tuple[float, ...]) -> Callable[[Seen], Floats]:
-    """Return hat functions of a number of each step, of those that are not next to the fish."""
+def _soon_by(of_step: Callable[[Seen], Floats]) -> Callable[[Seen], Floats]:
+    """Return weights of each step, (step, weight), for those that are not next to the fish."""
 
     def weights(seen: Seen) -> Floats:
         far = seen.here & (seen.distance_m > _FAR_M)
-        return np.asarray(far[..., None] * hats(cue(seen), knots)[:, None])
+        return np.asarray(far[..., None] * of_step(seen)[:, None])
 
     return weights
+
+
+def _by_zone(seen: Seen) -> Floats:
+    """Return one for steps along walls, and one for all others, shape (step, 2)."""
+    return np.stack([seen.follows_walls, ~seen.follows_walls], axis=1).astype(np.float64)
 
 
 _FEATURES: tuple[Feature, ...] = (
@@ -102,8 +108,10 @@ _FEATURES: tuple[Feature, ...] = (
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
-    _soon("by the time", _soon_by(lambda seen: seen.time, (0.0, 1.0))),
-    _soon("by the last turn", _soon_by(lambda seen: np.abs(seen.last_turn_rad), _TURN_RAD)),
+    _soon("by the time", _soon_by(lambda seen: hats(seen.time, (0.0, 1.0)))),
+    _soon("by the last turn", _soon_by(lambda seen: hats(np.abs(seen.last_turn_rad), _TURN_RAD))),
+    _soon("by who", _soon_by(each_fish)),
+    _soon("by the zone", _soon_by(_by_zone)),
 )
 
 

@@ -61,6 +61,10 @@ def _spread_by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, (0.0, 0.5, 1.5))[:, 1:]
 
 
+def _by_turn(swum: Swum) -> Floats:
+    return hats(swum.turn_rad, _KNOTS_RAD)[:, 1:]
+
+
 def _by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, _KNOTS_RAD)[:, 1:]
 
@@ -180,4 +184,5 @@ EFFECT = Effect(
         Pace(label="by the last turn", weights=_by_last_turn),
         Spread(label="slow and fast ones, by the last turn", weights=_spread_by_last_turn),
     ),
+    paces_given=(Pace(label="by the turn", weights=_by_turn),),
 )
