@@ -362,7 +362,7 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     late = features_of("reaction-delay", arena)
     for each in late:
         if each.instead is not True:
-            is_far = "by the" in each.label
+            is_far = "by the" in each.label or "by who" in each.label
             counts = seen.distance_m > 0.06 if is_far else seen.distance_m > 0
             np.testing.assert_allclose(
                 each.instead(seen).sum(axis=-1), seen.attention * counts, err_msg=each.label
@@ -409,9 +409,27 @@ def test_the_nearest_alone_is_a_range_by_rank(arena, seen):
 
 def test_habituation_to_robots_leaves_fish_as_they_are(arena, seen):
     """Attention to fish does not change with the time."""
-    to_robots = features_of("habituation", arena)[1].weights(seen)
+    to_robots = labelled("habituation", "attention to robots", arena).weights(seen)
     assert not to_robots[~seen.is_robot].any()
     assert to_robots[seen.is_robot].any()
+
+
+def test_habituation_is_a_change_and_may_be_each_fishs_own(arena, seen):
+    """A robot that is avoided all the time is not habituated to: weights have a mean of zero."""
+    all_robots = dataclasses.replace(
+        seen, is_robot=np.ones((N, OTHERS), dtype=bool), attention=np.ones((N, OTHERS))
+    )
+    to_robots = labelled("habituation", "attention to robots", arena).weights(all_robots)
+    np.testing.assert_allclose(to_robots.mean(axis=0), 0.0, atol=1e-12)
+    assert np.ptp(to_robots, axis=0).min() > 0.1
+
+    each = labelled("habituation", "attention, each fish", arena).weights(all_robots)
+    tracks = each_fish(seen)
+    assert each.shape == (N, OTHERS, 2 * tracks.shape[1])
+    for k in range(tracks.shape[1]):
+        other = tracks[:, k] == 0
+        assert not each[other, 0, k :: tracks.shape[1]].any()
+        assert each[~other, 0, k :: tracks.shape[1]].any()
 
 
 def test_a_sense_of_travel_is_counted_along_walls_alone(arena, seen):
@@ -639,6 +657,19 @@ def test_what_draws_may_wander_or_be_an_axis(arena, seen):
     np.testing.assert_allclose(axis.vectors(turned), turned_by(axis.vectors(seen), 2 * by))
 
 
+def test_what_draws_may_swing(arena, seen):
+    """Three times to and fro: back after a third of the time, the other way after a sixth."""
+    swing = labelled("directional-drift", "leaning, 3 times to and fro", arena)
+
+    def vectors(time):
+        return swing.vectors(dataclasses.replace(seen, time=np.full(N, time)))
+
+    np.testing.assert_allclose(vectors(0.1 + 1 / 3), vectors(0.1), atol=1e-9)
+    np.testing.assert_allclose(vectors(0.1 + 1 / 6), -vectors(0.1), atol=1e-9)
+    turned = dataclasses.replace(seen, x_axis=turned_by(seen.x_axis, 0.7))
+    np.testing.assert_allclose(swing.vectors(turned), turned_by(swing.vectors(seen), 0.7))
+
+
 def test_half_way_is_between_the_own_heading_and_anothers(arena, seen):
     """The same angle from both; nothing where nobody is."""
     drawn = labelled("alignment", "drawn half-way", arena)
@@ -711,6 +742,10 @@ def test_tenths_of_a_step_count_by_distance_time_and_turn(arena, seen):
     """Each with a share of its own; those next to the fish are felt at once."""
     near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.05))
     far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
+    by_zone = labelled("reaction-delay", "a tenth of a step, by the zone", arena).weights(far)
+    np.testing.assert_allclose(by_zone[..., 0], seen.attention * seen.follows_walls[:, None])
+    by_who = labelled("reaction-delay", "a tenth of a step, by who", arena).weights(far)
+    np.testing.assert_allclose(by_who, seen.attention[..., None] * each_fish(seen)[:, None])
     for label, cue in (("by the time", seen.time), ("by the last turn", abs(seen.last_turn_rad))):
         feature = labelled("reaction-delay", f"a tenth of a step, {label}", arena)
         assert not feature.weights(near).any()

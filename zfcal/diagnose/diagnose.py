@@ -26,7 +26,7 @@ from zfcal.diagnose.controls import ask_controls
 from zfcal.diagnose.findings import Diagnosis, Located
 from zfcal.diagnose.heading_look import curves_of, heading_look
 from zfcal.diagnose.located import Residuals, centre_and_spread, located
-from zfcal.diagnose.looks import Found, clearest_first, on_headings
+from zfcal.diagnose.looks import Found, clearest_first
 from zfcal.diagnose.naming import ties_of
 from zfcal.diagnose.notes import noise_note, notes_of
 from zfcal.diagnose.null import Null, from_replicates, run_null, theory
@@ -109,7 +109,8 @@ def _looked(case: Case, unfeatured: Unfeatured, tell: Tell) -> Found:
     on_speeds = speed_look(case, unfeatured)
     tell("asking features", 1, 2)
     found = heading_look(case, on_speeds, unfeatured)
-    named = [step.choice.best.candidate.effect for step in found.steps if on_headings(step)]
+    on_headings = found.steps[len(on_speeds.steps) :]
+    named = [step.choice.best.candidate.effect for step in on_headings]
     joint = [effect for effect in named if effect.paces_given]
     if joint and on_speeds.steps:
         given_turn = speed_look(case, unfeatured, joint)

@@ -38,15 +38,24 @@ def _attention(seen: Seen) -> Floats:
     )
 
 
+def _change(seen: Seen, knots: tuple[float, ...]) -> Floats:
+    """Return hat functions of the time, less their mean, shape (step, weight).
+
+    What some attend to, or is attended to, more or less all the time is another effect.
+    """
+    by = hats(seen.time, knots)
+    return np.asarray((by - by.mean(axis=0))[:, 1:])
+
+
 def _attention_of_each(seen: Seen) -> Floats:
-    """Return hat functions of the time for each fish: some may habituate, others not."""
-    by = hats(seen.time, _FEW)[:, 1:, None] * each_fish(seen)[:, None]
+    """Return a change for each fish: some may habituate, others not."""
+    by = _change(seen, _FEW)[:, :, None] * each_fish(seen)[:, None]
     by = by.reshape(len(by), 1, -1)
     return np.broadcast_to(by, (*seen.here.shape, by.shape[2]))
 
 
 def _attention_to_robots(seen: Seen) -> Floats:
-    return _attention(seen) * seen.is_robot[..., None]
+    return np.asarray(_change(seen, _KNOTS)[:, None] * seen.is_robot[..., None])
 
 
 _BY_TIME = Along(cue="share of the recording that has passed", knots=_KNOTS[1:], none_at=_KNOTS[0])
