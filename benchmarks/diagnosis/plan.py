@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-FIRST_SEED = 220_000
-FURTHER_SEED = 290_000
+FIRST_SEED = 320_000
+FURTHER_SEED = 390_000
 """Of trials that hide further forms. Neither were looked at before; a change of the diagnosis
 that is chosen on them asks for others."""
 

@@ -108,7 +108,7 @@ def test_no_seed_is_used_twice_and_none_that_was_tuned_on(planned):
                         quick=False)  # fmt: skip
     seeds = [job.scenario["seed"] for job in jobs]
     assert len(seeds) == len(set(seeds))
-    assert min(seeds) >= 220_000
+    assert min(seeds) >= 320_000
     with pytest.raises(ValueError, match="At most 100 seeds"):
         planned.Scale(seeds=101)
 
