@@ -309,9 +309,11 @@ def test_what_all_do_alike_is_gained_over(arena, seen):
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     near = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
     leaning = labelled("boldness", "leaning to the way out, by who", arena)
-    np.testing.assert_allclose(
-        leaning.vectors(near).sum(axis=1, keepdims=True), leaning.over.vectors(near)
-    )
+    both = leaning.vectors(near).reshape(N, -1, 2, 2)
+    np.testing.assert_allclose(both.sum(axis=1), leaning.over.vectors(near))
+    np.testing.assert_allclose(leaning.over.vectors(near)[:, 0], near.way_out)
+    far = dataclasses.replace(seen, xy_m=np.tile((0.06, 0.94), (N, 1)))
+    np.testing.assert_allclose(leaning.over.vectors(far)[:, 1], far.way_out)
     drawn = labelled("boldness", "drawn to the way out, by who", arena)
     np.testing.assert_allclose(
         drawn.weights(near).sum(axis=-1, keepdims=True), drawn.over.weights(near)

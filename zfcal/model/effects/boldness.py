@@ -58,10 +58,6 @@ def _lacks(company: Company) -> str | None:
 _TIMES = (0.0, 0.5, 1.0)
 
 
-def _leaning(seen: Seen) -> Floats:
-    return np.asarray(each_fish(seen)[..., None] * seen.way_out[:, None])
-
-
 def _who_by_time(seen: Seen) -> Floats:
     """Return what each fish has beside the first by the time: some leave from their moment on.
 
@@ -78,15 +74,33 @@ def _all_by_time(seen: Seen) -> Floats:
     return hats(seen.time, _TIMES)[:, 1:]
 
 
+def _nearness(between: shapely.Geometry, seen: Seen) -> Floats:
+    """Return one at the way out of a room, less farther off, shape (step,)."""
+    away_m = shapely.distance(between, shapely.points(seen.xy_m))
+    in_a_room = (seen.way_out != 0).any(axis=1)
+    return np.asarray(np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * in_a_room)
+
+
+def _leaning(between: shapely.Geometry) -> Tilt:
+    """Return that each fish leans to the way out in a measure of its own, near it and beyond."""
+
+    def common(seen: Seen) -> Floats:
+        near = _nearness(between, seen)
+        return np.stack([near, 1 - near], axis=1)[..., None] * seen.way_out[:, None]
+
+    def by_who(seen: Seen) -> Floats:
+        each = each_fish(seen)[:, :, None, None] * common(seen)[:, None]
+        return np.asarray(each.reshape(len(each), -1, 2))
+
+    return Tilt(
+        label="leaning to the way out, by who", vectors=by_who,
+        over=Tilt(label="leaning to the way out", vectors=common),
+    )  # fmt: skip
+
+
 def _near_way_out(between: shapely.Geometry) -> Weights:
     """Return one for each fish near the way out, shape (step, fish)."""
-
-    def weights(seen: Seen) -> Floats:
-        away_m = shapely.distance(between, shapely.points(seen.xy_m))
-        near = np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * (seen.way_out != 0).any(axis=1)
-        return np.asarray(each_fish(seen) * near[:, None])
-
-    return weights
+    return lambda seen: np.asarray(each_fish(seen) * _nearness(between, seen)[:, None])
 
 
 def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
@@ -143,16 +157,12 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
             over=Leaving(label="by the time", weights=_all_by_time),
         ),
         Leaving(label="who, into the open", weights=who, into="open"),
-        Tilt(
-            label="leaning to the way out, by who", vectors=_leaning,
-            over=Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None]),
-        ),
-    ]  # fmt: skip
+    ]
     number = find_rooms(arena)[0]
     between = arena.zones[number - 1].polygon if number else None
     if between is not None:
         made += [Leaving(label="who, between the rooms", weights=who, into="again")]
-        made += [*_by_who(between), _crossing(between)]
+        made += [_leaning(between), *_by_who(between), _crossing(between)]
     return tuple(made)
 
 
