@@ -51,6 +51,8 @@ def seen():
         then_toward=ways(len(LAGS), N, OTHERS),
         late_toward=ways(N, OTHERS),
         older_toward=ways(N, OTHERS),
+        soon_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
+        half_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
         late_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
         older_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
         bearing=ways(N, OTHERS),
@@ -167,6 +169,8 @@ def test_who_is_not_there_has_no_weight(arena, seen):
         here=none.astype(bool),
         is_robot=none.astype(bool),
         attention=none,
+        soon_attention=none,
+        half_attention=none,
         late_attention=none,
         older_attention=none,
         distance_m=none + AWAY_M,
@@ -364,16 +368,17 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     late = features_of("reaction-delay", arena)
     for each in late:
         if each.instead is not True:
-            is_far = "by the" in each.label or "by who" in each.label
+            is_far = any(word in each.label for word in ("by the", "by who", "far ones"))
             counts = seen.distance_m > 0.06 if is_far else seen.distance_m > 0
             np.testing.assert_allclose(
                 each.instead(seen).sum(axis=-1), seen.attention * counts, err_msg=each.label
             )
         assert each.low == 0.0
         # Three tenths of a step are three times one.
-        assert each.high == (3.0 if each.label.startswith("a tenth of a step") else 1.0)
+        tenths = each.label.startswith("a tenth of a step") and "sight" not in each.label
+        assert each.high == (3.0 if tenths else 1.0)
     for k, lag in enumerate(LAGS):
-        here, there = late[4 + k], late[4 + len(LAGS) + k]
+        here, there = late[5 + k], late[5 + len(LAGS) + k]
         assert (here.label, there.label) == (f"{lag} steps", f"{lag} steps, from there")
         np.testing.assert_array_equal(here.toward(seen), seen.ago_toward[k])
         np.testing.assert_array_equal(there.toward(seen), seen.then_toward[k])
@@ -744,6 +749,10 @@ def test_tenths_of_a_step_count_by_distance_time_and_turn(arena, seen):
     """Each with a share of its own; those next to the fish are felt at once."""
     near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.05))
     far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
+    for label in ("far ones", "by who", "by the zone", "by the time", "by the last turn"):
+        sight = labelled("reaction-delay", f"a tenth of a step, sight, {label}", arena)
+        assert not sight.weights(near).any()
+        np.testing.assert_allclose(sight.weights(far).sum(axis=-1), seen.soon_attention)
     by_zone = labelled("reaction-delay", "a tenth of a step, by the zone", arena).weights(far)
     np.testing.assert_allclose(by_zone[..., 0], seen.attention * seen.follows_walls[:, None])
     by_who = labelled("reaction-delay", "a tenth of a step, by who", arena).weights(far)

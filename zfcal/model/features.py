@@ -43,8 +43,9 @@ class Seen:
     late_toward, older_toward : ndarray, shape (step, other, 2)
         The same of whom the fish would have seen, had all others been where they were a step
         before, and two.
-    late_attention, older_attention : ndarray, shape (step, other)
-        Likewise.
+    soon_attention, half_attention, late_attention, older_attention : ndarray, shape (step, other)
+        Likewise, had all others been where they were a tenth of a step before, half a step, one and
+        two.
     ago_toward, then_toward : ndarray, shape (lag, step, other, 2)
         Where the other was `LAGS` steps before, seen or not: from where the fish is, and from where
         it was itself.
@@ -89,6 +90,8 @@ class Seen:
     half_toward: Floats
     late_toward: Floats
     older_toward: Floats
+    soon_attention: Floats
+    half_attention: Floats
     late_attention: Floats
     older_attention: Floats
     ago_toward: Floats

@@ -246,6 +246,22 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     np.testing.assert_allclose(found.seen.off_axis_rad, plain.seen.off_axis_rad, atol=1e-7)
 
 
+def test_others_come_into_view_late(law):
+    """Who is seen now and was not a tenth of a step ago is rarer than half a step ago, or a step.
+
+    Nobody is lost of whom both are true.
+    """
+    seen = law.draws[0].seen
+    new = [
+        float(((seen.attention > 0) & (ago == 0)).mean())
+        for ago in (seen.soon_attention, seen.half_attention, seen.late_attention)
+    ]
+    assert 0 < new[0] < new[1] < new[2] < 0.2
+    both = (seen.attention > 0) & (seen.soon_attention > 0)
+    ratio = np.log(seen.soon_attention[both] / seen.attention[both])
+    assert np.abs(np.median(ratio)) < 0.05
+
+
 def test_recent_turns_are_remembered_the_later_the_more():
     """A fish that turns by 0.5 at each step, and one that turned round two steps ago."""
     angle = np.array([[0.5 * k, 0.0 if k < 4 else math.pi] for k in range(7)])

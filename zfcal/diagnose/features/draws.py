@@ -239,6 +239,8 @@ def _seen(
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
     toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
+    _, soon_angle = perceive(states, at, turns.who, _SOON, cos_fov, False)
+    _, half_angle = perceive(states, at, turns.who, 0.5, cos_fov, False)
     late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov, False)
     older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov, False)
     ago, then = np.empty((2, len(LAGS), *toward.shape))
@@ -260,6 +262,8 @@ def _seen(
         half_toward=a_while_ago(0.5),
         late_toward=late[rows, others],
         older_toward=older[rows, others],
+        soon_attention=steps.alpha[:, None] * soon_angle[rows, others],
+        half_attention=steps.alpha[:, None] * half_angle[rows, others],
         late_attention=steps.alpha[:, None] * late_angle[rows, others],
         older_attention=steps.alpha[:, None] * older_angle[rows, others],
         ago_toward=ago[:, rows, others],

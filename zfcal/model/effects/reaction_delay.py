@@ -80,6 +80,17 @@ def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
     )  # fmt: skip
 
 
+def _soon_sight(label: str, by: Callable[[Seen], Floats]) -> Component:
+    """Return the same of whom the fish sees as well: others come into view and leave it late."""
+    return Component(
+        label=f"a tenth of a step, sight, {label}",
+        toward=lambda seen: seen.soon_toward,
+        weights=lambda seen: seen.soon_attention[..., None] * by(seen),
+        instead=lambda seen: seen.attention[..., None] * by(seen),
+        high=1.0,
+    )
+
+
 def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
@@ -94,6 +105,19 @@ def _soon_by(of_step: Callable[[Seen], Floats]) -> Callable[[Seen], Floats]:
     return weights
 
 
+def _ends(seen: Seen) -> Floats:
+    """Return how near the recording's beginning and end are, shape (step, 2)."""
+    return hats(seen.time, (0.0, 1.0))
+
+
+def _turn(seen: Seen) -> Floats:
+    return hats(np.abs(seen.last_turn_rad), _TURN_RAD)
+
+
+def _alike(seen: Seen) -> Floats:
+    return np.ones((len(seen.zone), 1))
+
+
 def _by_zone(seen: Seen) -> Floats:
     """Return one for steps along walls, and one for all others, shape (step, 2)."""
     return np.stack([seen.follows_walls, ~seen.follows_walls], axis=1).astype(np.float64)
@@ -102,16 +126,22 @@ def _by_zone(seen: Seen) -> Floats:
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
     _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
+    _late("half a step, sight", lambda seen: seen.half_toward, lambda seen: seen.half_attention),
     _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
     _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
     *(_ago(k) for k in range(len(LAGS))),
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
-    _soon("by the time", _soon_by(lambda seen: hats(seen.time, (0.0, 1.0)))),
-    _soon("by the last turn", _soon_by(lambda seen: hats(np.abs(seen.last_turn_rad), _TURN_RAD))),
+    _soon("by the time", _soon_by(_ends)),
+    _soon("by the last turn", _soon_by(_turn)),
     _soon("by who", _soon_by(each_fish)),
     _soon("by the zone", _soon_by(_by_zone)),
+    _soon_sight("far ones", _soon_by(_alike)),
+    _soon_sight("by who", _soon_by(each_fish)),
+    _soon_sight("by the zone", _soon_by(_by_zone)),
+    _soon_sight("by the time", _soon_by(_ends)),
+    _soon_sight("by the last turn", _soon_by(_turn)),
 )
 
 
