@@ -7,11 +7,12 @@ import pytest
 
 from zfcal.diagnose import speed_look as looking
 from zfcal.diagnose.case import open_case
+from zfcal.diagnose.diagnose import _looked
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Answer, Told
 from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
-from zfcal.diagnose.speed_look import speed_look
+from zfcal.diagnose.speed_look import gone_given, speed_look
 from zfcal.model.effects import find_effect
 
 LIT = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach_m": 0.35}}
@@ -55,6 +56,25 @@ def test_crowding_in_a_lit_room_is_named(case):
     shy = LIT | {"crowding": {"per_neighbour": 0.1, "radius_m": 0.35}}
     names = [each.choice.best.name for each in speed_look(case(shy, seed=40), nothing()).steps]
     assert names == ["crowding"]
+
+
+@pytest.mark.slow
+def test_speeds_that_turns_go_by_are_no_crowding(case):
+    """In our law the speed comes first: given the turn it depends on others, and names nothing.
+
+    What is there given the turn stays, and what is gone is not asked again.
+    """
+    coupling = {"speed-turn-coupling": {"strength": 1.5}}
+    own = case(coupling)
+    found = _looked(own, nothing(), lambda *_: None)
+    assert [each.choice.best.name for each in found.steps] == ["speed-turn-coupling"]
+    both = case(coupling | {"crowding": {"per_neighbour": 0.3}})
+    found = speed_look(both, nothing())
+    effect = [find_effect("speed-turn-coupling")]
+    assert [each.choice.best.name for each in found.steps] == ["crowding"]
+    assert gone_given(found, both.screen, effect) == []
+    without = speed_look(both, nothing(guess="any"), ["crowding"])
+    assert "crowding" not in [each.choice.best.name for each in without.steps]
 
 
 def step(name, nats=20.0):

@@ -422,21 +422,23 @@ def test_habituation_to_robots_leaves_fish_as_they_are(arena, seen):
 
 
 def test_habituation_is_a_change_and_may_be_each_fishs_own(arena, seen):
-    """A robot that is avoided all the time is not habituated to: weights have a mean of zero."""
-    all_robots = dataclasses.replace(
-        seen, is_robot=np.ones((N, OTHERS), dtype=bool), attention=np.ones((N, OTHERS))
-    )
-    to_robots = labelled("habituation", "attention to robots", arena).weights(all_robots)
-    np.testing.assert_allclose(to_robots.mean(axis=0), 0.0, atol=1e-12)
-    assert np.ptp(to_robots, axis=0).min() > 0.1
+    """Who is avoided all the time that it is there is not habituated to: in the mean nothing is."""
+    late = np.arange(N) >= N // 2
+    for here in (np.ones(N, dtype=bool), late):
+        robot = np.zeros((N, OTHERS), dtype=bool)
+        robot[here, 1] = True
+        to_robots = labelled("habituation", "attention to robots", arena)
+        weights = to_robots.weights(dataclasses.replace(seen, is_robot=robot))
+        assert not weights[~robot].any()
+        np.testing.assert_allclose(weights.sum(axis=(0, 1)), 0.0, atol=1e-12)
+    assert np.ptp(weights[robot], axis=0).max() > 0.1
 
-    each = labelled("habituation", "attention, each fish", arena).weights(all_robots)
+    each = labelled("habituation", "attention, each fish", arena).weights(seen)
     tracks = each_fish(seen)
-    assert each.shape == (N, OTHERS, 2 * tracks.shape[1])
+    each = each.reshape(N, OTHERS, tracks.shape[1], -1)
     for k in range(tracks.shape[1]):
-        other = tracks[:, k] == 0
-        assert not each[other, 0, k :: tracks.shape[1]].any()
-        assert each[~other, 0, k :: tracks.shape[1]].any()
+        assert not each[tracks[:, k] == 0, :, k].any()
+        np.testing.assert_allclose(each[:, :, k].sum(axis=(0, 1)), 0.0, atol=1e-12)
 
 
 def test_a_sense_of_travel_is_counted_along_walls_alone(arena, seen):
@@ -794,6 +796,21 @@ def test_others_in_another_room_are_a_share(arena, seen):
     np.testing.assert_allclose(weights(one.x, one.y), 2 / 3)
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     assert not weights(*between.centroid.coords[0]).any()
+
+
+def test_fish_lean_to_the_mean_heading_within_reach_or_off_the_walls(arena, seen):
+    """The unit vector of the sum; nobody within reach, no leaning."""
+    near = seen.distance_m < 0.25
+    total = (seen.heading * near[..., None]).sum(axis=1)
+    mean = labelled("alignment", "leaning, the mean within 0.25 m", arena).vectors(seen)[:, 0]
+    some = near.any(axis=1)
+    assert some.any()
+    expected = total[some] / np.linalg.norm(total[some], axis=1)[:, None]
+    np.testing.assert_allclose(mean[some], expected)
+    assert not mean[~some].any()
+    off = labelled("alignment", "leaning, the mean within 0.25 m, off the walls", arena)
+    expected = np.where(seen.follows_walls[:, None], 0.0, mean)
+    np.testing.assert_array_equal(off.vectors(seen)[:, 0], expected)
 
 
 def test_slow_steps_may_be_scattered(arena, seen):

@@ -35,7 +35,7 @@ from zfcal.diagnose.question import Question, Tell
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEVEL, Asked, best_of
-from zfcal.diagnose.speed_look import speed_look
+from zfcal.diagnose.speed_look import gone_given, speed_look
 from zfcal.diagnose.together import together
 
 _AT_LARGE_REPLICATES = 20
@@ -102,8 +102,8 @@ def diagnose(question: Question, tell: Tell) -> Diagnosis:
 def _looked(case: Case, unfeatured: Unfeatured, tell: Tell) -> Found:
     """Return what is missing of the law of speeds, and then of that of headings.
 
-    Where headings turn out to depend on the speed, speeds depend on all that turns fish. What they
-    show no more once the turn is given is not named.
+    Where headings turn out to depend on the speed, speeds may depend on all that turns fish. What
+    they show no more once the turn is given is not named.
     """
     tell("asking features", 0, 2)
     on_speeds = speed_look(case, unfeatured)
@@ -112,16 +112,11 @@ def _looked(case: Case, unfeatured: Unfeatured, tell: Tell) -> Found:
     on_headings = found.steps[len(on_speeds.steps) :]
     named = [step.choice.best.candidate.effect for step in on_headings]
     joint = [effect for effect in named if effect.paces_given]
-    if joint and on_speeds.steps:
-        given_turn = speed_look(case, unfeatured, joint)
-        if _names(given_turn) != _names(on_speeds):
-            found = heading_look(case, given_turn, unfeatured)
+    gone = gone_given(on_speeds, case.screen, joint) if joint else []
+    if gone:
+        found = heading_look(case, speed_look(case, unfeatured, gone), unfeatured)
     tell("asking features", 2, 2)
     return found
-
-
-def _names(found: Found) -> list[str]:
-    return [step.choice.best.name for step in found.steps]
 
 
 def _omnibus(question: Question, own: Mapping[str, float], rows: Sequence[_Row]) -> Omnibus:

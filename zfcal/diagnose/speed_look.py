@@ -7,7 +7,7 @@ name is there in all minutes, and not in pulses.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -38,7 +38,7 @@ from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
 
 
-def speed_look(case: Case, unfeatured: Unfeatured, beside: Sequence[Effect] = ()) -> Found:
+def speed_look(case: Case, unfeatured: Unfeatured, without: Collection[str] = ()) -> Found:
     """Return what is missing once speeds were asked for what their law lacks.
 
     Parameters
@@ -47,8 +47,9 @@ def speed_look(case: Case, unfeatured: Unfeatured, beside: Sequence[Effect] = ()
         The question, its scene and what is asked for.
     unfeatured
         What has no features.
-    beside
-        Effects on headings that are there, though the model lacks them.
+    without
+        Names that are not asked, since something else explains them; then nothing beyond the list
+        is asked either.
     """
     given = tuple(each.effect for each in in_model(case.screen.fitted.parameters))
     found = Found()
@@ -57,7 +58,8 @@ def speed_look(case: Case, unfeatured: Unfeatured, beside: Sequence[Effect] = ()
         looks = _Looks(
             case=case,
             screen=found.screen(case.screen),
-            beside=(*given, *beside, *(each.candidate.effect for each in there)),
+            beside=(*given, *(each.candidate.effect for each in there)),
+            without=tuple(without),
             number=len(there),
         )
         added = further(looks, unfeatured, there)
@@ -65,6 +67,34 @@ def speed_look(case: Case, unfeatured: Unfeatured, beside: Sequence[Effect] = ()
         if not added.steps:
             break
     return found
+
+
+def gone_given(found: Found, screen: Screen, given: Sequence[Effect]) -> list[str]:
+    """Return the names of a look that speeds show no more once the turn is given.
+
+    The law draws the speed first, and the turn from it and from what is near. So given the turn a
+    speed depends on what is near in a law that has no such effect: what is shown then is no reason
+    to name anything. But where fish have the turn first, what their speeds show of others is gone.
+
+    Parameters
+    ----------
+    found
+        By a look at speeds.
+    screen
+        The model that was given.
+    given
+        Effects by which headings depend on the speed.
+    """
+    gone, there = [], [each.effect for each in in_model(screen.fitted.parameters)]
+    for step in found.steps:
+        effect = step.choice.best.candidate.effect
+        beside, model = tuple(there), step.before
+        paces = [Paces(screen=model, beside=beside, given=own) for own in ((), tuple(given))]
+        alone, with_turn = (tell(pace_gains(each, [effect])) for each in paces)
+        if alone is not None and with_turn is None:
+            gone.append(effect.name)
+        there.append(effect)
+    return gone
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,12 +111,15 @@ class _Looks:
         Effects that are there: whatever form they have, what they explain is not named.
     number
         How many looks there were before.
+    without
+        Names that are not asked.
     """
 
     case: Case
     screen: Screen
     beside: tuple[Effect, ...]
     number: int = 0
+    without: tuple[str, ...] = ()
 
     @cached_property
     def paces(self) -> Paces:
@@ -129,6 +162,8 @@ class _Looks:
 
     def not_left_over(self, guess: Step | None) -> Step | None:
         """Return an effect beyond the list, unless features of what is there gain as much."""
+        if self.without:
+            return None
         if guess is None or not self.beside or not self.paces.has_law:
             return guess
         left, n = self.paces.gained_beside
@@ -136,7 +171,7 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        gains = pace_gains(self.paces, not_yet_there(self.case, self.beside))
+        gains = pace_gains(self.paces, self._asked(self.beside))
         said = answer(gains, self._noise(self.beside), level=level_of(self.number))
         if said.told is None:
             return said
@@ -147,7 +182,10 @@ class _Looks:
         if not told.lead > SURE:
             return False
         own = find_effect(told.gain.name)
-        return not self._stand(not_yet_there(self.case, (*self.beside, own)), own)
+        return not self._stand(self._asked((*self.beside, own)), own)
+
+    def _asked(self, beside: Sequence[Effect]) -> list[Effect]:
+        return [each for each in not_yet_there(self.case, beside) if each.name not in self.without]
 
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         return self._stand([effect], beside)

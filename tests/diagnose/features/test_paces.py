@@ -70,22 +70,20 @@ def by_company(paces):
     return np.where((paces.swum.distance_m < 0.09).sum(axis=1) >= 2, 1.25, 1.0)
 
 
-def test_beside_a_coupling_speeds_are_asked_given_the_turn(nothing, changed):
-    """Slower in turns, and fish turn where others are: no name, once the turn is given.
-
-    The turn itself names nothing: whatever turns fish would.
-    """
-    turn = nothing.swum.turn_rad
-    assert np.ptp(turn) > 3
-    times = np.ones(len(nothing.scene.moves))
-    times[nothing.rows] = 1 - 0.25 * turn / np.pi
-    slow = changed(times)
-    coupling = find_effect("speed-turn-coupling")
-    given, turn = slow.and_beside(coupling), slow.swum.turn_rad
-    assert abs(np.corrcoef(slow._left, turn)[0, 1]) > 0.1
-    assert abs(np.corrcoef(given._left, turn)[0, 1]) < 0.01
-    alone = [each.label for each in pace_gains(slow, [coupling])]
-    assert "by the turn" not in alone
+def test_fish_that_are_slow_in_turns_are_no_crowd_given_the_turn(nothing, changed):
+    """They turn where others are. Fish that are slow near others are a crowd given the turn too."""
+    times, coupling = np.ones(len(nothing.scene.moves)), find_effect("speed-turn-coupling")
+    near = np.where(nothing.swum.ahead_m < 0.1, 0.8, 1.0)
+    for factor, is_gone in ((1 - 0.8 * nothing.swum.turn_rad / np.pi, True), (near, False)):
+        times[nothing.rows] = factor
+        fits = changed(times)
+        given = dataclasses.replace(fits, given=(coupling,))
+        alone, left = (
+            best_by_name(pace_gains(each, [find_effect("crowding")]))[0].nats
+            for each in (fits, given)
+        )
+        assert alone > 10
+        assert (left < 0.2 * alone) is is_gone
 
 
 def late(paces):

@@ -182,7 +182,7 @@ def test_what_else_it_says_holds_together(effect):
 def test_every_other_form_is_a_generic_effect_of_a_listed_one():
     """By names that there are, of one effect each; with the same response, headings or speed."""
     pairs = [(form, effect) for effect in all_effects() for form in effect.other_forms]
-    assert len({form for form, _ in pairs}) == len(pairs) == 5
+    assert len({form for form, _ in pairs}) == len(pairs) == 7
     for form, listed in pairs:
         own = find_effect(form)
         assert own.generic

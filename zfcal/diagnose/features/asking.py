@@ -171,14 +171,21 @@ def _beside(law: Law, effects: Sequence[Effect]) -> Fits:
     also: list[Mixed] = []
     for effect in effects:
         for feature in effect.features(law.scene.arena):
-            chosen = fits.most_promising(feature, 1) if isinstance(feature, OneOf) else [feature]
+            chosen, n_tried = _chosen(fits, feature)
             for each in chosen:
                 if isinstance(each, Mixed):
                     also.append(_either_way(each))
                 elif not isinstance(each, Leaving) or law.zone_into(each.into):
-                    law = _absorbed(law, each)
+                    law = _absorbed(law, each, n_tried)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))
+
+
+def _chosen(fits: Fits, feature: Feature) -> tuple[Sequence[Single], int]:
+    """Return a feature, or the most promising of several, and of how many it is that."""
+    if isinstance(feature, OneOf):
+        return fits.most_promising(feature, 1), feature.n_tried
+    return [feature], 1
 
 
 def _either_way(feature: Mixed) -> Mixed:
@@ -194,13 +201,16 @@ def _either_way(feature: Mixed) -> Mixed:
     return replace(feature, high=feature.high or None)
 
 
-def _absorbed(law: Law, feature: Tilt | Leaving | Landing) -> Law:
-    """Return a law with a factor on headings or landings, if that gains more than chance."""
+def _absorbed(law: Law, feature: Tilt | Leaving | Landing, n_tried: int) -> Law:
+    """Return a law with a factor on headings or landings, if that gains more than chance.
+
+    It is the best of so many that were tried.
+    """
     fits = Fits(law=law)
     if isinstance(feature, Tilt):
         feature = replace(feature, low=None)
     made = fits.fit(feature)
-    if chdtrc(len(made.strengths), 2 * max(float(made.log_p.sum()), 0.0)) > LEVEL:
+    if n_tried * chdtrc(len(made.strengths), 2 * max(float(made.log_p.sum()), 0.0)) > LEVEL:
         return law
     if isinstance(feature, Tilt):
         return law.absorbing(bent=leaned(law, feature, made.factor))

@@ -59,10 +59,13 @@ class Paces:
         The model; what its effects do to speeds is divided out.
     beside
         Effects that are there, whatever form they have.
+    given
+        Effects on headings that depend on the speed: what speeds show of these counts as well.
     """
 
     screen: Screen
     beside: tuple[Effect, ...] = ()
+    given: tuple[Effect, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -157,12 +160,9 @@ class Paces:
     @cached_property
     def _also(self) -> Floats:
         """Orthonormal columns of what is there beside the means."""
-        made = [
-            self._less_means(feature.weights(self.swum))
-            for effect in self.beside
-            for feature in (*effect.paces, *effect.paces_given)
-            if isinstance(feature, Pace)
-        ]
+        own = [each for effect in self.beside for each in effect.paces if isinstance(each, Pace)]
+        own += [each for effect in self.given for each in effect.paces_given]
+        made = [self._less_means(feature.weights(self.swum)) for feature in own]
         return _span([np.zeros((len(self.rows), 0)), *made])
 
     @cached_property

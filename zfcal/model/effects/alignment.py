@@ -24,6 +24,7 @@ from zfcal.model.effects.weights import (
     both_senses,
     evenly,
     halfway,
+    mean_heading,
     seen_and_nearest,
     to_one_sense,
 )
@@ -35,7 +36,6 @@ from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
 
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""
-
 
 _NEAR_M = 0.15
 _REACHES_M = (0.08, 0.25, 0.4)
@@ -218,11 +218,12 @@ def _leaning_to_foremost(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _of_foremost(seen), seen.heading))
 
 
-def _mean(seen: Seen) -> Floats:
-    """Return the unit vector of the mean heading of those within 0.15 m."""
-    total = (seen.heading * (seen.distance_m < _COMPANY_M)[..., None]).sum(axis=1)
-    length = np.linalg.norm(total, axis=1)
-    return (total / np.maximum(length, 1e-9)[:, None])[:, None]
+def _leaning_to_mean(reach_m: float, *, off_walls: bool) -> Tilt:
+    def vectors(seen: Seen) -> Floats:
+        return mean_heading(seen, reach_m) * ~(seen.follows_walls & off_walls)[:, None, None]
+
+    label = f"leaning, the mean within {reach_m:g} m{', off the walls' * off_walls}"
+    return Tilt(label=label, vectors=vectors, low=0.0)
 
 
 _SEEN_M = (0.2, 9.0)
@@ -245,7 +246,7 @@ def _along(reach_m: float) -> Component:
 
 def _toward_mean(seen: Seen) -> Floats:
     """Return the sine of the angle from the own heading to the others' mean one."""
-    return aside_of(seen, _mean(seen), along_walls=True)
+    return aside_of(seen, mean_heading(seen, _COMPANY_M), along_walls=True)
 
 
 def _toward_nearest(seen: Seen) -> Floats:
@@ -262,7 +263,14 @@ _FEATURES: tuple[Feature, ...] = (
     Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0, along=_AND_AS_SEEN),
     Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
     Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
-    Tilt(label="leaning, the mean", vectors=_mean, low=0.0),
+    OneOf(
+        kind="leaning, the mean",
+        features=tuple(
+            _leaning_to_mean(reach_m, off_walls=off_walls)
+            for reach_m in (0.08, _COMPANY_M, 0.25, 0.4)
+            for off_walls in (False, True)
+        ),
+    ),
     Tilt(label="leaning, by bearing", vectors=_by_bearing, low=0.0),
     Tilt(label="leaning, their course", vectors=_their_course, low=0.0),
     Tilt(label="leaning, the foremost", vectors=_leaning_to_foremost, low=0.0, along=_TO_FOREMOST),

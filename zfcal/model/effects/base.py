@@ -227,8 +227,8 @@ class Effect:
         What its name means for speeds, whatever its form.
     paces_given
         Of an effect on headings that depends on the speed of the step: what speeds show of it,
-        given the heading. The joint law is the same, but these speeds may answer to all that turns
-        fish. So with the effect there they count beside others' features; they do not name it.
+        given the heading. The joint law may be that of fish that have the turn first; then their
+        speeds answer to all that turns them. These name nothing: they say what is left of a name.
     fixed
         Names of shapes that are no smooth matter, such as a range: a fit leaves them.
     idle

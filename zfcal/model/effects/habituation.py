@@ -38,24 +38,31 @@ def _attention(seen: Seen) -> Floats:
     )
 
 
-def _change(seen: Seen, knots: tuple[float, ...]) -> Floats:
-    """Return hat functions of the time, less their mean, shape (step, weight).
+def _change(seen: Seen, knots: tuple[float, ...], counts: Floats) -> Floats:
+    """Return hat functions of the time, less their mean where it counts, shape (step, weight).
 
     What some attend to, or is attended to, more or less all the time is another effect.
+
+    Parameters
+    ----------
+    counts : ndarray, shape (step,)
+        How much each step does; they are zero where it does not.
     """
-    by = hats(seen.time, knots)
-    return np.asarray((by - by.mean(axis=0))[:, 1:])
+    by, total = hats(seen.time, knots)[:, 1:], max(float(counts.sum()), 1e-9)
+    return np.asarray((by - counts @ by / total) * (counts > 0)[:, None])
 
 
 def _attention_of_each(seen: Seen) -> Floats:
     """Return a change for each fish: some may habituate, others not."""
-    by = _change(seen, _FEW)[:, :, None] * each_fish(seen)[:, None]
-    by = by.reshape(len(by), 1, -1)
-    return np.broadcast_to(by, (*seen.here.shape, by.shape[2]))
+    paid = seen.attention.sum(axis=1)
+    by = [_change(seen, _FEW, paid * fish) for fish in each_fish(seen).T]
+    each = np.concatenate(by, axis=1)[:, None]
+    return np.broadcast_to(each, (*seen.here.shape, each.shape[2]))
 
 
 def _attention_to_robots(seen: Seen) -> Floats:
-    return np.asarray(_change(seen, _KNOTS)[:, None] * seen.is_robot[..., None])
+    paid = (seen.attention * seen.is_robot).sum(axis=1)
+    return np.asarray(_change(seen, _KNOTS, paid)[:, None] * seen.is_robot[..., None])
 
 
 _BY_TIME = Along(cue="share of the recording that has passed", knots=_KNOTS[1:], none_at=_KNOTS[0])

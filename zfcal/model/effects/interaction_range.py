@@ -22,7 +22,7 @@ _SHARP_M = tuple(0.05 * 1.15**k for k in range(17))
 
 @inlined
 def edge(beyond_m: float) -> float:
-    """Return a step from 0 to 1 within a centimetre, so that a fit finds it by its slope."""
+    """Return a step from 0 to 1 within two centimetres, so that a fit finds it by its slope."""
     return 1.0 / (1.0 + math.exp(cut(-beyond_m / _EDGE_M, -60.0, 60.0)))
 
 
@@ -95,8 +95,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: all of that share is lost within a centimetre about the range; 0: little by "
-            "little.",
+            says="1: all of that share is lost within two centimetres about the range, and it is "
+            "the range that counts, whatever nearest is; 0: little by little.",
         ),
     ),
     strength="ignored",

@@ -36,7 +36,9 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
             off = across * across
         off /= parameters[4] * parameters[4]
         straight = (1.0 - off) * math.exp(-0.5 * off)
-    usual_m_s = state[SPEED * n + i] if parameters[3] > 0.0 else parameters[1]
+    usual_m_s, last_m_s = parameters[1], state[SPEED * n + i]
+    if parameters[3] > 0.0 and last_m_s >= 0.0:  # not where it is not known
+        usual_m_s = last_m_s
     quick = quickness(speed + SPEED_M_S - usual_m_s)
     return tilt(parameters[0], quick * straight, abs(quick))
 
@@ -143,16 +145,17 @@ EFFECT = Effect(
             low=0.01,
             high=0.3,
             default=SPEED_M_S,
-            says="Speed at which turns are as the base model has them, in m/s.",
+            says="Speed at which turns are as the base model has them, in m/s; with kick where the "
+            "last speed is not known.",
         ),
         EffectParameter(
             name="local",
             low=0.0,
             high=1.0,
             default=0.0,
-            says="0: all headings are preferred by the cosine of their turn. 1: those close to the "
-            "own direction, either way along the wall where fish follow walls, over those beside "
-            "it alone: the own direction is more concentrated.",
+            says="0: headings are preferred by the cosine of their turn. 1: those close to the own "
+            "direction are preferred, and those a little aside of it avoided; where fish follow "
+            "walls either way along the wall is the own direction.",
         ),
         EffectParameter(
             name="kick",
@@ -163,7 +166,7 @@ EFFECT = Effect(
         ),
         EffectParameter(
             name="width_rad",
-            low=0.1,
+            low=0.2,
             high=1.0,
             default=0.35,
             says="Where local: turns beyond which headings are less preferred, in radians.",

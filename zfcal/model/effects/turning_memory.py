@@ -278,7 +278,6 @@ EFFECT = Effect(
     needs={"rotation": ("turning",), "component": ("drawn",)},
     identity_s=0.8,
     shown_against="turn",
-    other_forms=("generic:heading:own-turn",),
     # generic:heading:own-turn is no other form of it: without its share of the last turn fish keep
     # their heading, which is no memory of turns, and what real fish do most.
     control=Control(name="a shuffled turn", states=_shuffled),

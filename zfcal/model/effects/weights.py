@@ -72,6 +72,13 @@ def halfway(seen: Seen, toward: Floats) -> Floats:
     return np.asarray(np.divide(between, length, out=np.zeros_like(between), where=known))
 
 
+def mean_heading(seen: Seen, reach_m: float) -> Floats:
+    """Return the unit vector of the mean heading of those within reach, shape (step, 1, 2)."""
+    total = (seen.heading * (seen.distance_m < reach_m)[..., None]).sum(axis=1)
+    length = np.linalg.norm(total, axis=1)
+    return np.asarray((total / np.maximum(length, 1e-9)[:, None])[:, None])
+
+
 def seen_and_nearest(seen: Seen) -> Floats:
     """Return weights for each that is seen, and for the nearest, shape (step, other, 2)."""
     return np.concatenate([(seen.in_sight & seen.here)[..., None], seen.nearest], axis=2)
