@@ -92,9 +92,8 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             position noise estimated from the tracks, not given. Strength is in oracle nats: the
             sum over steps of log f_true minus log f_base, the base law at its own maximum
             likelihood. Seeds begin at {FIRST_SEED}, of further forms at
-            {FURTHER_SEED}; they were written down before any was run, and no rule was chosen on
-            them. Intervals are Wilson's, 95 %. Code {_codes(found)}. Machine: {found["machine"]},
-            shared with other work."""
+            {FURTHER_SEED}; they were written down before any was run. Intervals are Wilson's,
+            95 %. Code {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
         table(("section", "trials", "planned", *MODES.values()), rows),
