@@ -199,12 +199,17 @@ def summary(desk: Desk, jobs: Sequence[Job]) -> dict[str, Any]:
     made = summarise(rows, planned=planned)
     return {
         "machine": machine(),
+        "seeds": _ends([row["scenario"]["seed"] for row in rows]),
         "code": {
             mode: {"diagnosis": each[LISTED_SECTION], "extension": each[EXTEND]}
             for mode, each in marks.items()
         },
         **made,
     }
+
+
+def _ends(seeds: Sequence[int]) -> list[int]:
+    return [min(seeds), max(seeds)] if seeds else []
 
 
 def publish(found: dict[str, Any], place: Places) -> None:

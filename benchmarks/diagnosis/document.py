@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.diagnosis.answers import DESCRIBES, FATES, NAMELESS, NOTHING
-from benchmarks.diagnosis.plan import FIRST_SEED, FURTHER_NOISE_MM, FURTHER_SEED, SECTIONS, VIDEO
+from benchmarks.diagnosis.plan import FURTHER_NOISE_MM, SECTIONS, VIDEO
 from benchmarks.shared.measuring import table
 
 MODES = {"full": "39 replicates", "quick": "`--quick`"}
@@ -91,13 +91,16 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             each is written as CSV at 15 Hz, imported and diagnosed as the commands do it, with the
             position noise estimated from the tracks, not given. Strength is in oracle nats: the
             sum over steps of log f_true minus log f_base, the base law at its own maximum
-            likelihood. Seeds begin at {FIRST_SEED}, of further forms at
-            {FURTHER_SEED}; they were written down before any was run. Intervals are Wilson's,
+            likelihood. Seeds are {_seeds(found)}. Intervals are Wilson's,
             95 %. Code {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
         table(("section", "trials", "planned", *MODES.values()), rows),
     ]
+
+
+def _seeds(found: Mapping[str, Any]) -> str:
+    return " to ".join(map(str, found.get("seeds") or ["none yet"]))
 
 
 def _codes(found: Mapping[str, Any]) -> str:
