@@ -452,3 +452,27 @@ def test_a_model_may_have_too_much_of_a_component(base, worlds):
     found = [Fits(law=Law(scene=drawn, fitted=each)).null_log_p.sum() for each in (too_much, right)]
     assert np.nansum(too_much.log_p) < np.nansum(right.log_p) - 10
     assert found[0] == pytest.approx(found[1], abs=3)
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("turning-bias", {"strength": 1.2, "turning": 1.0}),
+        ("turning-bias", {"strength": 0.4}),
+        ("alignment", {"weight": 30.0, "kappa": 8.0}),
+        ("interaction-range", {"range_m": 0.15, "sharp": 1.0}),
+        ("directional-drift", {"strength": 0.5, "direction_rad": 1.0}),
+    ],
+    ids=str,
+)
+def test_features_see_most_of_what_a_form_of_the_name_makes(base, worlds, name, given):
+    """Of headings drawn from a model that has it, three quarters of what the model itself gains."""
+    scene, fitted = base
+    model = with_effect(fitted.parameters, name, given)
+    there = maximise(scene, model, start=fitted.x, rounds=0)
+    drawn = worlds.redrawn(scene, there, np.random.default_rng(8), np.ones_like)
+    without = maximise(drawn, fitted.parameters)
+    form = np.nansum(maximise(drawn, model, start=without.x).log_p) - np.nansum(without.log_p)
+    best = best_by_name(gains_of(Law(scene=drawn, fitted=without), [find_effect(name)]))[0]
+    assert form > 15
+    assert best.log_p.sum() > 0.75 * form

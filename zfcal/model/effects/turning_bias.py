@@ -67,6 +67,10 @@ def _drawn(angle_rad: float, where: str) -> Component:
     )  # fmt: skip
 
 
+def _everywhere(seen: Seen) -> Floats:
+    return np.ones(len(seen.zone))
+
+
 def _left(seen: Seen) -> Floats:
     """Return the left of each heading, for each zone apart, shape (step, zone, 2)."""
     left = left_of(seen.own_heading)
@@ -79,7 +83,9 @@ def _left_by_who(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    Turned(label="offset", by=lambda seen: np.ones(len(seen.zone)), neighbours=True),
+    Turned(label="offset", by=_everywhere, neighbours=True),
+    # The base's own direction alone: what is drawn to others stays as it is.
+    Turned(label="offset of the own direction", by=_everywhere, neighbours=False),
     OneOf(
         kind="drawn to a side",
         features=tuple(
@@ -92,6 +98,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning", vectors=_left),
     # Some turn left, others right, as individuals do that have a side of their own.
     Turned(label="offset, by who", by=each_fish, neighbours=True),
+    Turned(label="offset of the own direction, by who", by=each_fish, neighbours=False),
     Tilt(label="leaning, by who", vectors=_left_by_who),
     Component(
         label="along the wall",
