@@ -1,15 +1,20 @@
 """Fits beside effects are made once for each law, and the same as if they were made anew."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
+from scipy.special import chdtrc
 
-from zfcal.diagnose.features.asking import fits_beside
+from zfcal.diagnose.features.asking import _absorbed, fits_beside
 from zfcal.diagnose.features.curves import redrawn
+from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import find_effect
+from zfcal.model.features import Tilt
 
 BIAS, DRIFT, COHESION = map(find_effect, ("turning-bias", "directional-drift", "group-cohesion"))
 
@@ -36,6 +41,22 @@ def test_fits_that_were_forgotten_are_made_again_as_they_were(law):
     again = fits_beside(law, [BIAS])
     assert again is not before[1]
     np.testing.assert_array_equal(again.null_log_p, before[1].null_log_p)
+
+
+def test_the_best_of_many_has_to_gain_more_to_be_taken_along(law):
+    """A leaning by chance to one of many places: taken along as the only one, not as their best."""
+    places = find_effect("place-preference").features(law.scene.arena)
+    tilts = next(f.features for f in places if isinstance(getattr(f, "features", [0])[0], Tilt))
+    fits = Fits(law=law)
+
+    def chance(tilt):
+        fit = fits.fit(dataclasses.replace(tilt, low=None))
+        return chdtrc(len(fit.strengths), 2 * max(float(fit.log_p.sum()), 0.0))
+
+    best = min(tilts, key=chance)
+    assert 1e-4 < chance(best) < LEVEL
+    assert _absorbed(law, best, 1) is not law
+    assert _absorbed(law, best, math.ceil(1.01 * LEVEL / chance(best))) is law
 
 
 def test_a_law_of_noisy_positions_keeps_no_fits(law):

@@ -10,7 +10,7 @@ from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.kernels.state import SPEED
+from zfcal.model.kernels.state import HX, HY, SPEED
 from zfcal.model.paces import Spread
 
 ALL = tuple(all_effects())
@@ -68,6 +68,15 @@ def by_the_nearest(paces):
 def by_company(paces):
     """Faster with two others within 9 cm."""
     return np.where((paces.swum.distance_m < 0.09).sum(axis=1) >= 2, 1.25, 1.0)
+
+
+def test_the_turn_of_a_step_is_that_from_the_heading_before_to_its_own(nothing):
+    """Of the last turn one step later, where the fish moved on."""
+    turns, states = nothing.turns, nothing.scene.states
+    before, after = (states[turns.at + k, :, turns.who][:, [HX, HY]] for k in (0, 1))
+    cosine = np.clip((before * after).sum(axis=1), -1, 1)
+    np.testing.assert_allclose(np.cos(nothing.swum.turn_rad), cosine, atol=1e-9)
+    assert np.abs(nothing.swum.turn_rad - nothing.swum.last_turn_rad).max() > 1
 
 
 def test_fish_that_are_slow_in_turns_are_no_crowd_given_the_turn(nothing, changed):
