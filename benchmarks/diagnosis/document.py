@@ -91,8 +91,8 @@ def _head(found: Mapping[str, Any]) -> list[str]:
             each is written as CSV at 15 Hz, imported and diagnosed as the commands do it, with the
             position noise estimated from the tracks, not given. Strength is in oracle nats: the
             sum over steps of log f_true minus log f_base, the base law at its own maximum
-            likelihood. Seeds are {_seeds(found)}. Intervals are Wilson's,
-            95 %. Code {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
+            likelihood. Seeds are {_seeds(found)}. Intervals are Wilson's, 95 %. Code
+            {_codes(found)}. Machine: {found["machine"]}, shared with other work."""
         ),
         _completeness(found),
         table(("section", "trials", "planned", *MODES.values()), rows),
@@ -100,6 +100,7 @@ def _head(found: Mapping[str, Any]) -> list[str]:
 
 
 def _seeds(found: Mapping[str, Any]) -> str:
+    """Return the least and the greatest seed of the trials that are told."""
     return " to ".join(map(str, found.get("seeds") or ["none yet"]))
 
 

@@ -16,8 +16,8 @@ import numpy as np
 
 FIRST_SEED = 320_000
 FURTHER_SEED = 390_000
-"""Of trials that hide further forms. Neither were looked at before; a change of the diagnosis
-that is chosen on them asks for others."""
+"""Of trials that hide further forms. No rule of the diagnosis was chosen on trials of either; one
+that is asks for other seeds."""
 
 FURTHER_NOISE_MM = 0.5
 """Of every third trial of a further form; the others have none."""

@@ -161,7 +161,10 @@ class _Looks:
         return step if told.lead > BY_ITSELF or self._explains(told) else None
 
     def not_left_over(self, guess: Step | None) -> Step | None:
-        """Return an effect beyond the list, unless features of what is there gain as much."""
+        """Return an effect beyond the list, unless features of what is there gain as much.
+
+        None where some names are not asked: what explains these is not held against it.
+        """
         if self.without:
             return None
         if guess is None or not self.beside or not self.paces.has_law:

@@ -166,7 +166,7 @@ EFFECT = Effect(
         ),
         EffectParameter(
             name="width_rad",
-            low=0.2,
+            low=0.2,  # Two cells of headings: the likelihood would not see a narrower one whole.
             high=1.0,
             default=0.35,
             says="Where local: turns beyond which headings are less preferred, in radians.",
