@@ -6,8 +6,7 @@ import re
 import grimp
 import pytest
 
-from zfcal.model.effects import all_effects, generic_effects
-from zfcal.model.effects.generic import PREFIX
+from zfcal.model.effects import PREFIX, all_effects, generic_effects
 from zfcal_cli.main import COMMANDS
 
 MOST_MODULES = 30

@@ -13,8 +13,7 @@ from zfcal.diagnose.candidates import (
     in_model,
     not_forms_of,
 )
-from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.effects.generic import generic_effects
+from zfcal.model.effects import all_effects, find_effect, generic_effects
 from zfcal.model.features import LAGS
 from zfcal.model.kernels.state import KIND
 from zfcal.model.scene import make_scene

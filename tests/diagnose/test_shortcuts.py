@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.effects.generic import generic_effects
+from zfcal.model.effects import all_effects, find_effect, generic_effects
 from zfcal.model.extended import with_effect
 from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.scores import factor_score, mixture_score

@@ -7,9 +7,11 @@ import importlib.util
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.model.features import LAGS, Seen
 from zfcal.parameters import natural
 
 # A neighbour just beside, one just ahead, one behind, one far: seen by the agent at (x, y).
@@ -67,3 +69,58 @@ def hard_state(request):
 def make_natural():
     """Return a function that gives natural parameters for an arena."""
     return natural_of
+
+
+@pytest.fixture
+def seen():
+    """Return what six steps of fish saw of two fish and a robot, all at random."""
+    rng, n, others = np.random.default_rng(3), 6, 3
+
+    def ways(*shape):
+        angle = rng.uniform(-np.pi, np.pi, shape)
+        return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    robot = np.zeros((n, others), dtype=bool)
+    robot[:, -1] = True
+    return Seen(
+        attention=rng.uniform(0.1, 2.0, (n, others)),
+        toward=ways(n, others),
+        soon_toward=ways(n, others),
+        half_toward=ways(n, others),
+        ago_toward=ways(len(LAGS), n, others),
+        then_toward=ways(len(LAGS), n, others),
+        late_toward=ways(n, others),
+        older_toward=ways(n, others),
+        soon_attention=rng.uniform(0.1, 2.0, (n, others)),
+        half_attention=rng.uniform(0.1, 2.0, (n, others)),
+        late_attention=rng.uniform(0.1, 2.0, (n, others)),
+        older_attention=rng.uniform(0.1, 2.0, (n, others)),
+        bearing=ways(n, others),
+        distance_m=rng.uniform(0.03, 0.5, (n, others)),
+        off_axis_rad=rng.uniform(0, np.pi, (n, others)),
+        speed_m_s=rng.uniform(0, 0.2, (n, others)),
+        lately_m_s=rng.uniform(0, 0.2, (n, others)),
+        heading=ways(n, others),
+        course=0.05 * ways(n, others),
+        here=np.ones((n, others), dtype=bool),
+        in_sight=rng.random((n, others)) < 0.7,
+        is_robot=robot,
+        other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:others], (n, 1)),
+        own_heading=ways(n),
+        x_axis=np.tile([1.0, 0.0], (n, 1)),
+        way_out=ways(n),
+        along_wall=ways(n),
+        xy_m=rng.uniform(0.1, 0.3, (n, 2)),
+        follows_walls=np.arange(n) % 2 == 0,
+        zone=np.arange(n) % 3 + 1,
+        track=np.arange(n, dtype=np.int32) % 3,
+        own_speed_m_s=rng.uniform(0.02, 0.2, n),
+        last_turn_rad=rng.normal(0, 0.3, n),
+        ago_heading=np.stack([ways(n) for _ in LAGS]),
+        recent_turn_rad=rng.normal(0, 0.3, n),
+        time=np.linspace(0, 1, n),
+        left_s=rng.uniform(0, 9, n),
+        each_left_s=rng.uniform(0, 9, (n, others)),
+        in_open=rng.uniform(0, 1, (n, others)),
+        stayed_s=rng.uniform(0, 30, n),
+    )

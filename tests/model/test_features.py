@@ -19,7 +19,6 @@ from zfcal.model.features import (
     Landing,
     Leaving,
     OneOf,
-    Seen,
     Sharper,
     Tilt,
     Turned,
@@ -28,60 +27,17 @@ from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.rooms import find_rooms
 
 N, OTHERS = 6, 3
-_OF_OTHERS = ("here", "speed_m_s", "lately_m_s", "distance_m", "off_axis_rad", "is_robot")
+"""Steps and others of the fixture `seen`."""
 
-
-@pytest.fixture
-def seen():
-    """Return what six steps of fish saw of two fish and a robot, all at random."""
-    rng = np.random.default_rng(3)
-
-    def ways(*shape):
-        angle = rng.uniform(-np.pi, np.pi, shape)
-        return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-    robot = np.zeros((N, OTHERS), dtype=bool)
-    robot[:, -1] = True
-    return Seen(
-        attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
-        toward=ways(N, OTHERS),
-        soon_toward=ways(N, OTHERS),
-        half_toward=ways(N, OTHERS),
-        ago_toward=ways(len(LAGS), N, OTHERS),
-        then_toward=ways(len(LAGS), N, OTHERS),
-        late_toward=ways(N, OTHERS),
-        older_toward=ways(N, OTHERS),
-        soon_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
-        half_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
-        late_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
-        older_attention=rng.uniform(0.1, 2.0, (N, OTHERS)),
-        bearing=ways(N, OTHERS),
-        distance_m=rng.uniform(0.03, 0.5, (N, OTHERS)),
-        off_axis_rad=rng.uniform(0, np.pi, (N, OTHERS)),
-        speed_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
-        lately_m_s=rng.uniform(0, 0.2, (N, OTHERS)),
-        heading=ways(N, OTHERS),
-        course=0.05 * ways(N, OTHERS),
-        here=np.ones((N, OTHERS), dtype=bool),
-        in_sight=rng.random((N, OTHERS)) < 0.7,
-        is_robot=robot,
-        other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:OTHERS], (N, 1)),
-        own_heading=ways(N),
-        x_axis=np.tile([1.0, 0.0], (N, 1)),
-        way_out=ways(N),
-        along_wall=ways(N),
-        xy_m=rng.uniform(0.1, 0.3, (N, 2)),
-        follows_walls=np.arange(N) % 2 == 0,
-        zone=np.arange(N) % 3 + 1,
-        track=np.arange(N, dtype=np.int32) % 3,
-        own_speed_m_s=rng.uniform(0.02, 0.2, N),
-        last_turn_rad=rng.normal(0, 0.3, N),
-        ago_heading=np.stack([ways(N) for _ in LAGS]),
-        recent_turn_rad=rng.normal(0, 0.3, N),
-        time=np.linspace(0, 1, N),
-        left_s=rng.uniform(0, 9, N),
-        each_left_s=rng.uniform(0, 9, (N, OTHERS)),
-    )
+_OF_OTHERS = (
+    "here",
+    "speed_m_s",
+    "lately_m_s",
+    "distance_m",
+    "off_axis_rad",
+    "is_robot",
+    "in_open",
+)
 
 
 @pytest.fixture(scope="module")
@@ -747,27 +703,20 @@ def test_old_headings_and_turns_to_one_side_draw(arena, seen):
         )
 
 
-def test_tenths_of_a_step_count_by_distance_time_and_turn(arena, seen):
-    """Each with a share of its own; those next to the fish are felt at once."""
+def test_tenths_of_a_step_count_for_those_that_are_not_next_to_the_fish(arena, seen):
+    """Those are felt at once, under all circumstances; of the others all of the attention."""
     near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.05))
     far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
-    for label in ("far ones", "by who", "by the zone", "by the time", "by the last turn"):
-        sight = labelled("reaction-delay", f"a tenth of a step, sight, {label}", arena)
+    for label in ("", ", by who", ", by the zone", ", by the time", ", by the last turn"):
+        sight = labelled("reaction-delay", f"a tenth of a step, sight, far ones{label}", arena)
         assert not sight.weights(near).any()
         np.testing.assert_allclose(sight.weights(far).sum(axis=-1), seen.soon_attention)
-    by_zone = labelled("reaction-delay", "a tenth of a step, by the zone", arena).weights(far)
-    np.testing.assert_allclose(by_zone[..., 0], seen.attention * seen.follows_walls[:, None])
-    by_who = labelled("reaction-delay", "a tenth of a step, by who", arena).weights(far)
-    np.testing.assert_allclose(by_who, seen.attention[..., None] * each_fish(seen)[:, None])
-    for label, cue in (("by the time", seen.time), ("by the last turn", abs(seen.last_turn_rad))):
-        feature = labelled("reaction-delay", f"a tenth of a step, {label}", arena)
-        assert not feature.weights(near).any()
-        weights = feature.weights(far)
-        np.testing.assert_allclose(weights.sum(axis=-1), seen.attention)
-        assert (
-            np.diff(weights[np.argsort(cue), 0, 0] / seen.attention[np.argsort(cue), 0]) <= 0
-        ).all()
-        assert feature.instead is feature.weights
+        np.testing.assert_allclose(sight.instead(far).sum(axis=-1), seen.attention)
+    by_zone = labelled("reaction-delay", "a tenth of a step, far ones, by the zone", arena)
+    np.testing.assert_allclose(
+        by_zone.weights(far)[..., 0], seen.attention * (seen.zone == 1)[:, None]
+    )
+    assert by_zone.instead is by_zone.weights
     by_distance = labelled("reaction-delay", "a tenth of a step, by distance", arena)
     near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.03))
     np.testing.assert_allclose(by_distance.weights(near)[..., 0], seen.attention)

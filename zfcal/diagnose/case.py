@@ -25,8 +25,7 @@ from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.sharpening import sharpened
 from zfcal.diagnose.standing import standing_of
-from zfcal.model.effects import Effect, find_effect
-from zfcal.model.effects.generic import generic_effects
+from zfcal.model.effects import Effect, find_effect, generic_effects
 from zfcal.model.extended import maximise
 from zfcal.model.fitted import Fitted, Free
 from zfcal.model.scene import Scene, make_scene

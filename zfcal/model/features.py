@@ -82,6 +82,10 @@ class Seen:
         Since another one that is still away left the room.
     each_left_s : ndarray, shape (step, other)
         Since each other one left it, though it may have come back; infinite for who did not.
+    in_open : ndarray, shape (step, other)
+        Share of the last five seconds that the other was off the walls.
+    stayed_s : ndarray, shape (step,)
+        Since the fish came into its room, or between the rooms, or into the recording.
     """
 
     attention: Floats
@@ -122,6 +126,8 @@ class Seen:
     time: Floats
     left_s: Floats
     each_left_s: Floats
+    in_open: Floats
+    stayed_s: Floats
 
     @property
     def nearest(self) -> Floats:
@@ -188,10 +194,11 @@ class Component:
     weights
         Shape (step, source, weight): a strength is fitted for each weight.
     kappa
-        Concentration about a source; ``own`` or ``neighbours``: as the base law has it there.
+        Concentration about a source; ``own`` or ``neighbours``: as the base law has it there;
+        ``sharper``: a tenth more than about neighbours.
     instead
-        Weights of what it takes the place of, of the directions to where the others are now: True
-        for all of the attention to them.
+        Weights of what it takes the place of, of the directions to where the others are now, which
+        have the base law's concentration if it is sharper: True for all of the attention to them.
     low, high
         Bounds of the strengths.
     along
@@ -204,7 +211,7 @@ class Component:
     label: str
     toward: Weights | Literal["toward", "bearing", "heading"]
     weights: Weights
-    kappa: float | Literal["own", "neighbours"] = "neighbours"
+    kappa: float | Literal["own", "neighbours", "sharper"] = "neighbours"
     instead: Weights | bool = False
     low: float = 0.0
     high: float | None = None
@@ -341,6 +348,10 @@ class Landing:
     over: Landing | None = None
 
 
+Choosable: TypeAlias = Component | Tilt | Turned | Leaving | Landing
+"""Features of which a first look may say how promising they are."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OneOf:
     """Features of which only the most promising ones are fitted, such as places.
@@ -357,8 +368,8 @@ class OneOf:
     """
 
     kind: str
-    features: Sequence[Component | Tilt | Turned | Landing]
-    near: Callable[[int], Sequence[Component | Tilt | Turned | Landing]] | None = None
+    features: Sequence[Choosable]
+    near: Callable[[int], Sequence[Choosable]] | None = None
 
     @property
     def n_tried(self) -> int:

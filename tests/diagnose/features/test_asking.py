@@ -2,19 +2,21 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.special import chdtrc
 
-from zfcal.diagnose.features.asking import _absorbed, fits_beside
+from zfcal.artifacts.arenas import load_arena
+from zfcal.diagnose.features.asking import _absorbed, _askable, _one, fits_beside
 from zfcal.diagnose.features.curves import redrawn
 from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import find_effect
-from zfcal.model.features import Tilt
+from zfcal.model.features import Leaving, Tilt
 
 BIAS, DRIFT, COHESION = map(find_effect, ("turning-bias", "directional-drift", "group-cohesion"))
 
@@ -75,3 +77,16 @@ def test_what_a_redrawn_law_takes_along_is_what_it_would_work_out(law, base):
     np.testing.assert_array_equal(made.cells, anew.cells)
     np.testing.assert_array_equal(made.weight, anew.weight)
     np.testing.assert_array_equal(made.base, anew.base)
+
+
+def test_a_tank_without_rooms_has_nobody_leaving_them(law):
+    """Neither by itself nor under circumstances; who swims into the open is another matter."""
+    open_square = load_arena("open-square", Path())
+    bare = dataclasses.replace(law, scene=dataclasses.replace(law.scene, arena=open_square))
+    for name in ("boldness", "collective-departure"):
+        effect = find_effect(name)
+        asked = _askable(bare, effect)
+        leaving = [each for each in asked if isinstance(_one(each), Leaving)]
+        assert all(_one(each).into == "open" for each in leaving)
+        in_rooms = [_one(each) for each in _askable(law, effect)]
+        assert sum(isinstance(each, Leaving) for each in in_rooms) > len(leaving)

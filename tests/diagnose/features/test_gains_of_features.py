@@ -68,6 +68,18 @@ def test_nothing_is_gained_where_nothing_is_missing(base):
     assert -10 < best_by_name(found)[0].nats < 6
 
 
+def test_what_each_fish_does_its_own_way_is_told(base, hidden):
+    """Half of them lean to the north and half to the south: all together to no direction."""
+    scene, _ = base
+    north = np.where(scene.turns.track % 2 == 0, 1.0, -1.0)
+    law = hidden(lambda angle: np.exp(0.25 * north[:, None] * np.sin(angle)))
+    told = tell(gains_of(law, all_effects()))
+    assert told.gain.name == "directional-drift"
+    assert told.gain.label == "leaning, by who"
+    alike = gains_of(law, [find_effect("directional-drift")], kinds={(told.gain.name, "leaning")})
+    assert alike[0].nats < 0.2 * told.gain.nats
+
+
 def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
     """Of headings 4 % are drawn about north-west, in a wide and lopsided bump: a direction."""
     _, fitted = base
@@ -178,6 +190,7 @@ def test_features_are_asked_by_kind(nothing):
         "leaning",
         "turning",
         "turning as a whole",
+        "leaning, by circumstances",
         "landing at a wall",
         "landing at a place",
     ]

@@ -309,11 +309,11 @@ def test_beside_an_effect_its_own_features_gain_nothing(nothing, changed):
 
 
 def test_what_comes_and_goes_is_not_there_in_all_minutes(nothing, changed):
-    """Two of ten minutes have it: gains are told, and differ between minutes."""
+    """Two of ten minutes have it, far apart: gains are told, and differ between minutes."""
     times = np.ones(len(nothing.scene.moves))
     times[nothing.rows] = by_the_nearest(nothing) ** 2
     always = changed(times)
-    seldom = np.where(nothing.scene.time_s(nothing.scene.moves) % 600 < 120, times**2, 1.0)
+    seldom = np.where(nothing.scene.time_s(nothing.scene.moves) % 300 < 60, times**2, 1.0)
     sometimes = changed(seldom)
     for paces, steady in ((always, True), (sometimes, False)):
         told = tell(pace_gains(paces, ALL))

@@ -96,7 +96,12 @@ def _off_walls(
 
 
 def _is_landing(feature: Feature) -> bool:
-    return isinstance(feature.features[0] if isinstance(feature, OneOf) else feature, Landing)
+    return isinstance(_one(feature), Landing)
+
+
+def _one(feature: Feature) -> Single:
+    """Return a feature, or the first of those of one sort."""
+    return feature.features[0] if isinstance(feature, OneOf) else feature
 
 
 def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
@@ -134,10 +139,12 @@ def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
 def _askable(law: Law, effect: Effect) -> list[Feature]:
     """Return the features of an effect that a tank allows: not all have a zone to leave into."""
     return [
-        feature
-        for feature in effect.features(law.scene.arena)
-        if not isinstance(feature, Leaving) or law.zone_into(feature.into)
+        feature for feature in effect.features(law.scene.arena) if _has_a_zone(law, _one(feature))
     ]
+
+
+def _has_a_zone(law: Law, feature: Single) -> bool:
+    return not isinstance(feature, Leaving) or law.zone_into(feature.into) > 0
 
 
 def fits_beside(law: Law, effects: Sequence[Effect]) -> Fits:
@@ -170,12 +177,12 @@ def _beside(law: Law, effects: Sequence[Effect]) -> Fits:
     fits = Fits(law=law)
     also: list[Mixed] = []
     for effect in effects:
-        for feature in effect.features(law.scene.arena):
+        for feature in _askable(law, effect):
             chosen, n_tried = _chosen(fits, feature)
             for each in chosen:
                 if isinstance(each, Mixed):
                     also.append(_either_way(each))
-                elif not isinstance(each, Leaving) or law.zone_into(each.into):
+                else:
                     law = _absorbed(law, each, n_tried)
                     fits = Fits(law=law)
     return Fits(law=law, also=tuple(also))

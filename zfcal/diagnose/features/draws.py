@@ -17,6 +17,7 @@ from zfcal.model.features import AWAY_M, LAGS, Seen
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
+    FOLLOWS,
     HX,
     HY,
     KIND,
@@ -47,6 +48,7 @@ _SOON = 0.1
 """Share of a step of a response that is a little late."""
 
 _LATELY_S = 2.0
+_OPEN_S = 5.0
 """How fast others were lately is taken over so long."""
 
 _RECENT, _FADING = 5, 0.6
@@ -294,6 +296,8 @@ def _seen(
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
+        in_open=_in_open(states, steps.scene.dt_s)[at[:, None], others],
+        stayed_s=_stayed(states, steps.scene.dt_s)[at, turns.who],
     )
 
 
@@ -310,6 +314,24 @@ def _lately(states: Floats, dt_s: float) -> Floats:
         total += np.where(known, then, 0.0)
         count += known
     return np.asarray(total / np.maximum(count, 1))
+
+
+def _in_open(states: Floats, dt_s: float) -> Floats:
+    """Return the share of the last seconds that everybody was off the walls, (sample, agent)."""
+    n = max(1, round(_OPEN_S / dt_s))
+    there = states[:, ZONE] > 0
+    off = there & ~(states[:, FOLLOWS] > 0)
+    passed, known = (np.cumsum(np.pad(each, ((n, 0), (0, 0))), axis=0) for each in (off, there))
+    return np.asarray((passed[n:] - passed[:-n]) / np.maximum(known[n:] - known[:-n], 1))
+
+
+def _stayed(states: Floats, dt_s: float) -> Floats:
+    """Return for how long everybody has been in its room, or between rooms, (sample, agent)."""
+    room = np.where(states[:, ZONE] > 0, states[:, ROOM], -1.0)
+    sample = np.arange(len(room))[:, None]
+    came = np.zeros(room.shape, dtype=np.int64)
+    came[1:] = np.where(room[1:] != room[:-1], sample[1:], 0)
+    return np.asarray((sample - np.maximum.accumulate(came, axis=0)) * dt_s)
 
 
 def _courses(states: Floats, dt_s: float) -> Floats:

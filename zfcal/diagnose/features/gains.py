@@ -28,13 +28,13 @@ from zfcal.diagnose.features.climbing import (
 )
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
+from zfcal.diagnose.features.first_look import FirstLook
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
-from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import MOST_SHARPER, Law
+from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
-    Component,
     Landing,
     Leaving,
     Mixed,
@@ -53,11 +53,7 @@ _OWN = 0.3
 fish attend to, their own way is never gone. Columns that are derivatives do not know."""
 
 _MOST_TILT = 4.0
-_MOST_LEAVING = 6.0
 _MOST_TURN = 0.3
-
-_TRIED = (0.005, 0.02, 0.06)
-"""Strengths of a component at which it is first asked for."""
 
 _AS_IT_IS, _NONE = np.ones(1), np.zeros(0)
 
@@ -165,7 +161,7 @@ class Fits:
     def prepare(self) -> None:
         """Work out what all features need, before they are asked side by side."""
         _ = (self.law.own_parameters, self.law.cells)
-        _ = (self._null, self._untilted, self._mean_heading, self.landings.prepared)
+        _ = (self._null, self._untilted, self.first_look.prepared, self.landings.prepared)
 
     @property
     def n_beside(self) -> int:
@@ -199,12 +195,17 @@ class Fits:
         if isinstance(feature, Tilt):
             return self.tilt(feature)
         if isinstance(feature, Leaving):
-            return self.leaving(feature)
+            return self.leavings.fit(feature)
         if isinstance(feature, Landing):
             return self.landings.fit(feature)
         columns, bounds = self._columns(feature)
         made = self._linear([columns], bounds, self._null.x)
         return replace(made, log_p=made.log_p - self.null_log_p)
+
+    @cached_property
+    def leavings(self) -> Leavings:
+        """Fits of features of leaving."""
+        return Leavings(law=self.law)
 
     @cached_property
     def landings(self) -> Landings:
@@ -220,64 +221,20 @@ class Fits:
         return replace(gain, log_p=made) if made.sum() > gain.log_p.sum() else gain
 
     def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Single]:
-        """Return the features that a first look says most of."""
-        promise = [self._promise(feature) for feature in choice.features]
+        """Return the features that a first look says most of, more than their strengths cost."""
+        promise = [self.first_look.nats(feature) for feature in choice.features]
         order = [int(k) for k in np.argsort(promise)[::-1][:n] if promise[k] > 0]
         if choice.near is None:
             return [choice.features[k] for k in order]
-        return [max(choice.near(k), key=self._promise) for k in order]
-
-    def _promise(self, feature: Component | Tilt | Turned | Landing) -> float:
-        """Return how clear a feature is: by the scores of its weights, or a gain in nats.
-
-        The score of a component has no variance where the density is next to nothing, so it is
-        asked for by what a few strengths of it gain, all its weights alike, the lapse as it is.
-        """
-        if isinstance(feature, Component):
-            return self._promise_of(self.law.component(feature, first=True))
-        if isinstance(feature, Landing):
-            scores = self.landings.scores(feature)
-        elif isinstance(feature, Turned):
-            (at, over), (base_at, base_over) = self.law.turned(feature), self.law.base
-            scores = self._no_lapse[:, None] * (at / base_at - over / base_over)
-        else:
-            taken = ways_of(self.law.turns.taken, axial=feature.axial)
-            apart = taken - self._mean_heading[int(feature.axial)]
-            scores = np.einsum("sbd,sd->sb", feature.vectors(self.law.draws[0].seen), apart)
-        total = scores.sum(axis=0)
-        if not np.isfinite(total).all():
-            return 0.0
-        return float(total @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ total)
-
-    def _promise_of(self, columns: Columns) -> float:
-        (at, over), lapse = (each.sum(axis=1) for each in columns), self.law.lapses.likely
-        (base_at, base_over), here = self.law.base, np.exp(self.law.log_here)
-        gains = [
-            float(
-                np.log(
-                    (1 - lapse)
-                    * here
-                    * (base_at[:, 0] + share * at)
-                    / (base_over[:, 0] + share * over)
-                    + lapse * UNIFORM
-                ).sum()
-            )
-            for share in (0.0, *_TRIED)
-        ]
-        return max(gains[1:]) - gains[0]
+        return [max(choice.near(k), key=self.first_look.nats) for k in order]
 
     @cached_property
-    def _no_lapse(self) -> Floats:
-        """Probability of each step that it was none, shape (step,)."""
-        (base_at, base_over), lapse = self.law.base, self.law.lapses.likely
-        density = (1 - lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
-        return np.asarray(density / (density + lapse * UNIFORM))
-
-    @cached_property
-    def _mean_heading(self) -> tuple[Floats, Floats]:
-        """Mean headings under the law, and those of twice their angle, shapes (step, 2)."""
-        chances = self.law.cells / self.law.cells.sum(axis=1, keepdims=True)
-        return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
+    def first_look(self) -> FirstLook:
+        """What features may gain, before any is fitted."""
+        return FirstLook(
+            law=self.law, own=self._own[0], landing_scores=self.landings.scores,
+            leaving_scores=self.leavings.scores,
+        )  # fmt: skip
 
     def _linear(
         self, added: Sequence[Columns], bounds: Sequence[Bounds], start: Floats | None
@@ -349,42 +306,6 @@ class Fits:
         at = np.exp(self.law.log_here) * self.law.base[0][:, 0] / self.law.cells.sum(axis=1)
 
         return self.law.lapses.log_mixed(at, lapses_alone(self.law.lapses, at))
-
-    def leaving(self, feature: Leaving) -> Fit:
-        """Return what a factor on landing in a zone adds, beside one for each zone left."""
-        law, into = self.law, self.law.zone_into(feature.into)
-        inside = (law.cells * law.share_of(into)).sum(axis=1) / law.cells.sum(axis=1)
-        landed = (law.turns.landing == into).astype(np.float64)
-        base = np.exp(law.log_here) * law.base[0][:, 0] / law.cells.sum(axis=1)
-        from_between = law.turns.zone == law.between
-        may = (from_between == (feature.into == "again")) & (inside > 0)
-        zones = np.unique(law.turns.zone[may])
-        each = (law.turns.zone[:, None] == zones).astype(np.float64)
-        weights = feature.weights(law.draws[0].seen)
-        may_, lapses = may[:, None].astype(np.float64), law.lapses
-
-        def fitted(columns: Floats) -> Fit:
-            n = columns.shape[1]
-
-            def density(x: Floats) -> tuple[Floats, Floats]:
-                log_factor = columns @ x[:n]
-                factor = np.exp(log_factor)
-                whole = 1 - inside + inside * factor
-                return base * np.exp(log_factor * landed) / whole, inside * factor / whole
-
-            def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
-                found, chance = density(x)
-                value, own, slopes = lapses.mixed(found, x[n:])
-                ahead = own * (landed - chance)
-                return value, lambda: np.column_stack([ahead[:, None] * columns, slopes])
-
-            peak = self._climb_from_null(objective, [(-_MOST_LEAVING, _MOST_LEAVING)] * n)
-            log_p = lapses.log_mixed(density(peak.x)[0], peak.x[n:])
-            return self._as_fit(log_p, peak, n - len(zones), columns @ peak.x[:n])
-
-        null = fitted(each * may_)
-        made = fitted(np.concatenate([each, weights], axis=1) * may_)
-        return replace(made, log_p=made.log_p - null.log_p)
 
     def _climb_from_null(self, objective: Objective, bounds: Sequence[tuple[float, float]]) -> Peak:
         return climb(objective, np.append(np.zeros(len(bounds)), self.law.lapses.start), bounds)

@@ -237,14 +237,13 @@ class Law:
             made = weighed(self._bells_of(feature, draw), weights)
             if not feature.instead:
                 return made
-            present = self._kept_bells(draw, "toward", feature.kappa)
+            usual = "neighbours" if feature.kappa == "sharper" else feature.kappa
+            present = self._kept_bells(draw, "toward", usual)
             attention = draw.seen.attention[..., None]
             taken = attention if feature.instead is True else feature.instead(draw.seen)
             return less(made, weighed(present, taken))
 
-        if first:
-            return of(self.draws[0])
-        return self.mean([of(draw) for draw in self.draws])
+        return of(self.draws[0]) if first else self.mean([of(draw) for draw in self.draws])
 
     def _bells_of(self, feature: Component, draw: Draw) -> Columns:
         if not isinstance(feature.toward, str):
@@ -263,9 +262,10 @@ class Law:
         return {}
 
     def _kappa(self, kappa: float | str) -> Floats | float:
-        if isinstance(kappa, str):
-            return self.kappa_own if kappa == "own" else self.kappa_f
-        return kappa
+        if not isinstance(kappa, str):
+            return kappa
+        more = _MORE if kappa == "sharper" else 1.0
+        return self.kappa_own if kappa == "own" else more * self.kappa_f
 
     def sharper(self, feature: Sharper) -> Columns:
         """Return what a tenth more of the own concentration adds, shape (step, weight)."""

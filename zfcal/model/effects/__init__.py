@@ -13,11 +13,11 @@ from functools import cache
 
 from zfcal.errors import InputError
 from zfcal.model.effects.base import MAX_PARAMETERS, NEIGHBOURS, Company, Effect, EffectParameter
-from zfcal.model.effects.generic import PREFIX, generic_effects
 
 __all__ = [
     "MAX_PARAMETERS",
     "NEIGHBOURS",
+    "PREFIX",
     "Company",
     "Effect",
     "EffectParameter",
@@ -28,11 +28,30 @@ __all__ = [
 ]
 
 
+PREFIX = "generic:"
+"""Begins the names of the generic family."""
+
+
 @cache
 def all_effects() -> tuple[Effect, ...]:
     """Return every listed effect, in the order of their names; the generic ones stand apart."""
     found = (_effect_of(module.name) for module in _modules())
     return tuple(sorted((effect for effect in found if effect), key=lambda effect: effect.name))
+
+
+@cache
+def generic_effects() -> tuple[Effect, ...]:
+    """Return every effect of the generic family, in the order of their names.
+
+    Named ``generic:heading:CUE``, ``generic:speed:CUE`` and ``generic:attention:CUE``. None of
+    them is an explanation; each says to what the fish respond, and in which direction, so that an
+    effect that nobody listed is still located, described and added.
+    """
+    from zfcal.model.effects.generic_attention import EFFECTS as ON_ATTENTION
+    from zfcal.model.effects.generic_heading import EFFECTS as ON_HEADING
+    from zfcal.model.effects.generic_speed import EFFECTS as ON_SPEED
+
+    return tuple(sorted((*ON_ATTENTION, *ON_HEADING, *ON_SPEED), key=lambda effect: effect.name))
 
 
 def find_effect(name: str) -> Effect:

@@ -8,6 +8,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Control, Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     Hooked,
     apart,
@@ -256,42 +257,39 @@ def _toward_nearest(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sj->sb", near, by))
 
 
+_AS_SEEN = Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0)
+_TURNING = Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0)
+
 _FEATURES: tuple[Feature, ...] = (
     Component(
         label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0, along=_AND_AS_SEEN
     ),
     Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0, along=_AND_AS_SEEN),
-    Component(label="drawn, as seen", toward="heading", weights=attended(evenly), kappa=9.0),
+    _AS_SEEN,
+    by_circumstances(_AS_SEEN, of_each=True),
     Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
-    OneOf(
-        kind="leaning, the mean",
-        features=tuple(
-            _leaning_to_mean(reach_m, off_walls=off_walls)
-            for reach_m in (0.08, _COMPANY_M, 0.25, 0.4)
-            for off_walls in (False, True)
-        ),
-    ),
+    OneOf(kind="leaning, the mean", features=tuple(
+        _leaning_to_mean(reach_m, off_walls=off_walls)
+        for reach_m in (0.08, _COMPANY_M, 0.25, 0.4) for off_walls in (False, True)
+    )),
     Tilt(label="leaning, by bearing", vectors=_by_bearing, low=0.0),
     Tilt(label="leaning, their course", vectors=_their_course, low=0.0),
     Tilt(label="leaning, the foremost", vectors=_leaning_to_foremost, low=0.0, along=_TO_FOREMOST),
     Component(
-        label="drawn, the foremost",
-        toward="heading",
-        weights=_of_foremost,
-        kappa=9.0,
+        label="drawn, the foremost", toward="heading", weights=_of_foremost, kappa=9.0,
         along=_TO_FOREMOST,
     ),
     OneOf(kind="along the wall as others do", features=tuple(map(_along, _SEEN_M))),
     Component(
-        label="drawn half-way",
-        toward=lambda seen: halfway(seen, seen.heading),
-        weights=seen_and_nearest,
-        kappa=9.0,
+        label="drawn half-way", toward=lambda seen: halfway(seen, seen.heading),
+        weights=seen_and_nearest, kappa=9.0,
     ),
-    Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0),
+    _TURNING,
+    by_circumstances(_TURNING),
+    by_circumstances(_leaning_to_mean(_COMPANY_M, off_walls=False)),
     Turned(label="turning as a whole", by=_toward_mean, neighbours=True, low=0.0),
     Turned(label="turning as the nearest", by=_toward_nearest, neighbours=True, low=0.0),
-)
+)  # fmt: skip
 
 
 EFFECT = Effect(

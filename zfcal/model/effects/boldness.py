@@ -8,8 +8,9 @@ import shapely
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
+from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.effects.weights import aside_of, each_fish, only, who
+from zfcal.model.effects.weights import aside_of, only, who
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -72,6 +73,10 @@ def _who_by_time(seen: Seen) -> Floats:
 
 def _all_by_time(seen: Seen) -> Floats:
     return hats(seen.time, _TIMES)[:, 1:]
+
+
+def _all(seen: Seen) -> Floats:
+    return np.ones((len(seen.zone), 1))
 
 
 def _nearness(between: shapely.Geometry, seen: Seen) -> Floats:
@@ -155,6 +160,11 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
             label="who, by the time",
             weights=_who_by_time,
             over=Leaving(label="by the time", weights=_all_by_time),
+        ),
+        by_circumstances(
+            Leaving(label="who", weights=who),
+            alone=Leaving(label="all", weights=_all),
+            without=("who", "the time", "the zone"),
         ),
         Leaving(label="who, into the open", weights=who, into="open"),
     ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import SPEED_M_S, log_speed, quickness, times_faster
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -97,6 +98,11 @@ EFFECT = Effect(
     other_forms=("generic:speed:own-speed",),
     paces=(
         Pace(label="by the last speed", weights=_last),
+        *paces_by(
+            Pace(label="by the last speed", weights=lambda swum: swum.last[:, None]),
+            "who",
+            "the time",
+        ),
         Pace(label="by the last three speeds", weights=_some_ago),
         Pace(
             label="by the mean over two seconds",

@@ -11,6 +11,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import in_tank
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
     Hooked,
@@ -143,6 +144,7 @@ def _lacks(company: Company) -> str | None:
 
 
 _KNOTS_S = (0.0, 1.0, 2.5, 5.0, 10.0)
+_JUST_S = 3.0
 
 
 def _freshly_left(seen: Seen) -> Floats:
@@ -152,6 +154,19 @@ def _freshly_left(seen: Seen) -> Floats:
 def _each_left(seen: Seen) -> Floats:
     """Return how many others have left, by the time since, though they may be back."""
     return np.asarray(hats(seen.each_left_s, _KNOTS_S)[..., :-1].sum(axis=1))
+
+
+def _just_left(seen: Seen) -> Floats:
+    """Return how many others have just left, shape (step, 1)."""
+    return np.exp(-seen.each_left_s / _JUST_S).sum(axis=1, keepdims=True)
+
+
+def _always(seen: Seen) -> Floats:
+    return np.ones((len(seen.zone), 1))
+
+
+def _out_after(seen: Seen) -> Floats:
+    return np.asarray(_just_left(seen)[..., None] * seen.way_out[:, None])
 
 
 def _way_out(seen: Seen) -> Floats:
@@ -200,11 +215,20 @@ _BY_TIME = Along(cue="time since the other left (s)", knots=_KNOTS_S[:-1])
 _FEATURES: tuple[Feature, ...] = (
     Leaving(label="time", weights=_freshly_left, along=_BY_TIME),
     Leaving(label="time, though it came back", weights=_each_left, along=_BY_TIME),
+    by_circumstances(
+        Leaving(label="just after others", weights=_just_left),
+        alone=Leaving(label="at any time", weights=_always),
+        without=("the zone",),
+    ),
     Component(
         label="drawn to the way out", toward=_way_out, weights=_freshly, kappa=3.0, along=_BY_TIME
     ),
     Component(label="drawn out by each", toward=_way_out, weights=_each, kappa=3.0, along=_BY_TIME),
     Tilt(label="leaning to the way out", vectors=_leaning, along=_BY_TIME),
+    by_circumstances(
+        Tilt(label="leaning to the way out after others", vectors=_out_after),
+        alone=Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None]),
+    ),
     Turned(label="turning to the way out", by=_turning, neighbours=False, along=_BY_TIME),
 )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -90,6 +91,7 @@ EFFECT = Effect(
     fixed=("usual",),
     paces=(
         Pace(label="number", weights=_number),
+        *paces_by(Pace(label="company", weights=_company), "who", "the time"),
         Pace(label="the nearest", weights=_nearest),
         Pace(label="somebody ahead", weights=_ahead),
         Spread(label="slow and fast ones, by how many are near", weights=_company),

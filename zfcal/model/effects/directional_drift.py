@@ -11,6 +11,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.directions import doubled, of_tank
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
     SLOWEST_M_S,
@@ -175,6 +176,8 @@ def _axes_off_the_walls(seen: Seen) -> Floats:
 
 _BY_DIRECTION = Along(cue="direction (rad)", knots=_DIRECTIONS)
 
+_LEANING = Tilt(label="leaning", vectors=_axes)
+
 _FEATURES: tuple[Feature, ...] = (
     Component(
         label="drawn, widely", toward=_compass, weights=_each, kappa=1.0, along=_BY_DIRECTION
@@ -187,7 +190,8 @@ _FEATURES: tuple[Feature, ...] = (
     OneOf(
         kind="drawn along an axis", features=tuple(_both_ways(k * math.pi / 6) for k in range(6))
     ),
-    Tilt(label="leaning", vectors=_axes),
+    _LEANING,
+    by_circumstances(_LEANING, without=("the time",)),
     Tilt(label="leaning, by the time", vectors=_axes_by_time),
     Tilt(label="leaning along an axis", vectors=_doubled, axial=True),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import times_faster
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -52,5 +53,8 @@ EFFECT = Effect(
     fixed=("usual_at_s",),
     per_hour=True,
     shown_against="time",
-    paces=(Pace(label="time", weights=_by_time),),
+    paces=(
+        Pace(label="time", weights=_by_time),
+        *paces_by(Pace(label="steadily", weights=lambda swum: swum.time[:, None]), "who"),
+    ),
 )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
     Hooked,
@@ -21,7 +25,7 @@ from zfcal.model.effects.forms import (
     turn_to,
 )
 from zfcal.model.effects.weights import aside_of, halfway, only, seen_and_nearest
-from zfcal.model.features import Along, Component, Feature, Seen, Tilt, Turned
+from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats, hats_where
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -131,13 +135,53 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
 
 
+def _middle_of(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Return the unit vector to the middle of some others, and how far it is.
+
+    Parameters
+    ----------
+    counts : ndarray of bool, shape (step, other)
+        Who is among them.
+    """
+    distance = np.where(seen.here & counts, seen.distance_m, 0.0)
+    total = (seen.bearing * distance[..., None]).sum(axis=1)
+    mean = total / np.maximum((seen.here & counts).sum(axis=1), 1)[:, None]
+    far = np.linalg.norm(mean, axis=1)
+    return mean / np.maximum(far, 1e-9)[:, None], far
+
+
 def _middle(seen: Seen) -> tuple[Floats, Floats]:
     """Return the unit vector to the middle of all others, and hat functions of its distance."""
-    distance = np.where(seen.here, seen.distance_m, 0.0)
-    total = (seen.bearing * distance[..., None]).sum(axis=1)
-    mean = total / np.maximum(seen.here.sum(axis=1), 1)[:, None]
-    far = np.linalg.norm(mean, axis=1)
-    return mean / np.maximum(far, 1e-9)[:, None], hats(far, _KNOTS_M)
+    toward, far = _middle_of(seen, np.ones_like(seen.here))
+    return toward, hats(far, _KNOTS_M)
+
+
+_Some: TypeAlias = Callable[[Seen], NDArray[np.bool_]]
+
+_SOME: dict[str, _Some] = {
+    "those in sight": lambda seen: seen.in_sight,
+    "those within 0.15 m": lambda seen: np.asarray(seen.distance_m < 0.15),
+    "those within 0.3 m": lambda seen: np.asarray(seen.distance_m < 0.3),
+    "those beyond 0.15 m": lambda seen: np.asarray(seen.distance_m > 0.15),
+    "the farthest": lambda seen: np.asarray(seen.chosen(seen.distance_m, seen.here)[..., 0] > 0),
+}
+
+
+def _drawn_to(label: str, counts: _Some) -> Component:
+    return Component(
+        label=f"drawn to {label}",
+        toward=lambda seen: only(_middle_of(seen, counts(seen))[0]),
+        weights=_alike,
+        kappa=4.0,
+    )
+
+
+def _leaning_to(label: str, counts: _Some) -> Tilt:
+    return Tilt(
+        label=f"leaning to {label}",
+        vectors=lambda seen: only(_middle_of(seen, counts(seen))[0]),
+        low=0.0,
+    )
 
 
 def _toward(seen: Seen) -> Floats:
@@ -146,6 +190,14 @@ def _toward(seen: Seen) -> Floats:
 
 def _by_distance(seen: Seen) -> Floats:
     return only(_middle(seen)[1])
+
+
+def _alike(seen: Seen) -> Floats:
+    return only(np.ones((len(seen.zone), 1)))
+
+
+def _to_middle(seen: Seen) -> Floats:
+    return only(_middle(seen)[0])
 
 
 def _leaning(seen: Seen) -> Floats:
@@ -218,6 +270,12 @@ _FEATURES: tuple[Feature, ...] = (
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
         along=_TO_NEAREST,
     ),
+    OneOf(kind="drawn to some", features=tuple(_drawn_to(*each) for each in _SOME.items())),
+    OneOf(kind="leaning to some", features=tuple(_leaning_to(*each) for each in _SOME.items())),
+    by_circumstances(
+        Component(label="drawn to the middle", toward=_toward, weights=_alike, kappa=4.0)
+    ),
+    by_circumstances(Tilt(label="leaning to the middle", vectors=_to_middle, low=0.0)),
 )  # fmt: skip
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.effects.weights import each_fish, factor_on_attention
+from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -36,6 +37,15 @@ def _attention(seen: Seen) -> Floats:
     return np.broadcast_to(
         hats(seen.time, _KNOTS)[:, None, 1:], (*seen.here.shape, len(_KNOTS) - 1)
     )
+
+
+def _by_time(seen: Seen) -> Floats:
+    by = hats(seen.time, _FEW)[:, None, 1:]
+    return np.broadcast_to(by, (*seen.here.shape, by.shape[-1]))
+
+
+def _steadily(seen: Seen) -> Floats:
+    return np.broadcast_to(seen.time[:, None, None], (*seen.here.shape, 1))
 
 
 def _change(seen: Seen, knots: tuple[float, ...], counts: Floats) -> Floats:
@@ -71,6 +81,13 @@ _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention, along=_BY_TIME),
     factor_on_attention(_attention_of_each, label="attention, each fish"),
     factor_on_attention(_attention_to_robots, label="attention to robots", along=_BY_TIME),
+    precision_of_attention(_by_time, "precision"),
+    by_circumstances(
+        factor_on_attention(_steadily, label="attention, steadily"),
+        alone=factor_on_attention(evenly),
+        without=("the time",),
+        of_each=True,
+    ),
 )
 
 

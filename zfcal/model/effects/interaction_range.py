@@ -8,8 +8,9 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import apart, beyond, cut, needs_neighbour
-from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -43,10 +44,15 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
 
 
 _KNOTS_M = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7)
+_FAR_M = (0.08, 0.25)
 
 
 def _attention(seen: Seen) -> Floats:
     return hats(seen.distance_m, _KNOTS_M)[..., 1:]
+
+
+def _far(seen: Seen) -> Floats:
+    return hats(seen.distance_m, _FAR_M)[..., 1:]
 
 
 def _farther(seen: Seen) -> Floats:
@@ -62,6 +68,12 @@ _FEATURES: tuple[Feature, ...] = (
         along=Along(cue="distance to the other (m)", knots=_KNOTS_M[1:], none_at=_KNOTS_M[0]),
     ),
     factor_on_attention(_farther, label="the nearest alone", high=0.0),
+    precision_of_attention(_far, "precision of far ones", high=0.0),
+    by_circumstances(
+        factor_on_attention(_far, label="attention to far ones", high=0.0),
+        alone=factor_on_attention(evenly, high=0.0),
+        without=("the time",),
+    ),
 )
 
 

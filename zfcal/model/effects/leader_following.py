@@ -8,8 +8,9 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
-from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Weights
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -97,11 +98,16 @@ _MOST_LED = 8
 """Of so many agents each is tried as the one that is followed."""
 
 _KNOTS_M_S = (0.0, 0.05, 0.1, 0.15, 0.2)
+_FAST_RANGE_M_S = (0.03, 0.14)
 _LATELY_M_S = (0.03, 0.07, 0.11)
 
 
 def _attention(seen: Seen) -> Floats:
     return hats(seen.speed_m_s, _KNOTS_M_S)[..., 1:]
+
+
+def _fast(seen: Seen) -> Floats:
+    return hats(seen.speed_m_s, _FAST_RANGE_M_S)[..., 1:]
 
 
 def _attention_lately(seen: Seen) -> Floats:
@@ -201,6 +207,13 @@ _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(lambda seen: seen.foremost, label="the foremost"),
     factor_on_attention(_going_its_way, label="who is ahead and swims its way"),
     factor_on_attention(_who, label="who"),
+    precision_of_attention(_fast, "precision of the fast"),
+    factor_on_attention(lambda seen: seen.in_open[..., None], label="who is in the open"),
+    by_circumstances(
+        factor_on_attention(_fast, label="attention to the fast"),
+        alone=factor_on_attention(evenly),
+        of_each=True,
+    ),
     OneOf(
         kind="drawn to the fastest in view",
         features=tuple(

@@ -14,6 +14,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import lengths, of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
 from zfcal.model.effects.weights import aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
@@ -92,6 +93,10 @@ _BY_DISTANCE = Along(cue="distance to the place (m)", knots=_KNOTS_M)
 _UP_TO = np.linspace(0.05, 0.95, 9)
 """Of the tank's width and height: corners as well, which fish like and keep away from."""
 
+_NEAR_M = 0.2
+_VARYING = ("who", "the time", "the speed")
+"""Circumstances under which places are asked for: of so many places others take too long."""
+
 _WALL_M = 0.1
 """Shorter pieces of wall are none: a round tank has many."""
 
@@ -143,6 +148,14 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     )
     return (
         *(_of_sort(kind, sort, places) for kind, sort in sorts),
+        OneOf(
+            kind="leaning, by circumstances",
+            features=[
+                each
+                for spot in spots
+                for each in by_circumstances(_leaning_near(spot), among=_VARYING).features
+            ],
+        ),
         *(OneOf(kind=kind, features=features) for kind, features in landings if features),
     )
 
@@ -215,6 +228,14 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
     return Tilt(
         label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors, along=_BY_DISTANCE
     )
+
+
+def _leaning_near(spot: Floats) -> Tilt:
+    def vectors(seen: Seen) -> Floats:
+        far_m = lengths(spot - seen.xy_m)
+        return np.asarray((np.exp(-far_m / _NEAR_M)[:, None] * _toward(seen, spot)[0])[:, None])
+
+    return Tilt(label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}, near it", vectors=vectors)
 
 
 def _turning(spot: Floats, room: shapely.Polygon | None) -> Turned:

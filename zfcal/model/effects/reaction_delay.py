@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.effects.weights import each_fish
 from zfcal.model.features import LAGS, Component, Feature, Seen
-from zfcal.model.kernels.hats import hats, hats_where
+from zfcal.model.kernels.hats import hats_where
 
 
 def _late(
@@ -65,7 +64,6 @@ def _by_distance(k: int) -> Component:
 
 _SOON_M = (0.03, 0.06, 0.15, 0.4)
 _FAR_M = 0.06
-_TURN_RAD = (0.0, 0.8, math.pi)
 
 
 def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
@@ -95,32 +93,9 @@ def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
 
-def _soon_by(of_step: Callable[[Seen], Floats]) -> Callable[[Seen], Floats]:
-    """Return weights of each step, (step, weight), for those that are not next to the fish."""
-
-    def weights(seen: Seen) -> Floats:
-        far = seen.here & (seen.distance_m > _FAR_M)
-        return np.asarray(far[..., None] * of_step(seen)[:, None])
-
-    return weights
-
-
-def _ends(seen: Seen) -> Floats:
-    """Return how near the recording's beginning and end are, shape (step, 2)."""
-    return hats(seen.time, (0.0, 1.0))
-
-
-def _turn(seen: Seen) -> Floats:
-    return hats(np.abs(seen.last_turn_rad), _TURN_RAD)
-
-
-def _alike(seen: Seen) -> Floats:
-    return np.ones((len(seen.zone), 1))
-
-
-def _by_zone(seen: Seen) -> Floats:
-    """Return one for steps along walls, and one for all others, shape (step, 2)."""
-    return np.stack([seen.follows_walls, ~seen.follows_walls], axis=1).astype(np.float64)
+def _far(seen: Seen) -> Floats:
+    """Return one for those that are not next to the fish, shape (step, other, 1)."""
+    return (seen.here & (seen.distance_m > _FAR_M))[..., None].astype(np.float64)
 
 
 _FEATURES: tuple[Feature, ...] = (
@@ -133,15 +108,9 @@ _FEATURES: tuple[Feature, ...] = (
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
-    _soon("by the time", _soon_by(_ends)),
-    _soon("by the last turn", _soon_by(_turn)),
-    _soon("by who", _soon_by(each_fish)),
-    _soon("by the zone", _soon_by(_by_zone)),
-    _soon_sight("far ones", _soon_by(_alike)),
-    _soon_sight("by who", _soon_by(each_fish)),
-    _soon_sight("by the zone", _soon_by(_by_zone)),
-    _soon_sight("by the time", _soon_by(_ends)),
-    _soon_sight("by the last turn", _soon_by(_turn)),
+    by_circumstances(_soon("far ones", _far), of_each=True),
+    _soon_sight("far ones", _far),
+    by_circumstances(_soon_sight("far ones", _far), of_each=True),
 )
 
 

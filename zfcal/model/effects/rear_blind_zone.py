@@ -6,8 +6,9 @@ import math
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.effects.weights import factor_on_attention
+from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -27,10 +28,15 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
 
 
 _KNOTS_RAD = (0.0, 1.2, 1.8, 2.1, 2.25, 2.3561)
+_BEHIND_RAD = (1.2, 2.0)
 
 
 def _attention(seen: Seen) -> Floats:
     return hats(seen.off_axis_rad, _KNOTS_RAD)[..., 1:]
+
+
+def _behind(seen: Seen) -> Floats:
+    return hats(seen.off_axis_rad, _BEHIND_RAD)[..., 1:]
 
 
 _FEATURES: tuple[Feature, ...] = (
@@ -40,6 +46,12 @@ _FEATURES: tuple[Feature, ...] = (
         along=Along(
             cue="bearing off the own heading (rad)", knots=_KNOTS_RAD[1:], none_at=_KNOTS_RAD[0]
         ),
+    ),
+    precision_of_attention(_behind, "precision of those behind", high=0.0),
+    by_circumstances(
+        factor_on_attention(_behind, label="attention to those behind", high=0.0),
+        alone=factor_on_attention(evenly, high=0.0),
+        without=("the time",),
     ),
 )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
     Hooked,
@@ -21,7 +22,12 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import aside_of, factor_on_attention
+from zfcal.model.effects.weights import (
+    aside_of,
+    evenly,
+    factor_on_attention,
+    precision_of_attention,
+)
 from zfcal.model.features import AWAY_M, Along, Component, Feature, Landing, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -131,6 +137,15 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
 
 
+def _to_robots(seen: Seen) -> Floats:
+    return seen.is_robot[..., None].astype(np.float64)
+
+
+def _leaning_near(seen: Seen) -> Floats:
+    near = np.exp(-seen.distance_m / _NEAR_M) * seen.is_robot
+    return np.asarray(np.einsum("sj,sjd->sd", near, seen.bearing)[:, None])
+
+
 def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
     aside = aside_of(seen, seen.bearing, along_walls=along_walls)
     return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside))
@@ -176,6 +191,14 @@ _FEATURES: tuple[Feature, ...] = (
         label="turning as a whole", by=partial(_turning, along_walls=True), neighbours=True,
         along=_TO_ROBOT,
     ),
+    precision_of_attention(_to_robots, "precision of robots"),
+    by_circumstances(
+        factor_on_attention(_to_robots, label="attention to robots"),
+        alone=factor_on_attention(evenly),
+        without=("the time",),
+        of_each=True,
+    ),
+    by_circumstances(Tilt(label="leaning near it", vectors=_leaning_near)),
 )  # fmt: skip
 
 

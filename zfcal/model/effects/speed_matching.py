@@ -6,6 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import (
     SPEED_M_S,
     apart,
@@ -50,6 +51,12 @@ def _near(swum: Swum) -> Floats:
     """Return the sums of the others' last speeds, by distance."""
     weights = hats_where(swum.here, swum.distance_m, _KNOTS_M)
     return np.asarray(np.einsum("sj,sjb->sb", swum.others, weights))
+
+
+def _of_all_near(swum: Swum) -> Floats:
+    """Return the sum of their last speeds, shape (step, 1)."""
+    near = swum.here & (swum.distance_m < _NEAR_M)
+    return np.asarray((swum.others * near).sum(axis=1, keepdims=True))
 
 
 def _near_lately(swum: Swum) -> Floats:
@@ -144,6 +151,13 @@ EFFECT = Effect(
     other_forms=("generic:speed:neighbour-speed",),
     paces=(
         Pace(label="of those near", weights=_near),
+        *paces_by(
+            Pace(label="of all near", weights=_of_all_near),
+            "who",
+            "the time",
+            "the last speed",
+            "how many are near",
+        ),
         Pace(label="of the nearest", weights=_nearest),
         Pace(label="of those near, over two seconds", weights=_near_lately),
         Spread(label="slow and fast ones, by the fastest near", weights=_by_fastest_near),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.effects.weights import only
 from zfcal.model.features import Along, Component, Feature, Landing, Seen, Sharper, Tilt
@@ -103,8 +104,11 @@ def _alike(seen: Seen) -> Floats:
     return np.ones((len(seen.zone), 1, 1))
 
 
+_BY_SPEED = Tilt(label="by speed", vectors=_by_speed)
+
 _FEATURES: tuple[Feature, ...] = (
-    Tilt(label="by speed", vectors=_by_speed),
+    _BY_SPEED,
+    by_circumstances(_BY_SPEED, alone=Tilt(label="ahead", vectors=_ahead), without=("the speed",)),
     Sharper(label="sharper by speed", by=_quicker),
     # More than at all speeds alike, which would be another law of turns.
     Component(
@@ -185,6 +189,11 @@ EFFECT = Effect(
     # Not by the turn of the step itself: near a wall a long step has to turn.
     paces=(
         Pace(label="by the last turn", weights=_by_last_turn),
+        *paces_by(
+            Pace(label="by the last turn", weights=lambda swum: swum.last_turn_rad[:, None]),
+            "who",
+            "the time",
+        ),
         Spread(label="slow and fast ones, by the last turn", weights=_spread_by_last_turn),
     ),
     paces_given=(Pace(label="by the turn", weights=_by_turn),),

@@ -9,8 +9,9 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.effects.weights import both_senses, each_fish, only, to_one_sense
+from zfcal.model.effects.weights import both_senses, only, to_one_sense
 from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -82,10 +83,25 @@ def _left_by_who(seen: Seen) -> Floats:
     return np.asarray(each_fish(seen)[..., None] * left_of(seen.own_heading)[:, None])
 
 
+def _to_left(seen: Seen) -> Floats:
+    return np.asarray(left_of(seen.own_heading)[:, None])
+
+
+_OWN_OFFSET = Turned(label="offset of the own direction", by=_everywhere, neighbours=False)
+_ALONG_WALL = Component(
+    label="along the wall",
+    toward=both_senses,
+    weights=to_one_sense,
+    kappa="own",
+    low=-0.98,
+    high=0.98,
+)
+
 _FEATURES: tuple[Feature, ...] = (
     Turned(label="offset", by=_everywhere, neighbours=True),
     # The base's own direction alone: what is drawn to others stays as it is.
-    Turned(label="offset of the own direction", by=_everywhere, neighbours=False),
+    _OWN_OFFSET,
+    by_circumstances(_OWN_OFFSET, without=("who",)),
     OneOf(
         kind="drawn to a side",
         features=tuple(
@@ -96,18 +112,13 @@ _FEATURES: tuple[Feature, ...] = (
         ),
     ),
     Tilt(label="leaning", vectors=_left),
+    by_circumstances(Tilt(label="leaning to the left", vectors=_to_left), without=("who",)),
     # Some turn left, others right, as individuals do that have a side of their own.
     Turned(label="offset, by who", by=each_fish, neighbours=True),
     Turned(label="offset of the own direction, by who", by=each_fish, neighbours=False),
     Tilt(label="leaning, by who", vectors=_left_by_who),
-    Component(
-        label="along the wall",
-        toward=both_senses,
-        weights=to_one_sense,
-        kappa="own",
-        low=-0.98,
-        high=0.98,
-    ),
+    _ALONG_WALL,
+    by_circumstances(_ALONG_WALL),
 )
 
 

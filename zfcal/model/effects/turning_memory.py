@@ -9,6 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats
 from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Control, Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.effects.weights import only
 from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Sharper, Tilt, Turned
@@ -183,8 +184,12 @@ def _course(n: int) -> Component:
     return Component(label=label, toward=toward, weights=_one, kappa=_KAPPA)
 
 
+_OFFSET = Turned(label="offset", by=_last_turn, neighbours=False)
+_LEANING = Tilt(label="leaning to the heading before", vectors=_leaning)
+
 _FEATURES: tuple[Feature, ...] = (
-    Turned(label="offset", by=_last_turn, neighbours=False),
+    _OFFSET,
+    by_circumstances(_OFFSET, without=("the last turn",)),
     Turned(label="offset by recent turns", by=lambda seen: seen.recent_turn_rad, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),
@@ -206,7 +211,8 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     Sharper(label="sharper by the last turn", by=_by_last_turn),
     Sharper(label="sharper by the last turn, off the walls", by=_by_last_turn_off_walls),
-    Tilt(label="leaning to the heading before", vectors=_leaning),
+    _LEANING,
+    by_circumstances(_LEANING, without=("the last turn",)),
     Tilt(label="leaning to earlier headings", vectors=_earlier),
     Tilt(label="leaning to earlier headings, along walls too", vectors=_before_the_last),
 )

@@ -9,6 +9,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter
+from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import sense_along, tilt
 from zfcal.model.effects.weights import to_one_sense
 from zfcal.model.features import Component, Feature, Seen, Tilt
@@ -49,11 +50,19 @@ def _earlier(seen: Seen) -> Floats:
     return np.moveaxis(np.where(seen.follows_walls[:, None], along, 0.0), 0, 1)
 
 
+_SHARE = Component(
+    label="share", toward=_both_ways, weights=to_one_sense, kappa="own", low=-0.98, high=0.98
+)
+_LEANING = Tilt(label="leaning", vectors=_leaning)
+
+# What turns of fast and slow steps differ in is `speed-turn-coupling`, along walls too.
+_OTHER = ("the speed",)
+
 _FEATURES: tuple[Feature, ...] = (
-    Component(
-        label="share", toward=_both_ways, weights=to_one_sense, kappa="own", low=-0.98, high=0.98
-    ),
-    Tilt(label="leaning", vectors=_leaning),
+    _SHARE,
+    by_circumstances(_SHARE, without=_OTHER),
+    _LEANING,
+    by_circumstances(_LEANING, without=_OTHER),
     Tilt(label="leaning, by earlier headings", vectors=_earlier),
 )
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.effects.circumstances import each_fish
 from zfcal.model.features import Along, Component, Seen, Weights
 
-_MOST_TRACKS = 12
-"""Of so many fish each is held apart; short pieces of tracks count as one more."""
+MOST_SHARPER = 3.0
+"""Tenths by which a concentration may be changed."""
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
@@ -23,17 +24,6 @@ def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats
     own = seen.own_heading[:, None]
     sine = own[..., 0] * toward[..., 1] - own[..., 1] * toward[..., 0]
     return sine if along_walls else np.where(seen.follows_walls[:, None], 0.0, sine)
-
-
-def each_fish(seen: Seen) -> Floats:
-    """Return one for each fish whose step it is, shape (step, fish).
-
-    The longest track is the last one; with it are all beyond the next `_MOST_TRACKS` - 1.
-    """
-    tracks, n_steps = np.unique(seen.track, return_counts=True)
-    longest = np.sort(tracks[np.argsort(-n_steps, kind="stable")][1:_MOST_TRACKS])
-    rest = ~np.isin(seen.track, longest)
-    return np.column_stack([seen.track[:, None] == longest, rest]).astype(np.float64)
 
 
 def who(seen: Seen) -> Floats:
@@ -121,3 +111,23 @@ def factor_on_attention(
 def evenly(seen: Seen) -> Floats:
     """Return one for everybody, shape (step, other, 1)."""
     return np.ones((*seen.attention.shape, 1))
+
+
+def precision_of_attention(
+    weights: Weights, label: str, *, low: float = -MOST_SHARPER, high: float = MOST_SHARPER
+) -> Component:
+    """Return how much more concentrated headings are about what fish attend to, in tenths.
+
+    Parameters
+    ----------
+    weights
+        Shape (step, other, weight).
+    label
+        Of the feature.
+    low, high
+        Bounds of the strengths.
+    """
+    by = attended(weights)
+    return Component(
+        label=label, toward="toward", weights=by, instead=by, kappa="sharper", low=low, high=high
+    )

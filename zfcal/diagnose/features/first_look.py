@@ -1,0 +1,145 @@
+"""A first look at features, which says what each may gain before any is fitted.
+
+By the scores of their weights where these have no strength (Rao 1948, Proceedings of the Cambridge
+Philosophical Society 44: 50-57).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from zfcal.arrays import Floats
+from zfcal.diagnose.features.columns import Columns
+from zfcal.diagnose.features.lapses import UNIFORM
+from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.ways import ways_of, ways_of_cells
+from zfcal.model.features import Choosable, Landing, Leaving, Tilt, Turned
+
+_TRIED = (0.005, 0.02, 0.06)
+"""Strengths of a component at which it is first asked for."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FirstLook:
+    """A first look at features of a law.
+
+    Parameters
+    ----------
+    law
+        Of the steps.
+    own
+        Columns that are fitted with every feature.
+    landing_scores
+        Scores of features of landing, shape (step, weight).
+    leaving_scores
+        Of features of leaving, given the probability of each step that it was none; and of what is
+        fitted beside them.
+    """
+
+    law: Law
+    own: Sequence[Columns]
+    landing_scores: Callable[[Landing], Floats]
+    leaving_scores: Callable[[Leaving, Floats], tuple[Floats, Floats]]
+
+    @property
+    def prepared(self) -> tuple[object, ...]:
+        """What all features need, worked out before they are asked side by side."""
+        return self._no_lapse, self._mean_heading, self._own_scores
+
+    def nats(self, feature: Choosable) -> float:
+        """Return about how many nats a feature gains, less its strengths, and than what it has to.
+
+        The density of one more component has no variance where that of the base is next to
+        nothing, so it is asked for by what a few strengths of it gain, the lapse as it is.
+        """
+        if feature.over is None or isinstance(feature, Landing):
+            return self._nats(feature)
+        return self._nats(feature) - self._nats(feature.over)
+
+    def _nats(self, feature: Choosable) -> float:
+        if isinstance(feature, Landing):
+            return _score_nats(self.landing_scores(feature))
+        if isinstance(feature, Leaving):
+            return _score_nats(*self.leaving_scores(feature, self._no_lapse))
+        if isinstance(feature, Tilt):
+            taken = ways_of(self.law.turns.taken, axial=feature.axial)
+            apart = taken - self._mean_heading[int(feature.axial)]
+            vectors = feature.vectors(self.law.draws[0].seen)
+            return _score_nats(np.einsum("sbd,sd->sb", vectors, apart))
+        if isinstance(feature, Turned):
+            return _score_nats(self._scores_of(self.law.turned(feature)), self._own_scores)
+        columns = self.law.component(feature, first=True)
+        if feature.low >= 0 and not feature.instead:
+            return self._tried_nats(columns)
+        return _score_nats(self._scores_of(columns), self._own_scores)
+
+    def _scores_of(self, columns: Columns) -> Floats:
+        """Return the scores of what adds to the mixture, shape (step, weight)."""
+        (at, over), (base_at, base_over) = columns, self.law.base
+        return np.asarray(self._no_lapse[:, None] * (at / base_at - over / base_over))
+
+    @cached_property
+    def _own_scores(self) -> Floats:
+        return np.concatenate([self._scores_of(columns) for columns in self.own], axis=1)
+
+    def _tried_nats(self, columns: Columns) -> float:
+        """Return what a few strengths of a component gain: of all weights alike, or of each.
+
+        Their scores have no variance where the density is next to nothing.
+        """
+        at, over = columns
+        alike = self._best_tried(at.sum(axis=1), over.sum(axis=1)) - 1
+        if at.shape[1] == 1:
+            return alike
+        each = (self._best_tried(*pair) - 1 for pair in zip(at.T, over.T, strict=True))
+        return max(alike, sum(max(nats, 0.0) for nats in each))
+
+    def _best_tried(self, at: Floats, over: Floats) -> float:
+        lapse, (base_at, base_over) = self.law.lapses.likely, self.law.base
+        here = (1 - lapse) * np.exp(self.law.log_here)
+        gains = [
+            float(
+                np.log(
+                    here * (base_at[:, 0] + share * at) / (base_over[:, 0] + share * over)
+                    + lapse * UNIFORM
+                ).sum()
+            )
+            for share in (0.0, *_TRIED)
+        ]
+        return max(gains[1:]) - gains[0]
+
+    @cached_property
+    def _no_lapse(self) -> Floats:
+        """Probability of each step that it was none, shape (step,)."""
+        (base_at, base_over), lapse = self.law.base, self.law.lapses.likely
+        density = (1 - lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
+        return np.asarray(density / (density + lapse * UNIFORM))
+
+    @cached_property
+    def _mean_heading(self) -> tuple[Floats, Floats]:
+        """Mean headings under the law, and those of twice their angle, shapes (step, 2)."""
+        chances = self.law.cells / self.law.cells.sum(axis=1, keepdims=True)
+        return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
+
+
+def _score_nats(scores: Floats, beside: Floats | None = None) -> float:
+    """Return about how many nats weights gain, less their number, by their scores.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (step, weight)
+        Of these.
+    beside : ndarray, shape (step, weight)
+        Of what is fitted with them, and is at its best without them.
+    """
+    total, spread = scores.sum(axis=0), scores.T @ scores
+    if not np.isfinite(total).all():
+        return 0.0
+    if beside is not None:
+        mixed = scores.T @ beside
+        spread = spread - mixed @ np.linalg.pinv(beside.T @ beside, hermitian=True) @ mixed.T
+    return float(total @ np.linalg.pinv(spread, hermitian=True) @ total) / 2 - len(total)

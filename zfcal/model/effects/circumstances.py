@@ -1,0 +1,202 @@
+"""Circumstances: under which fish may have an effect in another measure, whatever the effect is.
+
+Fish may follow walls more when they are alone, respond late in the open, or lean to a light each
+as much as it likes. A feature is asked for under circumstances by weights that are its own times
+those of a circumstance, which are never negative and add up to one: so what it is everywhere alike
+is among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zfcal.arrays import Floats
+from zfcal.model.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, Weights
+from zfcal.model.kernels.hats import hats
+from zfcal.model.paces import Pace, Swum
+
+Core = TypeVar("Core", Component, Tilt, Turned, Leaving)
+
+MOST_TRACKS = 12
+"""Of so many fish each is held apart; short pieces of tracks count as one more."""
+
+_TIMES = (0.0, 0.5, 1.0)
+_SPEEDS_M_S = (0.03, 0.07, 0.14)
+_STAYS_S = (0.0, 5.0, 20.0)
+_NEAR_M = (0.03, 0.1, 0.25)
+_NUMBERS = (0.0, 1.0, 3.0)
+_TURNS_RAD = (0.0, 0.5, 1.5)
+_BEARINGS_RAD = (0.0, 1.2, 2.3)
+_SCORES = (-1.0, 0.0, 1.0)
+
+
+def each_fish(seen: Seen) -> Floats:
+    """Return one for each fish whose step it is, shape (step, fish).
+
+    The longest track is the last one; with it are all beyond the next `MOST_TRACKS` - 1.
+    """
+    return each_of(seen.track)
+
+
+def each_of(track: NDArray[np.int32]) -> Floats:
+    """Return one for each track, shape (step, track), of tracks of shape (step,)."""
+    tracks, n_steps = np.unique(track, return_counts=True)
+    longest = np.sort(tracks[np.argsort(-n_steps, kind="stable")][1:MOST_TRACKS])
+    rest = ~np.isin(track, longest)
+    return np.column_stack([track[:, None] == longest, rest]).astype(np.float64)
+
+
+def _zones(seen: Seen) -> Floats:
+    return (seen.zone[:, None] == np.unique(seen.zone)).astype(np.float64)
+
+
+def _either(is_so: ArrayLike) -> Floats:
+    """Return one where something is so, and one where it is not, (step, other, 2)."""
+    so = np.asarray(is_so, dtype=np.float64)
+    return np.stack([so, 1.0 - so], axis=-1)
+
+
+def _nearest_m(seen: Seen) -> Floats:
+    return np.where(seen.here, seen.distance_m, AWAY_M).min(axis=1, initial=AWAY_M)
+
+
+CIRCUMSTANCES: dict[str, Weights] = {
+    "who": each_fish,
+    "the zone": _zones,
+    "the time": lambda seen: hats(seen.time, _TIMES),
+    "the speed": lambda seen: hats(seen.own_speed_m_s, _SPEEDS_M_S),
+    "the last turn": lambda seen: hats(np.abs(seen.last_turn_rad), _TURNS_RAD),
+    "the stay": lambda seen: hats(seen.stayed_s, _STAYS_S),
+    "the nearest": lambda seen: hats(_nearest_m(seen), _NEAR_M),
+    "how many are seen": lambda seen: hats(seen.in_sight.sum(axis=1), _NUMBERS),
+}
+"""Of steps, by name: shape (step, circumstance)."""
+
+OF_EACH: dict[str, Weights] = {
+    "distance": lambda seen: hats(seen.distance_m, _NEAR_M),
+    "bearing": lambda seen: hats(seen.off_axis_rad, _BEARINGS_RAD),
+    "whether it is the nearest": lambda seen: _either(seen.nearest[..., 0]),
+    "whether it is a robot": lambda seen: _either(seen.is_robot),
+}
+"""Of others, by name: shape (step, other, circumstance)."""
+
+
+PACED: dict[str, Callable[[Swum], Floats]] = {
+    "who": lambda swum: each_of(swum.track),
+    "the time": lambda swum: hats(swum.time, _TIMES),
+    "the last speed": lambda swum: hats(swum.last, _SCORES),
+    "how many are near": lambda swum: hats(
+        (swum.here & (swum.distance_m < _NEAR_M[1])).sum(axis=1), _NUMBERS
+    ),
+}
+"""Of steps whose speeds are asked for, by name: shape (step, circumstance)."""
+
+
+def by_circumstances(
+    core: Core,
+    *,
+    alone: Core | None = None,
+    without: Collection[str] = (),
+    among: Collection[str] | None = None,
+    of_each: bool = False,
+) -> OneOf:
+    """Return a feature under each sort of circumstances, of which the most promising are fitted.
+
+    Parameters
+    ----------
+    core
+        Of few weights: each is fitted for each circumstance.
+    alone
+        What may depend on circumstances as well, and is no case of the effect: attention as a
+        whole, of a feature of attention by distance. What is found has to gain more than that.
+    without
+        Names of circumstances that the feature goes by itself, or that make another effect of it.
+    among
+        Names of those that are asked for; None for all.
+    of_each
+        Whether the others that it has weights for have circumstances of their own.
+    """
+    known = {**CIRCUMSTANCES, **(OF_EACH if of_each else {})}
+    return OneOf(
+        kind=f"{core.label}, by circumstances",
+        features=tuple(
+            _under(core, name, of, alone)
+            for name, of in known.items()
+            if name not in without and (among is None or name in among)
+        ),
+    )
+
+
+def _under(core: Core, name: str, of: Weights, alone: Core | None) -> Core:
+    label = f"{core.label}, by {name}"
+    own = _times(core, of)
+    if isinstance(core, Component) and callable(core.instead):
+        same = core.instead is core.weights
+        core = replace(core, instead=own if same else _times(core, of, core.instead))
+    if alone is None:
+        return _with(core, own, label)
+    over = _times(alone, of)
+
+    def both(seen: Seen) -> Floats:
+        return np.concatenate([own(seen), over(seen)], axis=_axis(core))
+
+    return replace(_with(core, both, label), over=_with(alone, over, f"{alone.label}, by {name}"))
+
+
+def _axis(core: Core) -> int:
+    """Return which axis of a feature's weights is that of its strengths."""
+    return 2 if isinstance(core, Component) else 1
+
+
+def _times(core: Core, of: Weights, weights: Weights | None = None) -> Weights:
+    """Return the weights of a feature, or others of its kind, each for each circumstance."""
+    of_core = weights or _weights_of(core)
+
+    def products(seen: Seen) -> Floats:
+        own, by = of_core(seen), of(seen)
+        if isinstance(core, Component):
+            by = by if by.ndim == own.ndim else by[:, None]
+            made = own[..., None] * by[..., None, :]
+            return made.reshape(*own.shape[:2], own.shape[2] * by.shape[-1])
+        if isinstance(core, Tilt):
+            return (own[:, :, None] * by[:, None, :, None]).reshape(len(own), -1, 2)
+        own = own.reshape(len(by), -1)
+        return np.asarray((own[..., None] * by[:, None]).reshape(len(by), -1))
+
+    return products
+
+
+def _weights_of(core: Core) -> Weights:
+    if isinstance(core, Component | Leaving):
+        return core.weights
+    return core.vectors if isinstance(core, Tilt) else core.by
+
+
+def _with(core: Core, weights: Weights, label: str) -> Core:
+    """Return a feature of other weights, which are no curve."""
+    if isinstance(core, Tilt):
+        return replace(core, label=label, vectors=weights, along=None)
+    if isinstance(core, Turned):
+        return replace(core, label=label, by=weights, along=None)
+    return replace(core, label=label, weights=weights, along=None)
+
+
+def paces_by(core: Pace, *names: str) -> tuple[Pace, ...]:
+    """Return a feature of speeds under circumstances, by their names."""
+    return tuple(
+        replace(core, label=f"{core.label}, by {name}", weights=_paced(core, PACED[name]))
+        for name in names
+    )
+
+
+def _paced(core: Pace, of: Callable[[Swum], Floats]) -> Callable[[Swum], Floats]:
+    def made(swum: Swum) -> Floats:
+        own, by = core.weights(swum), of(swum)
+        return np.asarray((own[..., None] * by[:, None]).reshape(len(own), -1))
+
+    return made
