@@ -25,6 +25,9 @@ from zfcal.arrays import Floats
 AWAY_M = 9.0
 """In place of the distance to one who is not there."""
 
+MOST_SHARPER = 3.0
+"""Tenths by which features change a concentration at most."""
+
 LAGS = (1, 2, 3, 4, 5, 8)
 """Steps by which a response may be late."""
 
@@ -155,7 +158,8 @@ class Seen:
 
 
 Weights: TypeAlias = Callable[[Seen], Floats]
-"""Of a `Seen`: shape (step, source, weight); of a tilt or a landing (step, weight)."""
+"""Of a `Seen`: shape (step, source, weight) of a component, (step, weight, 2) of a tilt, and
+(step, weight) of what has no source."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,7 +213,7 @@ class Component:
     """
 
     label: str
-    toward: Weights | Literal["toward", "bearing", "heading"]
+    toward: Weights | Literal["toward", "bearing", "heading", "soon_toward", "half_toward"]
     weights: Weights
     kappa: float | Literal["own", "neighbours", "sharper"] = "neighbours"
     instead: Weights | bool = False

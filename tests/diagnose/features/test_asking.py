@@ -9,14 +9,17 @@ import pytest
 from scipy.special import chdtrc
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.diagnose.features.asking import _absorbed, _askable, _one, fits_beside
+from zfcal.diagnose.features.asking import _absorbed, _askable, _one, fits_beside, gains_of
 from zfcal.diagnose.features.curves import redrawn
 from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import find_effect
+from zfcal.model.extended import maximise
 from zfcal.model.features import Leaving, Tilt
+from zfcal.model.scene import make_scene
+from zfcal.model.simulate import simulate_tracks
 
 BIAS, DRIFT, COHESION = map(find_effect, ("turning-bias", "directional-drift", "group-cohesion"))
 
@@ -90,3 +93,30 @@ def test_a_tank_without_rooms_has_nobody_leaving_them(law):
         assert all(_one(each).into == "open" for each in leaving)
         in_rooms = [_one(each) for each in _askable(law, effect)]
         assert sum(isinstance(each, Leaving) for each in in_rooms) > len(leaving)
+
+
+def test_what_an_effect_has_to_gain_more_than_is_not_taken_along_with_it(base, worlds):
+    """Attention to the fast may change with time; attention to all that wanes is no part of that.
+
+    Fish that follow the fast and habituate, for 20 minutes: the second is there beside the first.
+    """
+    effects = {
+        "leader-following": {"strength": 1.0},
+        "habituation": {"per_hour": 6.0, "usual_at_s": 600.0},
+    }
+    fish = worlds.natural_fish(base[0].arena)
+    xy_m, _ = simulate_tracks(
+        dataclasses.replace(fish, effects=effects), base[0].arena, n_agents=5, n_steps=6000, seed=2
+    )
+    scene = make_scene(worlds.samples_of(xy_m), base[0].arena)
+    both = Law(scene=scene, fitted=maximise(scene, fish))
+    leading, waning = map(find_effect, effects)
+    alone, beside = (
+        max(each.nats for each in gains_of(both, [waning], beside=known))
+        for known in ((), (leading,))
+    )
+    assert alone > 50
+    assert beside > 0.3 * alone
+    assert not any(
+        "attention to the fast" in each.label for each in fits_beside(both, [leading]).also
+    )

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from scipy.special import i0e, ndtr
 
-from zfcal.diagnose.features.draws import Steps, _ago_heading, _recent_turn, draw_of, errors_of
+from zfcal.diagnose.features.draws import Steps, draw_of, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.diagnose.features.waves import WAVES, series_of, waves_of
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
-from zfcal.model.effects.weights import attended, evenly
+from zfcal.model.effects.weights import attended, evenly, precision_of_attention
 from zfcal.model.extended import maximise, with_effect
 from zfcal.model.features import LAGS, Component, Sharper, Tilt, Turned
+from zfcal.model.histories import ago_heading, recent_turn
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -270,10 +271,10 @@ def test_recent_turns_are_remembered_the_later_the_more():
     at, who = np.array([6, 6, 0]), np.array([0, 1, 0])
     weights = 0.6 ** np.arange(5) / (0.6 ** np.arange(5)).sum()
     expected = [0.5, 1.2 * weights[2], 0.0]
-    np.testing.assert_allclose(np.abs(_recent_turn(states, at, who)), expected, atol=1e-12)
+    np.testing.assert_allclose(np.abs(recent_turn(states, at, who)), expected, atol=1e-12)
     states[4, ZONE] = 0.0
     expected = [0.5 * weights[:1].sum(), 0.0, 0.0]
-    np.testing.assert_allclose(np.abs(_recent_turn(states, at, who)), expected, atol=1e-12)
+    np.testing.assert_allclose(np.abs(recent_turn(states, at, who)), expected, atol=1e-12)
 
 
 def test_a_law_without_some_zone_leaves_its_turns_out(base):
@@ -327,7 +328,7 @@ def test_headings_of_steps_before_are_known_up_to_a_gap(base):
     np.testing.assert_array_equal(seen.ago_heading[0][known], np.nan_to_num(then[known]))
     gone = scene.states.copy()
     gone[20, ZONE] = 0
-    found = _ago_heading(gone, np.array([22, 22, 25]), np.array([0, 1, 0]))
+    found = ago_heading(gone, np.array([22, 22, 25]), np.array([0, 1, 0]))
     assert found[LAGS.index(1)].any(axis=1).all()
     assert not found[LAGS.index(2), :2].any()
     assert found[LAGS.index(4), 2].any()
@@ -348,3 +349,13 @@ def test_what_is_drawn_turns_with_the_whole_law(base):
     )  # fmt: skip
     for made, known in zip(law.component(own), law._neighbours(), strict=True):
         np.testing.assert_allclose(made, known, rtol=1e-6, atol=1e-9)
+
+
+def test_precision_of_attention_is_the_derivative_of_the_law_by_its_concentration(base):
+    """Of all that is seen alike it is what the base's own concentration about neighbours adds."""
+    scene, fitted = base
+    law = Law(scene=scene, fitted=fitted)
+    made = law.component(precision_of_attention(evenly, "precision"))
+    for found, sharper, usual in zip(made, law._neighbours(1.1), law._neighbours(), strict=True):
+        np.testing.assert_allclose(found, sharper - usual, atol=1e-12)
+        assert np.abs(found).max() > 1e-3

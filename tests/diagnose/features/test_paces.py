@@ -308,6 +308,17 @@ def test_beside_an_effect_its_own_features_gain_nothing(nothing, changed):
     assert tell(pace_gains(there, ALL)) is None
 
 
+def test_what_is_there_at_first_alone_is_told_by_the_time(nothing, changed):
+    """Two minutes of ten: that it goes is what a feature by the time says."""
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = by_the_nearest(nothing) ** 4
+    first = np.where(nothing.scene.time_s(nothing.scene.moves) < 120, times, 1.0)
+    paces = changed(first)
+    told = tell(pace_gains(paces, ALL))
+    assert (told.gain.name, told.gain.label) == ("speed-matching", "of all near, by the time")
+    assert paces.course(told.gain).in_all_minutes
+
+
 def test_what_comes_and_goes_is_not_there_in_all_minutes(nothing, changed):
     """Two of ten minutes have it, far apart: gains are told, and differ between minutes."""
     times = np.ones(len(nothing.scene.moves))

@@ -178,6 +178,9 @@ def _beside(law: Law, effects: Sequence[Effect]) -> Fits:
     also: list[Mixed] = []
     for effect in effects:
         for feature in _askable(law, effect):
+            if isinstance(feature, OneOf) and feature.features[0].over is not None:
+                # What has to be gained more than, such as attention by the time, is no part of it.
+                continue
             chosen, n_tried = _chosen(fits, feature)
             for each in chosen:
                 if isinstance(each, Mixed):
@@ -235,7 +238,12 @@ def _gains(fits: Fits, name: str, feature: Feature) -> list[tuple[Single, Gain]]
     """Return a feature, or the most promising of several, with what they add."""
     if not isinstance(feature, OneOf):
         return [(feature, fits.gain(name, feature))]
+    chosen = fits.most_promising(feature)
+    if not chosen:
+        # It counts as one that was asked for.
+        nothing = fits.nothing(name, _one(feature))
+        return [(_one(feature), replace(nothing, n_tried=feature.n_tried, kind=feature.kind))]
     return [
         (each, replace(fits.gain(name, each), n_tried=feature.n_tried, kind=feature.kind))
-        for each in fits.most_promising(feature)
+        for each in chosen
     ]

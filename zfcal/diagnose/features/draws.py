@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,10 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
 from zfcal.model.extended import without_effects
 from zfcal.model.features import AWAY_M, LAGS, Seen
+from zfcal.model.histories import ago_heading, courses, in_open, lately, recent_turn, stayed
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
-    FOLLOWS,
     HX,
     HY,
     KIND,
@@ -46,16 +45,6 @@ from zfcal.units import HEADING_MIN_STEP_M
 
 _SOON = 0.1
 """Share of a step of a response that is a little late."""
-
-_LATELY_S = 2.0
-_OPEN_S = 5.0
-"""How fast others were lately is taken over so long."""
-
-_RECENT, _FADING = 5, 0.6
-"""So many turns are remembered, each that much less than the one after it."""
-
-_WIDE_RAD = 1.2
-"""Wider turns count as that: a fish that turns round does not spin."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -274,9 +263,9 @@ def _seen(
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
         speed_m_s=theirs(SPEED, at),
-        lately_m_s=_lately(states, steps.scene.dt_s)[at[:, None], others],
+        lately_m_s=lately(states, steps.scene.dt_s)[at[:, None], others],
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
-        course=_courses(states, steps.scene.dt_s)[at[:, None], others] * present,
+        course=courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,
         in_sight=angle[rows, others] > 0,
         is_robot=(theirs(KIND, at) > 0) & here,
@@ -291,87 +280,14 @@ def _seen(
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
         last_turn_rad=turned,
-        ago_heading=_ago_heading(states, at, turns.who),
-        recent_turn_rad=_recent_turn(states, at, turns.who),
+        ago_heading=ago_heading(states, at, turns.who),
+        recent_turn_rad=recent_turn(states, at, turns.who),
         time=at / max(1, len(steps.scene.k) - 1),
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
-        in_open=_in_open(states, steps.scene.dt_s)[at[:, None], others],
-        stayed_s=_stayed(states, steps.scene.dt_s)[at, turns.who],
+        in_open=in_open(states, steps.scene.dt_s)[at[:, None], others],
+        stayed_s=stayed(states, steps.scene.tracks, steps.scene.dt_s)[at, turns.who],
     )
-
-
-def _lately(states: Floats, dt_s: float) -> Floats:
-    """Return the mean speed over two seconds up to each sample, since who is there came."""
-    speed, present = states[:, SPEED], states[:, ZONE] > 0
-    total, count = np.zeros_like(speed), np.zeros_like(speed)
-    for ago in range(min(len(speed), max(1, round(_LATELY_S / dt_s)))):
-        present = present.copy()
-        present[ago:] &= states[: len(speed) - ago, ZONE] > 0
-        present[:ago] = False
-        then = np.roll(speed, ago, axis=0)
-        known = present & np.isfinite(then) & (then >= 0)
-        total += np.where(known, then, 0.0)
-        count += known
-    return np.asarray(total / np.maximum(count, 1))
-
-
-def _in_open(states: Floats, dt_s: float) -> Floats:
-    """Return the share of the last seconds that everybody was off the walls, (sample, agent)."""
-    n = max(1, round(_OPEN_S / dt_s))
-    there = states[:, ZONE] > 0
-    off = there & ~(states[:, FOLLOWS] > 0)
-    passed, known = (np.cumsum(np.pad(each, ((n, 0), (0, 0))), axis=0) for each in (off, there))
-    return np.asarray((passed[n:] - passed[:-n]) / np.maximum(known[n:] - known[:-n], 1))
-
-
-def _stayed(states: Floats, dt_s: float) -> Floats:
-    """Return for how long everybody has been in its room, or between rooms, (sample, agent)."""
-    room = np.where(states[:, ZONE] > 0, states[:, ROOM], -1.0)
-    sample = np.arange(len(room))[:, None]
-    came = np.zeros(room.shape, dtype=np.int64)
-    came[1:] = np.where(room[1:] != room[:-1], sample[1:], 0)
-    return np.asarray((sample - np.maximum.accumulate(came, axis=0)) * dt_s)
-
-
-def _courses(states: Floats, dt_s: float) -> Floats:
-    """Return everybody's mean velocity over two seconds, shape (sample, agent, 2), in m/s."""
-    n = max(1, round(_LATELY_S / dt_s))
-    xy = np.moveaxis(states[:, [X, Y]], 1, 2)
-    made = np.zeros_like(xy)
-    made[n:] = (xy[n:] - xy[:-n]) / (n * dt_s)
-    was_there = np.zeros(made.shape[:2], dtype=bool)
-    was_there[n:] = np.lib.stride_tricks.sliding_window_view(
-        states[:, ZONE] > 0, n + 1, axis=0
-    ).all(axis=-1)  # fmt: skip
-    return np.where(was_there[..., None] & np.isfinite(made), made, 0.0)
-
-
-def _ago_heading(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
-    """Return own headings so many steps before, shape (lag, step, 2); zeros before a gap."""
-    made = np.zeros((len(LAGS), len(at), 2))
-    is_known = np.ones(len(at), dtype=bool)
-    for ago in range(1, max(LAGS) + 1):
-        then = at - ago
-        is_known &= (then >= 0) & (states[np.maximum(then, 0), ZONE, who] > 0)
-        if ago in LAGS:
-            ways = states[np.maximum(then, 0), :, who][:, [HX, HY]]
-            made[LAGS.index(ago)] = np.where(is_known[:, None], np.nan_to_num(ways), 0.0)
-    return made
-
-
-def _recent_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
-    """Return the mean of the turns before some samples, the later the more it counts."""
-    headings = [states[np.maximum(at - k, 0), :, who][:, [HX, HY]] for k in range(_RECENT + 1)]
-    total, weights = np.zeros(len(at)), _FADING ** np.arange(_RECENT)
-    is_known = np.ones(len(at), dtype=bool)
-    for k, (weight, (now, before)) in enumerate(zip(weights, pairwise(headings), strict=True)):
-        # Before a gap it may have been another one.
-        is_known &= states[np.maximum(at - k - 1, 0), ZONE, who] > 0
-        left = before[:, 0] * now[:, 1] - before[:, 1] * now[:, 0]
-        turned = np.arctan2(left, (before * now).sum(axis=1))
-        total += np.where(is_known, weight * np.clip(turned, -_WIDE_RAD, _WIDE_RAD), 0.0)
-    return np.asarray(total / weights.sum())
 
 
 def _turned_back(seen: Seen, back: Floats) -> Seen:

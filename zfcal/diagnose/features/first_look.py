@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import orth
+from scipy.optimize import nnls
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.columns import Columns
@@ -21,6 +23,9 @@ from zfcal.model.features import Choosable, Landing, Leaving, Tilt, Turned
 
 _TRIED = (0.005, 0.02, 0.06)
 """Strengths of a component at which it is first asked for."""
+
+_NEXT_TO_NOTHING = 1e-6
+"""Share of a score's length that is rounding: columns may be sums of what is fitted with them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +53,7 @@ class FirstLook:
     @property
     def prepared(self) -> tuple[object, ...]:
         """What all features need, worked out before they are asked side by side."""
-        return self._no_lapse, self._mean_heading, self._own_scores
+        return self._no_lapse, self._mean_heading, self._own_basis
 
     def nats(self, feature: Choosable) -> float:
         """Return about how many nats a feature gains, less its strengths, and than what it has to.
@@ -62,20 +67,23 @@ class FirstLook:
 
     def _nats(self, feature: Choosable) -> float:
         if isinstance(feature, Landing):
-            return _score_nats(self.landing_scores(feature))
+            return _nats_of(self.landing_scores(feature))
         if isinstance(feature, Leaving):
-            return _score_nats(*self.leaving_scores(feature, self._no_lapse))
+            scores, beside = self.leaving_scores(feature, self._no_lapse)
+            return _nats_of(off(scores, basis_of(beside)))
         if isinstance(feature, Tilt):
             taken = ways_of(self.law.turns.taken, axial=feature.axial)
-            apart = taken - self._mean_heading[int(feature.axial)]
+            apart = self._no_lapse[:, None] * (taken - self._mean_heading[int(feature.axial)])
             vectors = feature.vectors(self.law.draws[0].seen)
-            return _score_nats(np.einsum("sbd,sd->sb", vectors, apart))
+            return _nats_of(np.einsum("sbd,sd->sb", vectors, apart), low=feature.low)
         if isinstance(feature, Turned):
-            return _score_nats(self._scores_of(self.law.turned(feature)), self._own_scores)
+            scores = self._scores_of(self.law.turned(feature))
+            return _nats_of(off(scores, self._own_basis), low=feature.low)
         columns = self.law.component(feature, first=True)
         if feature.low >= 0 and not feature.instead:
             return self._tried_nats(columns)
-        return _score_nats(self._scores_of(columns), self._own_scores)
+        scores = off(self._scores_of(columns), self._own_basis)
+        return _nats_of(scores, low=feature.low, high=feature.high)
 
     def _scores_of(self, columns: Columns) -> Floats:
         """Return the scores of what adds to the mixture, shape (step, weight)."""
@@ -83,8 +91,9 @@ class FirstLook:
         return np.asarray(self._no_lapse[:, None] * (at / base_at - over / base_over))
 
     @cached_property
-    def _own_scores(self) -> Floats:
-        return np.concatenate([self._scores_of(columns) for columns in self.own], axis=1)
+    def _own_basis(self) -> Floats:
+        """Orthonormal columns with the span of the scores of what is fitted with every feature."""
+        return basis_of(np.concatenate([self._scores_of(columns) for columns in self.own], axis=1))
 
     def _tried_nats(self, columns: Columns) -> float:
         """Return what a few strengths of a component gain: of all weights alike, or of each.
@@ -92,11 +101,9 @@ class FirstLook:
         Their scores have no variance where the density is next to nothing.
         """
         at, over = columns
-        alike = self._best_tried(at.sum(axis=1), over.sum(axis=1)) - 1
-        if at.shape[1] == 1:
-            return alike
-        each = (self._best_tried(*pair) - 1 for pair in zip(at.T, over.T, strict=True))
-        return max(alike, sum(max(nats, 0.0) for nats in each))
+        alike = self._best_tried(at.sum(axis=1), over.sum(axis=1))
+        each = (self._best_tried(*pair) for pair in zip(at.T, over.T, strict=True))
+        return max(alike, sum(max(nats, 0.0) for nats in each)) - at.shape[1]
 
     def _best_tried(self, at: Floats, over: Floats) -> float:
         lapse, (base_at, base_over) = self.law.lapses.likely, self.law.base
@@ -126,20 +133,53 @@ class FirstLook:
         return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
 
 
-def _score_nats(scores: Floats, beside: Floats | None = None) -> float:
-    """Return about how many nats weights gain, less their number, by their scores.
+def basis_of(scores: Floats) -> Floats:
+    """Return orthonormal columns with the span of others, shape (step, column)."""
+    size = np.linalg.norm(scores, axis=0)
+    return np.asarray(orth(scores[:, size > 0] / size[size > 0], rcond=_NEXT_TO_NOTHING))
+
+
+def off(scores: Floats, basis: Floats) -> Floats:
+    """Return scores less what is fitted with them, shape (step, weight).
+
+    Those of which nothing but rounding is left are zeros: they are sums of what is there.
 
     Parameters
     ----------
     scores : ndarray, shape (step, weight)
-        Of these.
-    beside : ndarray, shape (step, weight)
-        Of what is fitted with them, and is at its best without them.
+    basis : ndarray, shape (step, column)
+        Orthonormal.
     """
-    total, spread = scores.sum(axis=0), scores.T @ scores
-    if not np.isfinite(total).all():
-        return 0.0
-    if beside is not None:
-        mixed = scores.T @ beside
-        spread = spread - mixed @ np.linalg.pinv(beside.T @ beside, hermitian=True) @ mixed.T
-    return float(total @ np.linalg.pinv(spread, hermitian=True) @ total) / 2 - len(total)
+    left = scores - basis @ (basis.T @ scores)
+    gone = np.linalg.norm(left, axis=0) <= _NEXT_TO_NOTHING * np.linalg.norm(scores, axis=0)
+    return np.where(gone, 0.0, left)
+
+
+def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = None) -> float:
+    """Return about how many nats weights gain, less their number, by their scores.
+
+    The log likelihood is taken as quadratic where no weight has a strength. It has its maximum at
+    strengths that may have one sign alone, if they are bounded by zero.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (step, weight)
+        Of these, less what is fitted with them.
+    low, high
+        Bounds of the strengths.
+    """
+    n, size = scores.shape[1], np.linalg.norm(scores, axis=0)
+    some = np.isfinite(size) & (size > 0)
+    if not some.any():
+        return -float(n)
+    units = scores[:, some] / size[some]
+    values, ways = np.linalg.eigh(units.T @ units)
+    kept = values > _NEXT_TO_NOTHING * values[-1]
+    root = np.sqrt(values[kept])
+    square, aim = root[:, None] * ways[:, kept].T, ways[:, kept].T @ units.sum(axis=0) / root
+    missed = 0.0
+    if low is not None and low >= 0:
+        missed = float(nnls(square, aim)[1])
+    elif high is not None and high <= 0:
+        missed = float(nnls(-square, aim)[1])
+    return float(aim @ aim - missed**2) / 2 - n

@@ -31,7 +31,7 @@ from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
 from zfcal.diagnose.features.first_look import FirstLook
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
-from zfcal.diagnose.features.law import MOST_SHARPER, Law
+from zfcal.diagnose.features.law import SHARPER, Law
 from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
@@ -149,7 +149,7 @@ class Fits:
             return columns, [(_low(feature, _MOST_TURN), _MOST_TURN)] * columns[0].shape[1]
         if isinstance(feature, Sharper):
             columns = self.law.sharper(feature)
-            return columns, [MOST_SHARPER] * columns[0].shape[1]
+            return columns, [SHARPER] * columns[0].shape[1]
         columns = self.law.component(feature)
         return columns, [(feature.low, feature.high)] * columns[0].shape[1]
 
@@ -187,6 +187,13 @@ class Fits:
             made = made + self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n,
+            without_noise=not self.law.noise_m > 0,
+        )  # fmt: skip
+
+    def nothing(self, name: str, feature: Single) -> Gain:
+        """Return that a feature of an effect adds nothing, without a fit."""
+        return Gain(
+            name=name, label=feature.label, log_p=np.zeros(len(self.law.rows)), n_strengths=1,
             without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
 

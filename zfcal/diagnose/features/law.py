@@ -28,7 +28,7 @@ from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells
 from zfcal.diagnose.features.lapses import Lapses
 from zfcal.diagnose.features.waves import series_of, waves_of
 from zfcal.model.directions import turned_by
-from zfcal.model.features import Component, Sharper, Turned
+from zfcal.model.features import MOST_SHARPER, Component, Sharper, Turned
 from zfcal.model.fitted import SCALES, Fitted
 from zfcal.model.kernels.landing import ANGLES, PER_CELL
 from zfcal.model.kernels.rooms import find_rooms, open_zone
@@ -39,7 +39,7 @@ DRAWS = 8
 _TURN_RAD = 0.02
 """Half of the angle between the two laws whose difference stands for the derivative."""
 
-MOST_SHARPER = (-3.0, 3.0)
+SHARPER = (-MOST_SHARPER, MOST_SHARPER)
 """Bounds of what is added to a concentration, in tenths of it."""
 
 _WEIGHT = (-0.98, 6.0)
@@ -357,9 +357,9 @@ class Law:
         """
         social, social_more = self._neighbours(), self._neighbours(_MORE)
         changes = (
-            (self._own_sharper, MOST_SHARPER),
+            (self._own_sharper, SHARPER),
             (social, (-0.9, 6.0)),
-            (less(social_more, social), MOST_SHARPER),
+            (less(social_more, social), SHARPER),
         )
         columns, bounds = [], []
         for zone in np.unique(self.turns.zone):

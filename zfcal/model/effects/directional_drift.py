@@ -176,6 +176,11 @@ def _axes_off_the_walls(seen: Seen) -> Floats:
 
 _BY_DIRECTION = Along(cue="direction (rad)", knots=_DIRECTIONS)
 
+
+def _way_out(seen: Seen) -> Floats:
+    return seen.way_out[:, None]
+
+
 _LEANING = Tilt(label="leaning", vectors=_axes)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -191,7 +196,12 @@ _FEATURES: tuple[Feature, ...] = (
         kind="drawn along an axis", features=tuple(_both_ways(k * math.pi / 6) for k in range(6))
     ),
     _LEANING,
-    by_circumstances(_LEANING, without=("the time",)),
+    by_circumstances(
+        _LEANING,
+        # A direction of each room is a place, and of each fish it may be the way out.
+        alone=Tilt(label="leaning to the way out", vectors=_way_out),
+        without=("the time", "the zone", "the stay"),
+    ),
     Tilt(label="leaning, by the time", vectors=_axes_by_time),
     Tilt(label="leaning along an axis", vectors=_doubled, axial=True),
     Tilt(label="leaning, off the walls", vectors=_axes_off_the_walls),

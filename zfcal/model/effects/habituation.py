@@ -85,7 +85,7 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(
         factor_on_attention(_steadily, label="attention, steadily"),
         alone=factor_on_attention(evenly),
-        without=("the time",),
+        without=("the time", "whether it is a robot"),
         of_each=True,
     ),
 )

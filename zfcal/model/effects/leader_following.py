@@ -212,6 +212,7 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(
         factor_on_attention(_fast, label="attention to the fast"),
         alone=factor_on_attention(evenly),
+        without=("the time",),
         of_each=True,
     ),
     OneOf(

@@ -153,7 +153,9 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
             features=[
                 each
                 for spot in spots
-                for each in by_circumstances(_leaning_near(spot), among=_VARYING).features
+                for each in by_circumstances(
+                    _leaning_near(spot), alone=_WAY_OUT, among=_VARYING
+                ).features
             ],
         ),
         *(OneOf(kind=kind, features=features) for kind, features in landings if features),
@@ -228,6 +230,10 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
     return Tilt(
         label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors, along=_BY_DISTANCE
     )
+
+
+_WAY_OUT = Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None])
+"""Who leans to that more than others is bold."""
 
 
 def _leaning_near(spot: Floats) -> Tilt:

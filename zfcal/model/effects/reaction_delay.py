@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,13 +12,13 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import LAGS, Component, Feature, Seen
+from zfcal.model.features import LAGS, Component, Feature, Seen, Weights
 from zfcal.model.kernels.hats import hats_where
 
 
 def _late(
     label: str,
-    toward: Callable[[Seen], Floats],
+    toward: Weights | Literal["soon_toward", "half_toward"],
     attention: Callable[[Seen], Floats],
     high: float = 1.0,
 ) -> Component:
@@ -73,20 +75,26 @@ def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
         return seen.attention[..., None] * by(seen)
 
     return Component(
-        label=f"a tenth of a step, {label}", toward=lambda seen: seen.soon_toward,
+        label=f"a tenth of a step, {label}", toward="soon_toward",
         weights=weights, instead=weights, high=3.0,
     )  # fmt: skip
 
 
-def _soon_sight(label: str, by: Callable[[Seen], Floats]) -> Component:
-    """Return the same of whom the fish sees as well: others come into view and leave it late."""
-    return Component(
-        label=f"a tenth of a step, sight, {label}",
-        toward=lambda seen: seen.soon_toward,
-        weights=lambda seen: seen.soon_attention[..., None] * by(seen),
-        instead=lambda seen: seen.attention[..., None] * by(seen),
-        high=1.0,
-    )
+_FAR_SOON = Component(
+    label="a tenth of a step, sight, far ones",
+    toward="soon_toward",
+    weights=lambda seen: seen.soon_attention[..., None] * _far(seen),
+    instead=lambda seen: seen.attention[..., None] * _far(seen),
+    high=1.0,
+)
+"""Of whom the fish sees as well: others come into view and leave it late."""
+
+_FAR_LATER = replace(
+    _FAR_SOON,
+    label="half a step, sight, far ones",
+    toward="half_toward",
+    weights=lambda seen: seen.half_attention[..., None] * _far(seen),
+)
 
 
 def _soon_by_distance(seen: Seen) -> Floats:
@@ -99,9 +107,9 @@ def _far(seen: Seen) -> Floats:
 
 
 _FEATURES: tuple[Feature, ...] = (
-    _late("a tenth of a step", lambda seen: seen.soon_toward, lambda seen: seen.attention, 3.0),
-    _late("half a step", lambda seen: seen.half_toward, lambda seen: seen.attention),
-    _late("half a step, sight", lambda seen: seen.half_toward, lambda seen: seen.half_attention),
+    _late("a tenth of a step", "soon_toward", lambda seen: seen.attention, 3.0),
+    _late("half a step", "half_toward", lambda seen: seen.attention),
+    _late("half a step, sight", "half_toward", lambda seen: seen.half_attention),
     _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
     _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
     *(_ago(k) for k in range(len(LAGS))),
@@ -109,8 +117,10 @@ _FEATURES: tuple[Feature, ...] = (
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),
     by_circumstances(_soon("far ones", _far), of_each=True),
-    _soon_sight("far ones", _far),
-    by_circumstances(_soon_sight("far ones", _far), of_each=True),
+    _FAR_SOON,
+    by_circumstances(_FAR_SOON, of_each=True),
+    _FAR_LATER,
+    by_circumstances(_FAR_LATER, of_each=True),
 )
 
 

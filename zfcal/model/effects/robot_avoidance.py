@@ -195,7 +195,7 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(
         factor_on_attention(_to_robots, label="attention to robots"),
         alone=factor_on_attention(evenly),
-        without=("the time",),
+        without=("the time", "whether it is a robot"),
         of_each=True,
     ),
     by_circumstances(Tilt(label="leaning near it", vectors=_leaning_near)),

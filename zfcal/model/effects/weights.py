@@ -6,10 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.circumstances import each_fish
-from zfcal.model.features import Along, Component, Seen, Weights
-
-MOST_SHARPER = 3.0
-"""Tenths by which a concentration may be changed."""
+from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Weights
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
