@@ -56,7 +56,7 @@ class FirstLook:
         return self._no_lapse, self._mean_heading, self._own_basis
 
     def nats(self, feature: Choosable) -> float:
-        """Return about how many nats a feature gains, less its strengths, and than what it has to.
+        """Return about how many nats a feature gains beyond what it has to, less its strengths.
 
         The density of one more component has no variance where that of the base is next to
         nothing, so it is asked for by what a few strengths of it gain, the lapse as it is.

@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import tilt, way_out
-from zfcal.model.effects.weights import aside_of, only, who
+from zfcal.model.effects.weights import aside_of, every_step, only, who
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -73,10 +73,6 @@ def _who_by_time(seen: Seen) -> Floats:
 
 def _all_by_time(seen: Seen) -> Floats:
     return hats(seen.time, _TIMES)[:, 1:]
-
-
-def _all(seen: Seen) -> Floats:
-    return np.ones((len(seen.zone), 1))
 
 
 def _nearness(between: shapely.Geometry, seen: Seen) -> Floats:
@@ -163,7 +159,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
         ),
         by_circumstances(
             Leaving(label="who", weights=who),
-            alone=Leaving(label="all", weights=_all),
+            alone=Leaving(label="all", weights=every_step),
             without=("who", "the time", "the zone"),
         ),
         Leaving(label="who, into the open", weights=who, into="open"),

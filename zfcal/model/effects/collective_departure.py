@@ -21,7 +21,7 @@ from zfcal.model.effects.forms import (
     turn_to,
     way_out,
 )
-from zfcal.model.effects.weights import aside_of, only, who
+from zfcal.model.effects.weights import LEANING_OUT, aside_of, every_step, only, who
 from zfcal.model.features import (
     Along,
     Component,
@@ -161,10 +161,6 @@ def _just_left(seen: Seen) -> Floats:
     return np.exp(-seen.each_left_s / _JUST_S).sum(axis=1, keepdims=True)
 
 
-def _always(seen: Seen) -> Floats:
-    return np.ones((len(seen.zone), 1))
-
-
 def _out_after(seen: Seen) -> Floats:
     return np.asarray(_just_left(seen)[..., None] * seen.way_out[:, None])
 
@@ -217,7 +213,7 @@ _FEATURES: tuple[Feature, ...] = (
     Leaving(label="time, though it came back", weights=_each_left, along=_BY_TIME),
     by_circumstances(
         Leaving(label="just after others", weights=_just_left),
-        alone=Leaving(label="at any time", weights=_always),
+        alone=Leaving(label="at any time", weights=every_step),
         without=("the zone",),
     ),
     Component(
@@ -227,7 +223,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning to the way out", vectors=_leaning, along=_BY_TIME),
     by_circumstances(
         Tilt(label="leaning to the way out after others", vectors=_out_after),
-        alone=Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None]),
+        alone=LEANING_OUT,
     ),
     Turned(label="turning to the way out", by=_turning, neighbours=False, along=_BY_TIME),
 )

@@ -22,7 +22,7 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.effects.weights import LEANING_OUT, aside_of, only
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -177,10 +177,6 @@ def _axes_off_the_walls(seen: Seen) -> Floats:
 _BY_DIRECTION = Along(cue="direction (rad)", knots=_DIRECTIONS)
 
 
-def _way_out(seen: Seen) -> Floats:
-    return seen.way_out[:, None]
-
-
 _LEANING = Tilt(label="leaning", vectors=_axes)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -199,7 +195,7 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(
         _LEANING,
         # A direction of each room is a place, and of each fish it may be the way out.
-        alone=Tilt(label="leaning to the way out", vectors=_way_out),
+        alone=LEANING_OUT,
         without=("the time", "the zone", "the stay"),
     ),
     Tilt(label="leaning, by the time", vectors=_axes_by_time),

@@ -24,7 +24,7 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import aside_of, halfway, only, seen_and_nearest
+from zfcal.model.effects.weights import aside_of, every_step, halfway, only, seen_and_nearest
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats, hats_where
@@ -193,7 +193,7 @@ def _by_distance(seen: Seen) -> Floats:
 
 
 def _alike(seen: Seen) -> Floats:
-    return only(np.ones((len(seen.zone), 1)))
+    return only(every_step(seen))
 
 
 def _to_middle(seen: Seen) -> Floats:

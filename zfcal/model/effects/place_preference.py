@@ -16,7 +16,7 @@ from zfcal.model.directions import lengths, of_tank
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
-from zfcal.model.effects.weights import aside_of, only
+from zfcal.model.effects.weights import LEANING_OUT, aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -154,7 +154,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
                 each
                 for spot in spots
                 for each in by_circumstances(
-                    _leaning_near(spot), alone=_WAY_OUT, among=_VARYING
+                    _leaning_near(spot), alone=LEANING_OUT, among=_VARYING
                 ).features
             ],
         ),
@@ -230,10 +230,6 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
     return Tilt(
         label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}", vectors=vectors, along=_BY_DISTANCE
     )
-
-
-_WAY_OUT = Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None])
-"""Who leans to that more than others is bold."""
 
 
 def _leaning_near(spot: Floats) -> Tilt:

@@ -6,7 +6,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.circumstances import each_fish
-from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Weights
+from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Weights
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
@@ -103,6 +103,15 @@ def factor_on_attention(
     return Component(
         label=label, toward="toward", weights=attended(weights), low=_LEAST, high=high, along=along
     )
+
+
+LEANING_OUT = Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None])
+"""What fish may do by circumstances and is no direction, no place and no answer to others."""
+
+
+def every_step(seen: Seen) -> Floats:
+    """Return one for each step, shape (step, 1)."""
+    return np.ones((len(seen.zone), 1))
 
 
 def evenly(seen: Seen) -> Floats:
