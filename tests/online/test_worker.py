@@ -141,3 +141,20 @@ def test_it_is_stopped_in_the_middle_of_its_work(worker):
     assert time.monotonic() - began_s < 5
     with pytest.raises(ProcessLookupError):
         os.kill(worker.process, 0)
+
+
+def test_it_is_stopped_while_it_prepares_itself(tmp_path, monkeypatch, capfd):
+    """SIGTERM may come before the first order is waited for: no traceback, whatever the moment."""
+    module = "import os, signal\nos.nice = lambda by: os.kill(os.getpid(), signal.SIGTERM)\n"
+    (tmp_path / "early_job.py").write_text(module + "def job(order, tell): ...\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(os, "nice", os.nice)
+    made = Worker("test", importlib.import_module("early_job").job)
+    made.order(1)
+    ends_s = time.monotonic() + 20
+    while made.is_busy and time.monotonic() < ends_s:
+        made.take()
+        time.sleep(0.01)
+    assert not made.is_busy
+    made.stop()
+    assert "Traceback" not in capfd.readouterr().err

@@ -165,14 +165,15 @@ class _TerminatedError(BaseException):
 
 def _serve(pipe: Connection, job: Job, niceness: int) -> None:
     """Carry out orders until nobody gives any."""
-    signal.signal(signal.SIGTERM, _terminate)
-    # Ctrl-C goes to all processes of the terminal; whoever gives the orders ends this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
-    if hasattr(os, "nice"):
-        os.nice(niceness)
-    _hand_on_logs(pipe.send)
+    # SIGTERM may come at any moment, while the process still prepares itself too.
     with contextlib.suppress(EOFError, OSError, _TerminatedError):
+        signal.signal(signal.SIGTERM, _terminate)
+        # Ctrl-C goes to all processes of the terminal; whoever gives the orders ends this one.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        threading.Thread(target=_die_with_parent, daemon=True).start()
+        if hasattr(os, "nice"):
+            os.nice(niceness)
+        _hand_on_logs(pipe.send)
         while True:
             pipe.send(_answer(job, pipe.recv(), pipe.send))
 
@@ -185,6 +186,8 @@ def _answer(job: Job, order: object, tell: Tell) -> Done | Failure:
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signal's signature
+    # A second one, to the whole group say, must not disturb the closing.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise _TerminatedError
 
 
