@@ -9,13 +9,15 @@ from zfcal.diagnose.candidates import (
     askable,
     candidates_of,
     company_of,
+    curved,
     further_forms,
     in_model,
     not_forms_of,
 )
 from zfcal.model.effects import all_effects, find_effect, generic_effects
 from zfcal.model.features import LAGS
-from zfcal.model.kernels.state import KIND
+from zfcal.model.kernels import curves
+from zfcal.model.kernels.state import KIND, TIME
 from zfcal.model.scene import make_scene
 
 
@@ -184,3 +186,47 @@ def test_no_response_is_later_than_it_can_be(scene_of):
     assert len(then) == 2 * len(LAGS)
     slow = dataclasses.replace(scene, dt_s=1.25)
     assert max(forms_of(slow, "reaction-delay", "delay_s")) <= 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "cue", "knots"),
+    [
+        ("turning-bias", "leaning to the left, by the nearest", "BY_NEAREST", (0.03, 0.1, 0.25)),
+        ("habituation", "attention, steadily, by bearing", "BY_BEARING", (0.0, 1.2, 2.3)),
+        ("turning-bias", "leaning to the left, by the zone", "BY_ZONE", (1.0, 2.0, 3.0)),
+        ("interaction-range", "attention", "BY_DISTANCE", None),
+        ("crowding", "company, by how many are near", "BY_NEAREST", (0.03, 0.1, 0.25)),
+    ],
+)
+def test_a_curve_goes_by_what_a_feature_does(candidate, scene_of, name, label, cue, knots):
+    """By its circumstances, or by what its own weights go by."""
+    made = curved(candidate(name), label, scene_of())
+    assert made.shape["by"] == getattr(curves, cue)
+    own = tuple(made.shape[f"knot_{k}"] for k in (1, 2, 3))
+    assert own == (knots or own)
+    assert list(own) == sorted(set(own))
+    assert made.shape["more_1"] == made.shape["more_3"] == 0.0
+    assert candidate(name).shape.items() <= made.shape.items()
+
+
+def test_a_curve_by_time_is_in_seconds_of_the_trial(candidate, scene_of):
+    """A feature goes by shares of the recording."""
+    scene = scene_of()
+    made = curved(candidate("turning-bias"), "leaning to the left, by the time", scene)
+    begin_s, end_s = scene.states[0, TIME, 0], scene.states[-1, TIME, 0]
+    own = [made.shape[f"knot_{k}"] for k in (1, 2, 3)]
+    assert own == pytest.approx([begin_s, (begin_s + end_s) / 2, end_s])
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("turning-bias", "leaning to the left, by who"),
+        ("turning-bias", "leaning to the left"),
+        ("reaction-delay", "attention, by the nearest"),
+        ("freezing", "stops, by the time"),
+    ],
+)
+def test_no_curve_goes_by_what_a_model_does_not_know(candidate, scene_of, name, label):
+    """By who somebody is, or of what is no matter of one strength."""
+    assert curved(candidate(name), label, scene_of()) is None

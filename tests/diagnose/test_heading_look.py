@@ -25,6 +25,7 @@ from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise
+from zfcal.model.kernels.curves import BY_NEAREST
 
 NOTHING = Found()
 
@@ -133,7 +134,9 @@ def test_a_place_that_is_a_direction_is_put_aside_for_it(question, monkeypatch):
         for name, nats in (("place-preference", 120.0), ("directional-drift", 100.0))
     }  # fmt: skip
     score = SimpleNamespace(clearness=9.0, information=1.0)
-    monkeypatch.setattr(common, "in_the_model", lambda _case, _screen, name: (forms[name], score))
+    monkeypatch.setattr(
+        common, "in_the_model", lambda _case, _screen, own: (forms[own.name], score)
+    )
     monkeypatch.setattr(
         common, "feigned", lambda made, _before: [x for x in made if "place" in x.name]
     )
@@ -182,10 +185,36 @@ def test_of_a_direction_and_its_opposite_the_right_one_is_fitted(question, direc
     """Their scores have the same size: only the sign tells which of them fish prefer."""
     given = {"strength": 0.3, "direction_rad": direction_rad}
     case = open_case(question({"directional-drift": given}))
-    found, _ = common.in_the_model(case, case.screen, "directional-drift")
+    found, _ = common.in_the_model(case, case.screen, gain("directional-drift", np.zeros(1)))
     assert found.values["turning"] == found.values["drawn"] == 0.0
     assert found.interval["strength"][0] > 0.1
     assert abs(math.remainder(found.values["direction_rad"] - direction_rad, math.tau)) < 0.5
+
+
+@pytest.mark.slow
+def test_a_form_gets_a_curve_where_that_gains_more(question):
+    """Fish that turn left near others and right far from them: half of it is no plain form."""
+    bent = {"by": float(BY_NEAREST), "knot_1": 0.03, "knot_2": 0.1, "knot_3": 0.25}
+    given = {"strength": 0.0, "more_1": 0.8, "more_3": -0.8} | bent
+    (effect,) = diagnose(question({"turning-bias": given}), lambda *_: None).effects
+    assert effect.name == "turning-bias"
+    assert bent.items() <= effect.strength.items()
+    for key in ("strength", "more_1", "more_3"):
+        low, high = effect.interval[key]
+        assert low - 0.2 < given[key] < high + 0.2
+    assert "Fitted strength by distance to the nearest: " in effect.says
+    curve = effect.by_features
+    assert curve.cue == "distance to the nearest (m)"
+    assert curve.at.tolist() == [0.03, 0.1, 0.25]
+    assert curve.form == pytest.approx(curve.strength, abs=0.2)
+    assert curve.form_nats > 0.9 * curve.nats
+
+
+@pytest.mark.slow
+def test_a_plain_form_stays_where_fish_have_it(question):
+    """Its features under circumstances gain no more than it does."""
+    (effect,) = diagnose(question({"turning-bias": {"strength": 0.8}}), lambda *_: None).effects
+    assert "by" not in effect.strength
 
 
 @pytest.mark.slow

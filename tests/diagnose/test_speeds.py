@@ -7,6 +7,7 @@ from zfcal.diagnose.confirming import half_of
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed, held_out_gain, log_density
 from zfcal.model.extended import maximise
+from zfcal.model.kernels.curves import BY_TIME
 from zfcal.model.scene import make_scene
 
 
@@ -150,6 +151,19 @@ def test_speed_matching_is_found_again(screen, candidate):
     own = screen(59, {"speed-matching": {"exponent": 0.5}})
     found = fit_speed(own, candidate("speed-matching"), 0.3)
     assert found.values["exponent"] == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_curve_of_an_exponent_is_found_again(screen, candidate):
+    """Fast after fast steps at first, slow after them at last: a mean of nothing."""
+    bent = {"by": float(BY_TIME), "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}
+    more = {"more_1": 0.5, "more_3": -0.5}
+    own = screen(53, {"burst-and-coast": {"exponent": 0.0} | bent | more})
+    flat = fit_speed(own, candidate("burst-and-coast"), 0.1)
+    found = fit_speed(own, candidate("burst-and-coast", **bent), 0.1)
+    assert found.values["exponent"] == pytest.approx(0.0, abs=0.08)
+    for key, value in more.items():
+        assert found.values[key] == pytest.approx(value, abs=0.12)
+    assert found.gain.sum() > flat.gain.sum() + 40
 
 
 def test_no_effect_gains_next_to_nothing(screen, candidate):

@@ -29,6 +29,20 @@ def test_without_an_interval_none_is_told(candidate):
     assert "Fitted share: 0.6." in text
 
 
+def test_a_curve_is_told_knot_by_knot(candidate):
+    """With what it goes by; the sentence is that of the side on which it is strongest."""
+    bent = {"by": 4.0, "knot_1": 0.03, "knot_2": 0.1, "knot_3": 0.25}
+    own = candidate("turning-bias", **bent)
+    values = own.values(-0.1) | {"more_1": 1.1, "more_3": -0.4}
+    text = says(own, values, {"strength": (-0.2, 0.0)})
+    assert text.startswith(own.effect.says)
+    assert (
+        "Fitted strength by distance to the nearest: 1 at 0.03 m, -0.1 at 0.1 m, -0.5 at 0.25 m."
+        in text
+    )
+    assert says(own, values | {"more_1": 0.2}, {}).startswith(own.effect.opposite)
+
+
 def test_an_interval_of_a_shape_is_not_that_of_the_strength(candidate):
     """Only the strength is told."""
     text = says(candidate("alignment"), {"weight": 5.0, "kappa": 3.0}, {"kappa": (1.0, 5.0)})

@@ -18,6 +18,7 @@ from zfcal.model.extended import (
     without_effects,
 )
 from zfcal.model.fitted import MIN_STEPS, SCALES, constants, zone_log_p, zone_scores, zone_turns
+from zfcal.model.kernels import curves
 from zfcal.model.kernels.extended import (
     BASE,
     BASE_SLOPE,
@@ -37,6 +38,10 @@ from zfcal.tracks import Samples
 
 DT_S = 0.2
 
+KNOTS = {"knot_1": 0.03, "knot_2": 0.1, "knot_3": 0.25, "more_1": -0.4, "more_3": 0.5}
+BY_DISTANCE = {"by": float(curves.BY_DISTANCE)} | KNOTS
+BY_SPEED = {"by": float(curves.BY_SPEED)} | KNOTS
+
 HOOKS = {
     "none": {},
     "component": {"alignment": {"weight": 20.0, "kappa": 6.0}},
@@ -55,6 +60,8 @@ HOOKS = {
     "directions of then": {
         "reaction-delay": {"delay_s": 0.3, "share": 0.3, "whole": 0.0, "then": 1.0}
     },
+    "curve of a factor": {"turning-bias": {"strength": 0.5} | BY_SPEED},
+    "curve of sight": {"rear-blind-zone": {"ignored": 0.4} | BY_DISTANCE},
     "all": {
         "alignment": {"weight": 20.0, "kappa": 6.0},
         "turning-bias": {"strength": 0.5},

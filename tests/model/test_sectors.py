@@ -11,10 +11,14 @@ from scipy import stats
 
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.heading import PATIENCE
+from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import make_sight
 from zfcal.model.kernels.sectors import draw_in_sectors, open_sectors
-from zfcal.model.kernels.state import SECTORS, look, make_work
+from zfcal.model.kernels.state import (
+    SECTORS,
+    make_work,
+)
 from zfcal.model.onestep import _prepare, draw_headings
 
 SPEED_M_S = 0.19

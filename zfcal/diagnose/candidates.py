@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.arena import Arena
+from zfcal.model.curves import KNOTS
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
-from zfcal.model.features import LAGS
+from zfcal.model.effects.circumstances import curve_under
+from zfcal.model.features import LAGS, OneOf
+from zfcal.model.kernels.curves import BY_ZONE
 from zfcal.model.kernels.rooms import find_rooms
-from zfcal.model.kernels.state import KIND
+from zfcal.model.kernels.state import KIND, TIME
 from zfcal.model.scene import Scene
 from zfcal.parameters import Parameters
 
@@ -105,7 +108,7 @@ _LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
 
 
 def _at(effect: Effect, values: Mapping[str, float]) -> Candidate:
-    own = {p.name: values.get(p.name, p.default) for p in effect.parameters}
+    own = effect.spelt_out(values)
     shape = {key: value for key, value in own.items() if key != effect.strength}
     return Candidate(effect=effect, shape=shape)
 
@@ -160,6 +163,36 @@ def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
             if lag * scene.dt_s <= longest_s
         ]
     return tuple(_at(effect, shape) for shape in shapes)
+
+
+def curved(candidate: Candidate, label: str, scene: Scene) -> Candidate | None:
+    """Return an effect whose strength goes by what a feature does; None where that is no cue.
+
+    Parameters
+    ----------
+    candidate
+        At a shape.
+    label
+        Of the feature.
+    scene
+        Of the recording.
+    """
+    if candidate.effect.lag is not None or candidate.effect.rests:
+        return None
+    time_s = scene.states[:, TIME]
+    along = next(
+        (
+            each.along
+            for feature in candidate.effect.features(scene.arena)
+            for each in (feature.features if isinstance(feature, OneOf) else (feature,))
+            if each.label == label
+        ),
+        None,
+    )
+    by = curve_under(label, along, float(time_s.min()), float(time_s.max()))
+    if by is None or (by["by"] == BY_ZONE and len(scene.arena.zones) != len(KNOTS)):
+        return None
+    return Candidate(effect=candidate.effect, shape=candidate.shape | by)
 
 
 def _lasting_fish(scene: Scene) -> list[int]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, further_forms
+from zfcal.diagnose.candidates import Candidate, curved, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise, by_noise
 from zfcal.diagnose.features.gains import Gain
@@ -194,7 +194,7 @@ def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
         The name and its ties.
     """
     made = {
-        gain.name: in_the_model(case, screen, gain.name) for gain in (told.gain, *told.ties)
+        gain.name: in_the_model(case, screen, gain) for gain in (told.gain, *told.ties)
     }  # fmt: skip
     aside = {each.name for each in feigned([form for form, _ in made.values()], screen)}
     left = [pair for name, pair in made.items() if name not in aside]
@@ -254,10 +254,14 @@ def noise_of_form(case: Case, form: Refit) -> ByNoise:
     return by_noise(np.array(rows), [form.n_free])[0]
 
 
-def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
-    """Return an effect in the model in that form which gains most, and its score there."""
-    own = [each for each in (*case.listed, *case.generic) if each.name == name]
-    own += further_forms(find_effect(name), case.scene)
+def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
+    """Return an effect in the model in that form which gains most, and its score there.
+
+    Where its features gain more under circumstances than any form does, the best one is tried with
+    a strength that goes by these as well.
+    """
+    own = [each for each in (*case.listed, *case.generic) if each.name == gain.name]
+    own += further_forms(find_effect(gain.name), case.scene)
     scores = ask_all(screen, own, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -each.clearness):
@@ -269,6 +273,12 @@ def in_the_model(case: Case, screen: Screen, name: str) -> tuple[Refit, Score]:
         each = max(1, n_workers // len(tried))
         made = list(pool.map(lambda score: refit(screen, score, n_workers=each), tried))
     k = int(np.argmax([each.worth for each in made]))
+    by = curved(tried[k].candidate, gain.label, case.scene)
+    if by is not None and gain.nats > made[k].nats:
+        bent = dataclasses.replace(tried[k], candidate=by)
+        other = refit(screen, bent, n_workers=n_workers)
+        if other.worth > made[k].worth:
+            return other, bent
     return made[k], tried[k]
 
 

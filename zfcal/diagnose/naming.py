@@ -16,6 +16,7 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed
+from zfcal.model.curves import MORE, has_curve
 from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free
 from zfcal.model.kernels.state import TRAIT
@@ -202,7 +203,7 @@ def _refit_speed(screen: Screen, score: Score) -> Refit:
         values=found.values,
         interval={candidate.effect.strength: found.interval},
         gain=by_sample(screen.scene, moves.at, found.gain),
-        n_free=1,
+        n_free=1 + (len(MORE) if has_curve(candidate.shape) else 0),
     )
 
 

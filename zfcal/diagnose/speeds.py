@@ -28,6 +28,7 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.fields import is_known, is_within_fields
 from zfcal.diagnose.rests import ChainFit, Runs, fit_chain, runs_of
 from zfcal.diagnose.screening import Screen
+from zfcal.model.curves import MORE, has_curve
 from zfcal.model.extended import bounds_of, without_effects
 from zfcal.model.packing import pack
 from zfcal.parameters import Parameters
@@ -39,6 +40,9 @@ _SPARE, _MOST_BINS = 2, 200
 _SMOOTH = 0.5
 _FAST_QUANTILE = 0.995
 _DIFFERENCE = 1e-3
+_MOST_LOOKS = 150
+"""At curves of a strength."""
+
 _RAREST = 1e-6
 """Chance per step below which fish never stop."""
 
@@ -145,7 +149,7 @@ def _polygon(place: Floats, known: NDArray[np.bool_], n_bins: int) -> Floats:
 
 
 def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
-    """Return an effect on speed at its maximum likelihood, its shape as it is.
+    """Return an effect on speed at its maximum likelihood, its shape as it is but for its curve.
 
     Parameters
     ----------
@@ -160,6 +164,9 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
         return _fit_stops(screen, candidate)
     all_ = np.ones(len(screen.scene.moves), dtype=bool)
     likelihood = _Likelihood.of(screen, candidate, all_)
+    if has_curve(candidate.shape):
+        likelihood = likelihood.bent(start)
+        candidate = likelihood.candidate
     low, high = bounds_of(candidate.name, candidate.effect.strength)
     best = likelihood.maximum(start)
     by = max(0.05 * abs(best), 1e-3 * (high - low))
@@ -249,6 +256,37 @@ class _Likelihood:
             options={"xatol": 1e-3 * reach, "maxiter": 25},
         )
         return float(found.x)
+
+    def bent(self, start: float) -> _Likelihood:
+        """Return them with the curve of the strength that is most likely (Nelder and Mead 1965)."""
+        effect = self.candidate.effect
+        keys = (effect.strength, *MORE)
+        limits = [bounds_of(effect.name, key) for key in keys]
+        first = np.array([start, 0.0, 0.0])
+        by = np.array([0.05 * (high - low) for low, high in limits])
+
+        def at(x: Floats) -> tuple[_Likelihood, float]:
+            strength, *more = map(float, x)
+            shape = self.candidate.shape | dict(zip(MORE, more, strict=True))
+            return replace(self, candidate=replace(self.candidate, shape=shape)), strength
+
+        def loss(x: Floats) -> float:
+            likelihood, strength = at(x)
+            return -float(likelihood.log_p(strength)[self.learnt].sum())
+
+        found = optimize.minimize(
+            loss,
+            first,
+            method="Nelder-Mead",
+            bounds=limits,
+            options={
+                "initial_simplex": np.vstack([first, first + np.diag(by)]),
+                "maxfev": _MOST_LOOKS,
+                "xatol": 0.01 * float(by.max()),
+                "fatol": 0.05,
+            },
+        )
+        return at(found.x)[0]
 
 
 class _alone:  # noqa: N801 - a function of two steps

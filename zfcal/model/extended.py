@@ -312,7 +312,7 @@ def bounds_of(name: str, key: str, arena: Arena | None = None) -> tuple[float, f
     In an arena a place is looked for within the box round the tank: from one metres away fish would
     be drawn the same way wherever they are, which is no place but a direction.
     """
-    (found,) = (each for each in find_effect(name).parameters if each.name == key)
+    found = find_effect(name).parameter(key)
     if arena is None or key not in _AXES:
         return found.low, found.high
     ends = arena.outline.bounds[_AXES[key] :: 2]

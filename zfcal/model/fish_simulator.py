@@ -13,6 +13,7 @@ from zfcal.errors import InputError
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.heading import apply_move
+from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
 from zfcal.model.kernels.random import seeded
@@ -30,7 +31,6 @@ from zfcal.model.kernels.state import (
     Work,
     X,
     Y,
-    look,
     make_work,
     place,
     remember,

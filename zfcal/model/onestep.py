@@ -11,6 +11,7 @@ from zfcal.errors import InputError
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_grid
+from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
@@ -29,7 +30,6 @@ from zfcal.model.kernels.state import (
     Work,
     X,
     Y,
-    look,
     make_work,
     remember,
     settle,

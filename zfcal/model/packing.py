@@ -12,8 +12,10 @@ from scipy.special import i0e
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
+from zfcal.model.curves import has_curve, knots_of, strengths_at
 from zfcal.model.effects import MAX_PARAMETERS, NEIGHBOURS, Effect, find_effect
 from zfcal.model.effects.genome import genome_length, with_strengths
+from zfcal.model.kernels.curves import CURVE_COLUMNS, LEVELS
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
 from zfcal.model.kernels.state import (
     KAPPA_BASE,
@@ -138,6 +140,7 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
     fov = np.array([parameters.fov_rad for parameters in models])
     # At pi everything is seen, whatever the rounding of the cosine.
     cos_fov = np.where(fov >= math.pi, -2.0, np.cos(fov))
+    rows, curves = _effect_parameters(effects, models, n_models)
     return Packed(
         zones=zones,
         turns=turns,
@@ -156,7 +159,8 @@ def _packed(own: Floats, gamma: Floats, models: Sequence[Parameters], arena: Are
         sights=_hooks(effects, "sight", models),
         rotations=_hooks(effects, "rotation", models),
         whole_rotations=_hooks(effects, "whole_rotation", models),
-        effects=_effect_parameters(effects, models, n_models),
+        effects=rows,
+        curves=curves,
     )
 
 
@@ -219,11 +223,7 @@ def _of_each(effects: Sequence[Effect], models: Sequence[Parameters]) -> list[in
         for row, effect in enumerate(effects)
         if effect.each
         and any(
-            dict(zip(effect.names, effect.values(model.effects[effect.name]), strict=True))[
-                effect.each
-            ]
-            != 0.0
-            for model in models
+            effect.spelt_out(model.effects[effect.name])[effect.each] != 0.0 for model in models
         )
     ]
 
@@ -238,7 +238,7 @@ def _lags(
             continue
         for model in range(n_models):
             given = models[model % len(models)]
-            values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
+            values = effect.spelt_out(given.effects[effect.name])
             lags[model] = max(lags[model], math.ceil(_steps_late(values[effect.lag], given.dt_s)))
     return lags
 
@@ -256,7 +256,7 @@ def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: in
     for effect in effects:
         for model in range(n_models if effect.lag is not None else 0):
             given = models[model % len(models)]
-            values = dict(zip(effect.names, effect.values(given.effects[effect.name]), strict=True))
+            values = effect.spelt_out(given.effects[effect.name])
             steps = _steps_late(values[effect.lag], given.dt_s) if effect.lag else 0.0
             made[model, LATE_SHARE] = values[effect.strength]
             made[model, LATE_FELT_M] = values["felt_m"]
@@ -268,15 +268,50 @@ def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: in
 
 def _effect_parameters(
     effects: Sequence[Effect], models: Sequence[Parameters], n_models: int
-) -> Floats:
+) -> tuple[Floats, Floats]:
+    """Return the parameters of effects, and the curves that their strengths follow."""
     packed = np.zeros((n_models, len(effects), MAX_PARAMETERS))
     for row, effect in enumerate(effects):
         for model in range(n_models):
             given = models[model % len(models)].effects[effect.name]
             packed[model, row, : len(effect.parameters)] = effect.values(given)
-    each = [
+    each = _of_each(effects, models)
+    ranked = [
         np.where(np.arange(MAX_PARAMETERS) == MAX_PARAMETERS - 1, rank, packed[:, row])
-        for row in _of_each(effects, models)
+        for row in each
         for rank in range(1, NEIGHBOURS + 1)
     ]
-    return np.concatenate([packed, np.stack(each, axis=1)], axis=1) if each else packed
+    rows = [*range(len(effects)), *(row for row in each for _ in range(NEIGHBOURS))]
+    whole = np.concatenate([packed, np.stack(ranked, axis=1)], axis=1) if ranked else packed
+    return _with_levels(whole, [effects[row] for row in rows], models)
+
+
+def _with_levels(
+    packed: Floats, effects: Sequence[Effect], models: Sequence[Parameters]
+) -> tuple[Floats, Floats]:
+    """Return rows of parameters with those of levels after them, and the curves.
+
+    Parameters
+    ----------
+    packed : ndarray, shape (model, row, 8)
+    effects
+        Of each row.
+    """
+    n_models, n_rows = packed.shape[:2]
+    given = [[model.effects[effect.name] for effect in effects] for model in models]
+    curved = [row for row in range(n_rows) if any(has_curve(own[row]) for own in given)]
+    if not curved:
+        return packed, np.zeros((n_models, 0, CURVE_COLUMNS))
+    curves = np.zeros((n_models, n_rows, CURVE_COLUMNS))
+    levels = np.repeat(packed[:, curved], LEVELS, axis=1)
+    for number, row in enumerate(curved):
+        at = effects[row].names.index(effects[row].strength)
+        for model in range(n_models):
+            own = given[model % len(given)][row]
+            if has_curve(own):
+                first = number * LEVELS
+                curves[model, row] = (own["by"], n_rows + first, *knots_of(own))
+                levels[model, first : first + LEVELS, at] = strengths_at(
+                    own, effects[row].parameter(effects[row].strength)
+                )
+    return np.concatenate([packed, levels], axis=1), curves

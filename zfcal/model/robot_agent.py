@@ -12,6 +12,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
+from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
 from zfcal.model.kernels.random import seeded
@@ -37,7 +38,6 @@ from zfcal.model.kernels.state import (
     Work,
     X,
     Y,
-    look,
     make_work,
     remember,
     settle,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from zfcal.model.curves import EffectParameter, curve_of
 from zfcal.model.effects import all_effects, generic_effects
-from zfcal.model.effects.base import Effect, EffectParameter
+from zfcal.model.effects.base import Effect
+from zfcal.model.kernels.curves import BY_NEAREST
 
 _HEAD = """\
 # Effects
@@ -19,6 +21,33 @@ effect does nothing. Where it may be negative the second sentence holds. A param
 file leaves out has its default.
 
 This page is made by `make effects-page` from the files in `zfcal/model/effects/`.
+"""
+
+_CURVES = """
+## Curves
+
+The strength of any effect but `reaction-delay` may go by something, such as the distance to the
+nearest:
+
+    [effects.turning-bias]
+    strength = 0.1
+    by = {by}
+    knot_1 = 0.03
+    knot_2 = 0.1
+    knot_3 = 0.25
+    more_1 = 0.9
+    more_3 = -0.7
+
+So fish turn left where the nearest is within 3 cm (0.1 + 0.9), hardly at 10 cm, and right from
+25 cm on (0.1 - 0.7); between the knots the strength changes evenly, in 16 steps. It stays within the
+range that it has without a curve. `zfcal diagnose` gives a curve to what it names where features
+gain more than any plain form does, and the curve gains more than its two further parameters cost.
+
+| parameter | default | what it is |
+|---|---|---|
+{rows}
+What is of the other goes by whom the fish attends to, where an effect changes attention, and by the
+nearest elsewhere. `calibrate` moves the strength, and so the whole curve with it.
 """
 
 _GENERIC = """
@@ -35,7 +64,11 @@ speed.
 
 def effects_page() -> str:
     """Return the page in Markdown: sentences, parameters with bounds and units, references."""
-    return _part(_HEAD, all_effects()) + _part(_GENERIC, generic_effects())
+    rows = "".join(
+        f"| `{each.name}` | {each.default:g} | {each.says} |\n" for each in curve_of(0.0, 1.0)
+    )
+    curves = _CURVES.format(by=BY_NEAREST, rows=rows)
+    return _part(_HEAD, all_effects()) + curves + _part(_GENERIC, generic_effects())
 
 
 def _part(head: str, effects: Sequence[Effect]) -> str:

@@ -14,11 +14,13 @@ import numpy as np
 
 from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.features.asking import best_feature, fits_beside
+from zfcal.diagnose.features.climbing import Fit
 from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import Effect
+from zfcal.model.effects.circumstances import along_under
 from zfcal.model.features import Component, Landing, Leaving, Single, Tilt
 from zfcal.model.kernels.landing import ANGLES
 
@@ -50,27 +52,34 @@ def curve_of(
         return None
     feature, gain = found
     made = FeatureCurve(label=feature.label, nats=gain.nats, form_nats=nats)
-    if feature.along is None:
-        return made
     fits = replace(fits, off_walls=isinstance(feature, Landing))
-    n, fit = len(feature.along.knots), fits.fit(feature)
-    shown = _Knots(none_at=feature.along.none_at)
+    fit = fits.fit(feature)
+    along = feature.along or along_under(feature.label, _n_own(fits, feature, fit))
+    if along is None:
+        return made
+    n = len(along.knots)
+    shown = _Knots(none_at=along.none_at)
+    besides = fit.strengths[n:], fit.interval[n:]
     return replace(
         made,
-        cue=feature.along.cue,
+        cue=along.cue,
         strength_name=_name_of(feature),
-        at=shown.knots(feature.along.knots),
+        at=shown.knots(along.knots),
         strength=shown.values(fit.strengths[:n]),
         low=shown.values(fit.interval[:n, 0]),
         high=shown.values(fit.interval[:n, 1]),
         form=shown.values(_of_the_form(fits, feature, with_it)[:n]),
         besides={
             name: (float(value), float(low), float(high))
-            for name, value, (low, high) in zip(
-                feature.along.besides, fit.strengths[n:], fit.interval[n:], strict=True
-            )
+            for name, value, (low, high) in zip(along.besides, *besides, strict=bool(along.besides))
         },
     )
+
+
+def _n_own(fits: Fits, feature: Single, fit: Fit) -> int:
+    """Return how many strengths are a feature's own, those of what it has to exceed put aside."""
+    over = getattr(feature, "over", None)
+    return len(fit.strengths) - (0 if over is None else len(fits.fit(over).strengths))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,13 @@ import pkgutil
 from functools import cache
 
 from zfcal.errors import InputError
-from zfcal.model.effects.base import MAX_PARAMETERS, NEIGHBOURS, Company, Effect, EffectParameter
+from zfcal.model.curves import EffectParameter
+from zfcal.model.effects.base import (
+    MAX_PARAMETERS,
+    NEIGHBOURS,
+    Company,
+    Effect,
+)
 
 __all__ = [
     "MAX_PARAMETERS",

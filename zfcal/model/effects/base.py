@@ -38,6 +38,7 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
+from zfcal.model.curves import MORE, EffectParameter, curve_of, has_curve, knots_of
 from zfcal.model.features import Feature
 from zfcal.model.paces import Pace, PaceFeature
 
@@ -45,29 +46,6 @@ MAX_PARAMETERS = 8
 
 NEIGHBOURS = 8
 """Of so many neighbours each may have a component of its own."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EffectParameter:
-    """One number of an effect.
-
-    Parameters
-    ----------
-    name
-        As in the model file.
-    low, high
-        Bounds within which it is calibrated.
-    default
-        Used where the model file is silent.
-    says
-        What it means, with its unit.
-    """
-
-    name: str
-    low: float
-    high: float
-    default: float
-    says: str
 
 
 Shapes = tuple[dict[str, float], ...]
@@ -283,6 +261,17 @@ class Effect:
         return tuple(parameter.name for parameter in self.parameters)
 
     @property
+    def curve(self) -> tuple[EffectParameter, ...]:
+        """Parameters that it may have besides: see `curve_of`."""
+        own = next((each for each in self.parameters if each.name == self.strength), None)
+        return () if own is None else curve_of(own.low, own.high)
+
+    def parameter(self, name: str) -> EffectParameter:
+        """Return the parameter of a name, one of its curve as well."""
+        (found,) = (each for each in (*self.parameters, *self.curve) if each.name == name)
+        return found
+
+    @property
     def on_speed(self) -> bool:
         """Whether it changes the speed; otherwise it changes the heading."""
         return self.speed is not None
@@ -314,20 +303,28 @@ class Effect:
 
     def free(self, shape: Mapping[str, float]) -> tuple[str, ...]:
         """Return the parameters that a fit moves in a form: those that are smooth and not idle."""
-        idle = self.idle(dict(zip(self.names, self.values(shape), strict=True)))
-        return tuple(name for name in self.names if name not in {*self.fixed, *idle})
+        idle = self.idle(self.spelt_out(shape))
+        curve = MORE if has_curve(shape) else ()
+        return tuple(name for name in (*self.names, *curve) if name not in {*self.fixed, *idle})
 
     def degree(self, given: Mapping[str, float]) -> int | None:
         """Return the degree of the polynomial that the log of its factor is, None if it is none."""
-        values = dict(zip(self.names, self.values(given), strict=True))
-        return None if values.get(self.not_harmonic) else self.harmonics
+        return None if self.spelt_out(given).get(self.not_harmonic) else self.harmonics
 
     def calls(self, kind: str, given: Mapping[str, float]) -> bool:
         """Return whether a function of a kind has anything to do at these parameters."""
         if getattr(self, kind) is None:
             return False
+        needs, values = self.needs.get(kind, ()), self.spelt_out(given)
+        by_curve = has_curve(given) and self.strength in needs
+        return not needs or by_curve or any(values[name] != 0.0 for name in needs)
+
+    def spelt_out(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return all parameters by their names, those of the curve where it has one."""
         values = dict(zip(self.names, self.values(given), strict=True))
-        return kind not in self.needs or any(values[name] != 0.0 for name in self.needs[kind])
+        if has_curve(given):
+            values |= {each.name: given.get(each.name, each.default) for each in self.curve}
+        return values
 
     def values(self, given: Mapping[str, float]) -> tuple[float, ...]:
         """Return the parameters in their order, with defaults for those not given.
@@ -338,14 +335,19 @@ class Effect:
             A name that the effect does not have, or a value out of bounds.
         """
         known = {parameter.name: parameter for parameter in self.parameters}
+        curve = {parameter.name: parameter for parameter in self.curve}
         for name, value in given.items():
-            if name not in known:
+            if name not in {**known, **curve}:
                 raise InputError(
                     f"Effect {self.name!r} has no parameter {name!r}; it has {list(known)}."
                 )
-            low, high = known[name].low, known[name].high
+            found = {**known, **curve}[name]
+            low, high = found.low, found.high
             if not (low <= value <= high and math.isfinite(value)):
                 raise InputError(
                     f"Effect {self.name!r}: {name} must be in [{low:g}, {high:g}], got {value!r}."
                 )
+        if has_curve(given) and self.lag is not None:
+            raise InputError(f"Effect {self.name!r} has no curve: a delay is the same for all.")
+        knots_of(given)
         return tuple(given.get(name, parameter.default) for name, parameter in known.items())

@@ -16,11 +16,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.features import AWAY_M, Component, Leaving, OneOf, Seen, Tilt, Turned, Weights
+from zfcal.model.curves import KNOTS, MORE, cue_named
+from zfcal.model.features import (
+    AWAY_M,
+    Along,
+    Component,
+    Leaving,
+    OneOf,
+    Seen,
+    Tilt,
+    Turned,
+    Weights,
+)
+from zfcal.model.kernels.curves import (
+    BY_BEARING,
+    BY_DISTANCE,
+    BY_NEAREST,
+    BY_NUMBER,
+    BY_SPEED,
+    BY_TIME,
+    BY_TURN,
+    BY_ZONE,
+    NOTHING,
+)
 from zfcal.model.kernels.hats import hats
 from zfcal.model.paces import Pace, Swum
 
 Core = TypeVar("Core", Component, Tilt, Turned, Leaving)
+
+_BY = ", by "
 
 MOST_TRACKS = 12
 """Of so many fish each is held apart; short pieces of tracks count as one more."""
@@ -86,6 +110,31 @@ OF_EACH: dict[str, Weights] = {
 """Of others, by name: shape (step, other, circumstance)."""
 
 
+CURVES: dict[str, tuple[int, tuple[float, float, float]]] = {
+    "the speed": (BY_SPEED, _SPEEDS_M_S),
+    "the last turn": (BY_TURN, _TURNS_RAD),
+    "the nearest": (BY_NEAREST, _NEAR_M),
+    "how many are seen": (BY_NUMBER, _NUMBERS),
+    "the zone": (BY_ZONE, (1.0, 2.0, 3.0)),
+    "the time": (BY_TIME, _TIMES),
+    "distance": (BY_DISTANCE, _NEAR_M),
+    "bearing": (BY_BEARING, _BEARINGS_RAD),
+    "the last speed": (BY_SPEED, _SPEEDS_M_S),
+    "how many are near": (BY_NEAREST, _NEAR_M),
+}
+"""What the strength of a form goes by under circumstances of a name, and the knots of its curve.
+
+Those of the time are shares of a recording.
+"""
+
+_SHARE_OF_TIME = "share of the recording that has passed"
+
+_BY_CUE = {
+    **{cue_named({"by": by}): by for by in (BY_NEAREST, BY_DISTANCE, BY_BEARING)},
+    _SHARE_OF_TIME: BY_TIME,
+}
+"""What a strength goes by where a feature's own weights go by a cue."""
+
 PACED: dict[str, Callable[[Swum], Floats]] = {
     "who": lambda swum: each_of(swum.track),
     "the time": lambda swum: hats(swum.time, _TIMES),
@@ -132,8 +181,56 @@ def by_circumstances(
     )
 
 
+def curve_under(
+    label: str, along: Along | None, begin_s: float, end_s: float
+) -> dict[str, float] | None:
+    """Return the curve of a form by what a feature goes by, or by its circumstances.
+
+    Parameters
+    ----------
+    label
+        Of the feature.
+    along
+        What its first weights go by; None where that is nothing.
+    begin_s, end_s
+        Of the recording, in seconds of the trial.
+
+    Returns
+    -------
+    dict or None
+        Parameters of `zfcal.model.curves`; None where there is no such curve.
+    """
+    by, knots = CURVES.get(label.rpartition(_BY)[2], (NOTHING, _TIMES))
+    if by == NOTHING and along is not None and len(along.knots) >= len(KNOTS):
+        by = _BY_CUE.get(along.cue, NOTHING)
+        knots = along.knots[0], along.knots[len(along.knots) // 2], along.knots[-1]
+    if by == NOTHING:
+        return None
+    if by == BY_TIME:
+        first, middle, last = (begin_s + share * (end_s - begin_s) for share in knots)
+        knots = first, middle, last
+    return {"by": float(by), **dict(zip(KNOTS, knots, strict=True)), **dict.fromkeys(MORE, 0.0)}
+
+
+def along_under(label: str, n_strengths: int) -> Along | None:
+    """Return what the strengths of a feature under circumstances go by; None where that is no cue.
+
+    Parameters
+    ----------
+    label
+        Of the feature.
+    n_strengths
+        Its own ones: a feature of one weight has as many as there are knots.
+    """
+    by, knots = CURVES.get(label.rpartition(_BY)[2], (NOTHING, _TIMES))
+    if by in {NOTHING, BY_ZONE} or n_strengths != len(knots):
+        return None
+    cue = _SHARE_OF_TIME if by == BY_TIME else cue_named({"by": by})
+    return Along(cue=cue, knots=knots)
+
+
 def _under(core: Core, name: str, of: Weights, alone: Core | None) -> Core:
-    label = f"{core.label}, by {name}"
+    label = f"{core.label}{_BY}{name}"
     own = _times(core, of)
     if isinstance(core, Component) and callable(core.instead):
         same = core.instead is core.weights
@@ -145,7 +242,7 @@ def _under(core: Core, name: str, of: Weights, alone: Core | None) -> Core:
     def both(seen: Seen) -> Floats:
         return np.concatenate([own(seen), over(seen)], axis=_axis(core))
 
-    return replace(_with(core, both, label), over=_with(alone, over, f"{alone.label}, by {name}"))
+    return replace(_with(core, both, label), over=_with(alone, over, f"{alone.label}{_BY}{name}"))
 
 
 def _axis(core: Core) -> int:
@@ -189,7 +286,7 @@ def _with(core: Core, weights: Weights, label: str) -> Core:
 def paces_by(core: Pace, *names: str) -> tuple[Pace, ...]:
     """Return a feature of speeds under circumstances, by their names."""
     return tuple(
-        replace(core, label=f"{core.label}, by {name}", weights=_paced(core, PACED[name]))
+        replace(core, label=f"{core.label}{_BY}{name}", weights=_paced(core, PACED[name]))
         for name in names
     )
 

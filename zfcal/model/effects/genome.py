@@ -33,10 +33,7 @@ def spelt_out(template: Parameters) -> Parameters:
     effects = [(find_effect(name), given) for name, given in template.effects.items()]
     return dataclasses.replace(
         template,
-        effects={
-            effect.name: dict(zip(effect.names, effect.values(given), strict=True))
-            for effect, given in effects
-        },
+        effects={effect.name: effect.spelt_out(given) for effect, given in effects},
     )
 
 
@@ -158,5 +155,5 @@ def with_strengths(template: Parameters, genes: Floats) -> Parameters:
 
 
 def _range(name: str, key: str) -> tuple[float, float]:
-    (found,) = (each for each in find_effect(name).parameters if each.name == key)
+    found = find_effect(name).parameter(key)
     return found.low, found.high

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.hooks import (
     call_component,
     call_factor,
@@ -44,12 +45,11 @@ def attend(
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
         for h in range(packed.sights.shape[0]):
-            own = packed.effects[0, packed.sights[h, 1]].ctypes.data
             for j in range(n):
                 if row[i * n + j] > 0.0:
                     row[i * n + j] *= call_sight(
                         packed.sights[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                        own, j,
+                        parameters_at(packed, 0, packed.sights[h, 1], states[at[s]], row, i, j), j,
                     )  # fmt: skip
         for j in range(n):
             changed[s, j] = row[i * n + j]
@@ -77,7 +77,8 @@ def ask_components(
             out[:] = 0.0
             weight: float = call_component(
                 packed.components[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                packed.effects[0, packed.components[h, 1]].ctypes.data, out.ctypes.data,
+                parameters_at(packed, 0, packed.components[h, 1], states[at[s]], row, i, -1),
+                out.ctypes.data,
             )  # fmt: skip
             parts[s, h, 0] = max(weight, 0.0)
             parts[s, h, 1], parts[s, h, 2], parts[s, h, 3] = out[0], out[1], out[2]
@@ -107,7 +108,7 @@ def ask_rotations(
         for h in range(hooks.shape[0]):
             angle[s] += call_rotation(
                 hooks[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                packed.effects[0, hooks[h, 1]].ctypes.data,
+                parameters_at(packed, 0, hooks[h, 1], states[at[s]], row, i, -1),
             )  # fmt: skip
         for j in range(n):
             row[i * n + j] = 0.0
@@ -154,7 +155,7 @@ def ask_factors(
         i = who[s]
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
-        state = states[at[s]].ctypes.data
+        state = states[at[s]]
         for g in range(-1, cells):
             ux, uy, zone = taken[s, 0], taken[s, 1], landing[s]
             if g >= 0:
@@ -163,8 +164,8 @@ def ask_factors(
             if zone > 0:
                 for h in range(packed.factors.shape[0]):
                     product *= call_factor(
-                        packed.factors[h, 0], state, row.ctypes.data, n, i,
-                        packed.effects[0, packed.factors[h, 1]].ctypes.data,
+                        packed.factors[h, 0], state.ctypes.data, row.ctypes.data, n, i,
+                        parameters_at(packed, 0, packed.factors[h, 1], state, row, i, -1),
                         ux, uy, speed_m_s[s], zone,
                     )  # fmt: skip
             if g >= 0:
@@ -177,23 +178,24 @@ def ask_factors(
 
 @inlined
 def _log_factor(
-    packed: Packed, state: int, row: int, at: tuple[int, int], heading: tuple[float, float],
+    packed: Packed, state: Floats, row: Floats, i: int, heading: tuple[float, float],
     speed_m_s: float, landing: int,
 ) -> float:  # fmt: skip
     """Return the log of the product of the effects' factors at one heading.
 
     Parameters
     ----------
-    state, row
-        Addresses of the agents' state and of what is seen.
-    at
-        Number of agents, and the agent.
+    state : ndarray, shape (row, agent)
+    row : ndarray, shape (agent * agent,)
+        What is seen.
+    i
+        The agent.
     """
     product = 1.0
     for h in range(packed.factors.shape[0]):
         product *= call_factor(
-            packed.factors[h, 0], state, row, at[0], at[1],
-            packed.effects[0, packed.factors[h, 1]].ctypes.data,
+            packed.factors[h, 0], state.ctypes.data, row.ctypes.data, state.shape[1], i,
+            parameters_at(packed, 0, packed.factors[h, 1], state, row, i, -1),
             heading[0], heading[1], speed_m_s, landing,
         )  # fmt: skip
     return math.log(max(product, 1e-300))
@@ -241,9 +243,9 @@ def ask_harmonics(
         i = who[s]
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
-        state, seen, me = states[at[s]].ctypes.data, row.ctypes.data, (n, i)
+        state = states[at[s]]
         for p in range(points):
-            value[p] = _log_factor(packed, state, seen, me, (gx[p], gy[p]), speed_m_s[s], 1)
+            value[p] = _log_factor(packed, state, row, i, (gx[p], gy[p]), speed_m_s[s], 1)
         waves[s] = 0.0
         for p in range(points):
             waves[s, 0] += value[p] / points
@@ -253,7 +255,7 @@ def ask_harmonics(
         zones[s] = 0.0
         if by_landing:
             for z in range(1, zones.shape[1]):
-                there = _log_factor(packed, state, seen, me, (gx[0], gy[0]), speed_m_s[s], z + 1)
+                there = _log_factor(packed, state, row, i, (gx[0], gy[0]), speed_m_s[s], z + 1)
                 zones[s, z] = there - value[0]
         log_taken[s] = _polynomial(waves[s], taken[s, 0], taken[s, 1]) + zones[s, landing[s] - 1]
         for j in range(n):
@@ -281,7 +283,8 @@ def ask_speeds(
         for h in range(packed.speeds.shape[0]):
             factor[s] *= call_speed(
                 packed.speeds[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                packed.effects[0, packed.speeds[h, 1]].ctypes.data, 1.0 - 1e-12,
+                parameters_at(packed, 0, packed.speeds[h, 1], states[at[s]], row, i, -1),
+                1.0 - 1e-12,
             )  # fmt: skip
         for j in range(n):
             row[i * n + j] = 0.0

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel, lean
+from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_speed
 from zfcal.model.kernels.mixture import gather, spun, tilt, toward_one, weigh
@@ -268,7 +269,8 @@ def draw_move(
     for k in range(packed.speeds.shape[0]):
         factor *= call_speed(
             packed.speeds[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, state.shape[1],
-            i, packed.effects[model, packed.speeds[k, 1]].ctypes.data, uniform(random),
+            i, parameters_at(packed, model, packed.speeds[k, 1], state, sight.angle_sr, i, -1),
+            uniform(random),
         )  # fmt: skip
     # An agent that an effect stops keeps its heading.
     for _ in range(1 + REDRAWS if factor > 0.0 else 0):

@@ -6,7 +6,9 @@ import math
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation
+from zfcal.model.kernels.looking import sight_row, splits
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import vonmises_r
 from zfcal.model.kernels.state import (
@@ -17,8 +19,6 @@ from zfcal.model.kernels.state import (
     ZONE,
     Packed,
     Work,
-    sight_row,
-    splits,
 )
 
 
@@ -105,7 +105,7 @@ def gather(
     for k in range(packed.components.shape[0]):
         weight = call_component(
             packed.components[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, n, i,
-            packed.effects[model, packed.components[k, 1]].ctypes.data,
+            parameters_at(packed, model, packed.components[k, 1], state, sight.angle_sr, i, -1),
             parts[count, 1:].ctypes.data,
         )  # fmt: skip
         if weight > 0.0:
@@ -134,8 +134,8 @@ def _turn(
     angle = 0.0
     for k in range(hooks.shape[0]):
         angle += call_rotation(
-            hooks[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-            state.shape[1], i, packed.effects[model, hooks[k, 1]].ctypes.data,
+            hooks[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, state.shape[1], i,
+            parameters_at(packed, model, hooks[k, 1], state, sight.angle_sr, i, -1),
         )  # fmt: skip
     return angle
 
@@ -160,8 +160,8 @@ def tilt(
     product = 1.0
     for k in range(packed.factors.shape[0]):
         product *= call_factor(
-            packed.factors[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-            state.shape[1], i, packed.effects[model, packed.factors[k, 1]].ctypes.data,
+            packed.factors[k, 0], state.ctypes.data, sight.angle_sr.ctypes.data, state.shape[1], i,
+            parameters_at(packed, model, packed.factors[k, 1], state, sight.angle_sr, i, -1),
             ux, uy, speed, landing,
         )  # fmt: skip
     return product
