@@ -39,9 +39,10 @@ nearest:
     more_3 = -0.7
 
 So fish turn left where the nearest is within 3 cm (0.1 + 0.9), hardly at 10 cm, and right from
-25 cm on (0.1 - 0.7); between the knots the strength changes evenly, in 16 steps. It stays within the
-range that it has without a curve. `zfcal diagnose` gives a curve to what it names where features
-gain more than any plain form does, and the curve gains more than its two further parameters cost.
+25 cm on (0.1 - 0.7); between the knots the strength changes evenly, in 16 steps. It stays within
+the range that it has without a curve. `zfcal diagnose` gives a curve to what it names where
+features gain more than any plain form does, and the curve gains more than its two further
+parameters cost.
 
 | parameter | default | what it is |
 |---|---|---|
