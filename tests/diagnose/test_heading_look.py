@@ -146,6 +146,9 @@ def test_a_place_that_is_a_direction_is_put_aside_for_it(question, monkeypatch):
     assert common.as_step(None, None, Told(gain=place, p=0.0, ties=())) is None
     forms["directional-drift"].values["strength"] = 0.0
     assert common.as_step(None, None, Told(gain=drift, p=0.0, ties=())) is None
+    # Of a curve it may be 0 at the middle one of three knots.
+    forms["directional-drift"].values.update(by=4.0, more_1=0.5, more_3=-0.5)
+    assert common.as_step(None, None, Told(gain=drift, p=0.0, ties=())) is not None
 
 
 @pytest.mark.slow

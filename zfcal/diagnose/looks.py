@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.steadiness import Of
+from zfcal.model.curves import MORE, strengths_of
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.extended import maximise
 
@@ -201,7 +203,7 @@ def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
     if not left:
         return None
     (best, score), *others = left
-    if best.values[best.candidate.effect.strength] == 0.0:
+    if not any(strengths_of(best.values, best.candidate.effect.strength)):
         return None
     ties = tuple(tie for tie, _ in others if not best.over(tie) > SURE)
     return Step(
@@ -274,7 +276,9 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
         made = list(pool.map(lambda score: refit(screen, score, n_workers=each), tried))
     k = int(np.argmax([each.worth for each in made]))
     by = curved(tried[k].candidate, gain.label, case.scene)
-    if by is not None and gain.nats > made[k].nats:
+    # A curve that is worth it gains more than half a log of the samples for each parameter.
+    least = 0.5 * len(MORE) * math.log(len(made[k].gain))
+    if by is not None and gain.nats - made[k].nats > least:
         bent = dataclasses.replace(tried[k], candidate=by)
         other = refit(screen, bent, n_workers=n_workers)
         if other.worth > made[k].worth:

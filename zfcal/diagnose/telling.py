@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.model.curves import CUES, EffectParameter, has_curve, strengths_of
+from zfcal.model.curves import CUES, EffectParameter, has_curve, knots_of, strengths_of
 
 _AT_ITS_END = 0.01
 """Share of a range within which a strength is at its end: the fit went as far as it may."""
@@ -23,8 +23,7 @@ def says(
     """
     effect = candidate.effect
     (strength,) = (each for each in effect.parameters if each.name == effect.strength)
-    at = strengths_of(values, effect.strength)[1] if has_curve(values) else (values[strength.name],)
-    turned = max(at, key=abs) < 0 and effect.opposite
+    turned = max(strengths_of(values, effect.strength), key=abs) < 0 and effect.opposite
     size = _curve(strength, values) if has_curve(values) else _size(strength, values, interval)
     return f"{effect.opposite if turned else effect.says} {size}"
 
@@ -34,7 +33,7 @@ def _curve(strength: EffectParameter, values: dict[str, float]) -> str:
     says, unit = CUES[int(values["by"])]
     at = [
         f"{own:.3g} at {knot:.3g}{f' {unit}' if unit else ''}"
-        for knot, own in zip(*strengths_of(values, strength.name), strict=True)
+        for knot, own in zip(knots_of(values), strengths_of(values, strength.name), strict=True)
     ]
     name = strength.name.replace("_", " ")
     return f"Fitted {name} by {says}: {', '.join(at)}. {strength.says}"

@@ -120,20 +120,20 @@ def strengths_at(given: Mapping[str, float], own: EffectParameter) -> Floats:
     return np.clip(given.get(own.name, own.default) + more, own.low, own.high)
 
 
-def strengths_of(
-    given: Mapping[str, float], strength: str
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the knots of an effect's curve and the strength at each.
+def strengths_of(given: Mapping[str, float], strength: str) -> tuple[float, ...]:
+    """Return the strength at each knot of an effect's curve; the one that it has without a curve.
 
     Parameters
     ----------
     given
-        Parameters of an effect that has a curve.
+        Parameters of an effect.
     strength
         Name of its strength.
     """
     own = given[strength]
-    return knots_of(given), (own + given[MORE[0]], own, own + given[MORE[1]])
+    if not has_curve(given):
+        return (own,)
+    return own + given[MORE[0]], own, own + given[MORE[1]]
 
 
 def cue_named(given: Mapping[str, float]) -> str:
