@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.model.curves import strengths_at
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.genome import from_genome, genome_names, spelt_out, to_genome
 from zfcal.model.extended import maximise
 from zfcal.model.kernels import curves, state
-from zfcal.model.kernels.curves import LEVELS, cue_of, level_of
+from zfcal.model.kernels.curves import LEVELS, level_of, strengths_at
+from zfcal.model.kernels.state import cue_of
 from zfcal.model.onestep import heading_density
 from zfcal.model.packing import pack
 from zfcal.model.scene import make_scene
@@ -81,8 +81,7 @@ def test_levels_are_even_between_knots_and_end_at_them():
 
 def test_a_strength_stays_within_its_bounds():
     """Which are those of the effect, here 0 to 1: straight between the knots, cut beyond."""
-    ignored = find_effect("rear-blind-zone").parameter("ignored")
-    found = strengths_at({"ignored": 0.5, "more_1": -0.4, "more_3": 2.0}, ignored)
+    found = strengths_at({"more_1": -0.4, "more_3": 2.0}, 0.5, (0.0, 1.0))
     assert found[[0, LEVELS // 4, LEVELS // 2]] == pytest.approx([0.1, 0.3, 0.5])
     assert found[-1] == 1.0
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.arena import Arena
-from zfcal.model.curves import KNOTS
 from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
 from zfcal.model.effects.circumstances import curve_under
 from zfcal.model.features import LAGS, OneOf
-from zfcal.model.kernels.curves import BY_ZONE
+from zfcal.model.kernels.curves import BY_ZONE, KNOTS
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import KIND, TIME
 from zfcal.model.scene import Scene

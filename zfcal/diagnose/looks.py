@@ -23,9 +23,9 @@ from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.steadiness import Of
-from zfcal.model.curves import MORE, strengths_of
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.extended import maximise
+from zfcal.model.kernels.curves import MORE, strengths_of
 
 BY_ITSELF = 4.0
 """Standard errors by which features of a name must lead those of all others where no form of ours

@@ -16,9 +16,9 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.speeds import fit_speed
-from zfcal.model.curves import MORE, has_curve
 from zfcal.model.extended import bounds_of, maximise, nats_at, with_effect
 from zfcal.model.fitted import Fitted, Free
+from zfcal.model.kernels.curves import MORE, has_curve
 from zfcal.model.kernels.state import TRAIT
 from zfcal.model.scene import Moves, Scene, thin
 

@@ -28,8 +28,8 @@ from zfcal.diagnose.candidates import Candidate
 from zfcal.diagnose.fields import is_known, is_within_fields
 from zfcal.diagnose.rests import ChainFit, Runs, fit_chain, runs_of
 from zfcal.diagnose.screening import Screen
-from zfcal.model.curves import MORE, has_curve
 from zfcal.model.extended import bounds_of, without_effects
+from zfcal.model.kernels.curves import MORE, has_curve
 from zfcal.model.packing import pack
 from zfcal.parameters import Parameters
 

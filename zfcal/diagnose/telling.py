@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from zfcal.diagnose.candidates import Candidate
-from zfcal.model.curves import CUES, EffectParameter, has_curve, knots_of, strengths_of
+from zfcal.model.effects.base import EffectParameter
+from zfcal.model.kernels.curves import CUES, has_curve, knots_of, strengths_of
 
 _AT_ITS_END = 0.01
 """Share of a range within which a strength is at its end: the fit went as far as it may."""

@@ -12,10 +12,9 @@ from scipy.special import i0e
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
-from zfcal.model.curves import has_curve, knots_of, strengths_at
 from zfcal.model.effects import MAX_PARAMETERS, NEIGHBOURS, Effect, find_effect
 from zfcal.model.effects.genome import genome_length, with_strengths
-from zfcal.model.kernels.curves import CURVE_COLUMNS, LEVELS
+from zfcal.model.kernels.curves import CURVE_COLUMNS, LEVELS, has_curve, knots_of, strengths_at
 from zfcal.model.kernels.staircase import COLUMNS, ROWS, SCALE_AT, TAKE, build
 from zfcal.model.kernels.state import (
     KAPPA_BASE,
@@ -305,13 +304,13 @@ def _with_levels(
     curves = np.zeros((n_models, n_rows, CURVE_COLUMNS))
     levels = np.repeat(packed[:, curved], LEVELS, axis=1)
     for number, row in enumerate(curved):
-        at = effects[row].names.index(effects[row].strength)
+        strength = effects[row].parameter(effects[row].strength)
+        at, ends = effects[row].names.index(strength.name), (strength.low, strength.high)
         for model in range(n_models):
             own = given[model % len(given)][row]
             if has_curve(own):
                 first = number * LEVELS
                 curves[model, row] = (own["by"], n_rows + first, *knots_of(own))
-                levels[model, first : first + LEVELS, at] = strengths_at(
-                    own, effects[row].parameter(effects[row].strength)
-                )
+                value = own.get(strength.name, strength.default)
+                levels[model, first : first + LEVELS, at] = strengths_at(own, value, ends)
     return np.concatenate([packed, levels], axis=1), curves

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from zfcal.model.curves import EffectParameter, curve_of
 from zfcal.model.effects import all_effects, generic_effects
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter, curve_of
 from zfcal.model.kernels.curves import BY_NEAREST
 
 _HEAD = """\
@@ -26,11 +25,11 @@ This page is made by `make effects-page` from the files in `zfcal/model/effects/
 _CURVES = """
 ## Curves
 
-The strength of any effect but `reaction-delay` may go by something, such as the distance to the
+The strength of any effect that is no delay may go by something, such as the distance to the
 nearest:
 
-    [effects.turning-bias]
-    strength = 0.1
+    [effects.{name}]
+    {strength} = 0.1
     by = {by}
     knot_1 = 0.03
     knot_2 = 0.1
@@ -38,11 +37,10 @@ nearest:
     more_1 = 0.9
     more_3 = -0.7
 
-So fish turn left where the nearest is within 3 cm (0.1 + 0.9), hardly at 10 cm, and right from
-25 cm on (0.1 - 0.7); between the knots the strength changes evenly, in 16 steps. It stays within
-the range that it has without a curve. `zfcal diagnose` gives a curve to what it names where
-features gain more than any plain form does, and the curve gains more than its two further
-parameters cost.
+So it is 1 where the nearest is within 3 cm (0.1 + 0.9), 0.1 at 10 cm, and -0.6 from 25 cm on
+(0.1 - 0.7); between the knots it changes evenly, in 16 steps. It stays within the range that it has
+without a curve. `zfcal diagnose` gives a curve to what it names where features gain more than any
+plain form does, and the curve gains more than its two further parameters cost.
 
 | parameter | default | what it is |
 |---|---|---|
@@ -68,14 +66,18 @@ def effects_page() -> str:
     rows = "".join(
         f"| `{each.name}` | {each.default:g} | {each.says} |\n" for each in curve_of(0.0, 1.0)
     )
-    curves = _CURVES.format(by=BY_NEAREST, rows=rows)
+    signed = _plainest([effect for effect in all_effects() if effect.opposite])
+    curves = _CURVES.format(name=signed.name, strength=signed.strength, by=BY_NEAREST, rows=rows)
     return _part(_HEAD, all_effects()) + curves + _part(_GENERIC, generic_effects())
 
 
 def _part(head: str, effects: Sequence[Effect]) -> str:
-    plainest = min(reversed(effects), key=lambda effect: len(effect.parameters))
     sections = "".join(_section(effect) for effect in effects)
-    return head.format(example=_example(plainest)) + sections
+    return head.format(example=_example(_plainest(effects))) + sections
+
+
+def _plainest(effects: Sequence[Effect]) -> Effect:
+    return min(reversed(effects), key=lambda effect: len(effect.parameters))
 
 
 def _example(effect: Effect) -> str:

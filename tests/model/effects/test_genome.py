@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from zfcal.errors import InputError
-from zfcal.model.curves import EffectParameter
 from zfcal.model.effects import all_effects
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.genome import (
     check_effects,
     check_genomes,

@@ -12,8 +12,7 @@ from scipy import stats
 
 from zfcal.errors import InputError
 from zfcal.model import packing
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, SIGHT, SPEED
 from zfcal.model.kernels.state import HX, TIME, X
 from zfcal.model.onestep import draw_headings, heading_density

@@ -12,12 +12,12 @@ import pkgutil
 from functools import cache
 
 from zfcal.errors import InputError
-from zfcal.model.curves import EffectParameter
 from zfcal.model.effects.base import (
     MAX_PARAMETERS,
     NEIGHBOURS,
     Company,
     Effect,
+    EffectParameter,
 )
 
 __all__ = [

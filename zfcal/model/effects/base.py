@@ -38,8 +38,8 @@ import numpy as np
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
-from zfcal.model.curves import MORE, EffectParameter, curve_of, has_curve, knots_of
 from zfcal.model.features import Feature
+from zfcal.model.kernels.curves import KNOTS, MORE, has_curve, knots_of
 from zfcal.model.paces import Pace, PaceFeature
 
 MAX_PARAMETERS = 8
@@ -48,7 +48,51 @@ NEIGHBOURS = 8
 """Of so many neighbours each may have a component of its own."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EffectParameter:
+    """One number of an effect.
+
+    Parameters
+    ----------
+    name
+        As in the model file.
+    low, high
+        Bounds within which it is calibrated.
+    default
+        Used where the model file is silent.
+    says
+        What it means, with its unit.
+    """
+
+    name: str
+    low: float
+    high: float
+    default: float
+    says: str
+
+
 Shapes = tuple[dict[str, float], ...]
+
+
+def curve_of(low: float, high: float) -> tuple[EffectParameter, ...]:
+    """Return the parameters that any effect may have besides: by what its strength goes.
+
+    Parameters
+    ----------
+    low, high
+        Bounds of its strength, which is that at the middle one of three knots.
+    """
+    cues = ", ".join(f"{number} {says}" for number, (says, _) in enumerate(CUES))
+    own = [
+        ("by", 0.0, len(CUES) - 1.0, f"What the strength goes by: {cues}."),
+        *((name, -1e5, 1e5, "Of the cue, ascending.") for name in KNOTS),
+        ("more_1", low - high, high - low, "Strength beyond its own at and below the first knot."),
+        ("more_3", low - high, high - low, "Strength beyond its own at and above the last knot."),
+    ]
+    return tuple(
+        EffectParameter(name=name, low=least, high=most, default=0.0, says=says)
+        for name, least, most, says in own
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,8 +7,7 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Company, Effect, Shapes
+from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.effects.weights import aside_of, every_step, only, who

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import KNOTS, MORE, cue_named
 from zfcal.model.features import (
     AWAY_M,
     Along,
@@ -37,7 +36,10 @@ from zfcal.model.kernels.curves import (
     BY_TIME,
     BY_TURN,
     BY_ZONE,
+    KNOTS,
+    MORE,
     NOTHING,
+    cue_named,
 )
 from zfcal.model.kernels.hats import hats
 from zfcal.model.paces import Pace, Swum

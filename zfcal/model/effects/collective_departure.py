@@ -9,9 +9,8 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import in_tank
-from zfcal.model.effects.base import Company, Effect
+from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,

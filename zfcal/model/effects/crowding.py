@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import apart, beyond, needs_neighbour, times_faster
 from zfcal.model.kernels.compiled import hook

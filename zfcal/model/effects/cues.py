@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.curves import EffectParameter
+from zfcal.model.effects.base import EffectParameter
 from zfcal.model.effects.forms import Hooked, apart, beyond, cut, quickness
 from zfcal.model.kernels.compiled import inlined
 from zfcal.model.kernels.state import TIME, X, Y

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import paces_by
 from zfcal.model.effects.forms import times_faster
 from zfcal.model.kernels.compiled import hook

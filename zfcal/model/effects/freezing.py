@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import DT_S, SPEED

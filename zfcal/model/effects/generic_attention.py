@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.cues import REFERENCE, bearing, number, too_far
 from zfcal.model.effects.forms import apart, needs_neighbour
 from zfcal.model.kernels.compiled import hook

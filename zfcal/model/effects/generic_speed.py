@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from zfcal.arena import Arena
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Company, Effect, Shapes
+from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
 from zfcal.model.effects.cues import (
     FIXED,
     PLACE,

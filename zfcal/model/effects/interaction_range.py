@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import apart, beyond, cut, needs_neighbour
 from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention

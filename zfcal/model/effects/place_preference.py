@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import lengths, of_tank
-from zfcal.model.effects.base import Effect, Likeness
+from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
 from zfcal.model.effects.weights import LEANING_OUT, aside_of, only

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
 from zfcal.model.features import LAGS, Component, Feature, Seen, Weights

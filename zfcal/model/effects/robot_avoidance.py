@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import lengths
-from zfcal.model.effects.base import Company, Effect
+from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import lengths
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.effects.weights import only

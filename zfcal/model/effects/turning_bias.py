@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import left_of, turned_by
-from zfcal.model.effects.base import Effect
+from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
 from zfcal.model.effects.weights import both_senses, only, to_one_sense

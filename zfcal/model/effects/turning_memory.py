@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
 from zfcal.model.directions import left_of, turned_by
-from zfcal.model.effects.base import Control, Effect
+from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.effects.weights import only

@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.curves import EffectParameter
-from zfcal.model.effects.base import Company, Effect
+from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import sense_along, tilt
 from zfcal.model.effects.weights import to_one_sense

@@ -1,34 +1,26 @@
-"""Effects whose strength goes by a cue, such as the time or the distance to the nearest.
+"""By what the strength of an effect goes, if by anything: curves that any effect may have.
 
-A curve is a table of an effect's parameters at so many levels of its cue. The functions of effects
-know nothing of it: at each call they are handed the row of their level.
+An effect has its own mechanism, and one strength. With a curve the strength differs with a cue, by
+hat functions of three knots: so the form that a model has follows what features were fitted to be.
+The functions of effects know nothing of it: at each call they are handed the parameters of one of
+so many levels of the cue.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+
+import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.state import (
-    HX,
-    HY,
-    NEVER_S,
-    PAST_HX,
-    PAST_HY,
-    SPEED,
-    TIME,
-    ZONE,
-    Packed,
-    X,
-    Y,
-)
+from zfcal.errors import InputError
+from zfcal.model.kernels.compiled import inlined
 
 # What a strength goes by; the last two are of the neighbour that is attended to.
 NOTHING, BY_TIME, BY_SPEED, BY_TURN, BY_NEAREST, BY_NUMBER, BY_ZONE, BY_DISTANCE, BY_BEARING = (
     range(9)
 )
-LAST_CUE = BY_BEARING
 
 # Columns of a curve: the cue, its first row of ``effects``, and its knots.
 CUE, FIRST, KNOT, CURVE_COLUMNS = 0, 1, 2, 5
@@ -39,60 +31,24 @@ BETWEEN = 16
 LEVELS = 2 * BETWEEN + 1
 
 
-@kernel
-def nearest_other(state: Floats, i: int) -> int:
-    """Return the nearest other agent, seen or not; -1 for nobody."""
-    found, least = -1, NEVER_S
-    for k in range(state.shape[1]):
-        if k != i and state[ZONE, k] > 0.0:
-            away = math.hypot(state[X, k] - state[X, i], state[Y, k] - state[Y, i])
-            if away < least:
-                found, least = k, away
-    return found
+CUES = (
+    ("nothing", ""),
+    ("time of the trial", "s"),
+    ("own last speed", "m/s"),
+    ("own last turn", "rad"),
+    ("distance to the nearest", "m"),
+    ("how many are seen", ""),
+    ("number of the zone", ""),
+    ("distance to the other", "m"),
+    ("bearing off the own heading", "rad"),
+)
+"""What a strength may go by, and its unit; its place here is what ``by`` names."""
 
+MORE = ("more_1", "more_3")
+"""Parameters of a curve that are fitted."""
 
-@kernel
-def cue_of(cue: int, state: Floats, sight: Floats, i: int, j: int) -> float:
-    """Return what a strength goes by, of agent i.
-
-    Parameters
-    ----------
-    state : ndarray, shape (row, agent)
-    sight : ndarray, shape (agent * agent,)
-        Solid angles.
-    j
-        The neighbour that is attended to; -1 for the nearest.
-    """
-    n = state.shape[1]
-    if cue == BY_TIME:
-        return state[TIME, i]
-    if cue == BY_SPEED:
-        return state[SPEED, i]
-    if cue == BY_ZONE:
-        return state[ZONE, i]
-    if cue == BY_TURN:
-        x, y = state[HX, i], state[HY, i]
-        return _apart(state[PAST_HX, i], state[PAST_HY, i], x, y)
-    if cue == BY_NUMBER:
-        seen = 0.0
-        for k in range(n):
-            if k != i and sight[i * n + k] > 0.0:
-                seen += 1.0
-        return seen
-    if j < 0 or cue == BY_NEAREST:
-        j = nearest_other(state, i)
-    if j < 0:
-        return NEVER_S
-    dx, dy = state[X, j] - state[X, i], state[Y, j] - state[Y, i]
-    if cue == BY_BEARING:
-        return _apart(state[HX, i], state[HY, i], dx, dy)
-    return math.hypot(dx, dy)
-
-
-@inlined
-def _apart(x: float, y: float, to_x: float, to_y: float) -> float:
-    """Return the angle between two vectors, from 0 to pi."""
-    return abs(math.atan2(x * to_y - y * to_x, x * to_x + y * to_y))
+KNOTS = ("knot_1", "knot_2", "knot_3")
+"""Those where it bends."""
 
 
 @inlined
@@ -105,25 +61,67 @@ def level_of(value: float, low: float, middle: float, high: float) -> int:
     return math.floor(BETWEEN * min(2.0, max(0.0, share)) + 0.5)
 
 
-@inlined
-def parameters_at(
-    packed: Packed, model: int, row: int, state: Floats, sight: Floats, i: int, j: int
-) -> int:
-    """Return the address of an effect's parameters, by its curve if it has one.
+def has_curve(given: Mapping[str, float]) -> bool:
+    """Return whether the strength of an effect goes by something."""
+    return given.get("by", 0.0) > 0.0
+
+
+def knots_of(given: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return the knots of an effect's curve; zeros where it has none.
+
+    Raises
+    ------
+    InputError
+        They do not ascend, or there is no such cue.
+    """
+    first, middle, last = (given.get(name, 0.0) for name in KNOTS)
+    if has_curve(given):
+        if not first < middle < last:
+            raise InputError(
+                f"knot_1, knot_2 and knot_3 must ascend, got {first:g}, {middle:g} and {last:g}.",
+                hint="They are values of what the strength goes by, from the lowest on.",
+            )
+        if given["by"] != int(given["by"]):
+            raise InputError(
+                f"by must be a whole number, 0 to {len(CUES) - 1}, got {given['by']:g}."
+            )
+    return first, middle, last
+
+
+def strengths_at(given: Mapping[str, float], strength: float, ends: tuple[float, float]) -> Floats:
+    """Return the strength at each level, from the first knot of a curve to the last one.
 
     Parameters
     ----------
-    row
-        Of ``packed.effects``.
-    state, sight
-        As `cue_of` takes them.
-    i, j
-        The agent, and the neighbour that is attended to; -1 for none.
+    given
+        Parameters of an effect.
+    strength
+        At the middle knot.
+    ends
+        Bounds of the strength, within which it stays.
     """
-    if packed.curves.shape[1] > 0:
-        curve = packed.curves[model, row]
-        if curve[CUE] > 0.0:
-            value = cue_of(int(curve[CUE]), state, sight, i, j)
-            level = level_of(value, curve[KNOT], curve[KNOT + 1], curve[KNOT + 2])
-            row = int(curve[FIRST]) + level
-    return packed.effects[model, row].ctypes.data
+    first, last = (given.get(name, 0.0) for name in MORE)
+    more = np.interp(np.linspace(0.0, 2.0, LEVELS), (0.0, 1.0, 2.0), (first, 0.0, last))
+    return np.clip(strength + more, *ends)
+
+
+def strengths_of(given: Mapping[str, float], strength: str) -> tuple[float, ...]:
+    """Return the strength at each knot of an effect's curve; the one that it has without a curve.
+
+    Parameters
+    ----------
+    given
+        Parameters of an effect.
+    strength
+        Name of its strength.
+    """
+    own = given[strength]
+    if not has_curve(given):
+        return (own,)
+    return own + given[MORE[0]], own, own + given[MORE[1]]
+
+
+def cue_named(given: Mapping[str, float]) -> str:
+    """Return what the strength of an effect goes by, with its unit."""
+    says, unit = CUES[int(given["by"])]
+    return f"{says} ({unit})" if unit else says

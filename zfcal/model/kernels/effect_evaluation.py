@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.hooks import (
     call_component,
     call_factor,
@@ -17,7 +16,7 @@ from zfcal.model.kernels.hooks import (
     call_sight,
     call_speed,
 )
-from zfcal.model.kernels.state import Packed
+from zfcal.model.kernels.state import Packed, parameters_at
 
 _HARDLY = 1e-6
 

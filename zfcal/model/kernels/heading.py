@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel, lean
-from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.geometry import Tank, best_within, zone_of
 from zfcal.model.kernels.hooks import call_speed
 from zfcal.model.kernels.mixture import gather, spun, tilt, toward_one, weigh
@@ -37,6 +36,7 @@ from zfcal.model.kernels.state import (
     X,
     Y,
     has_effects,
+    parameters_at,
 )
 
 REJECTIONS = 200

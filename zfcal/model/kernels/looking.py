@@ -6,7 +6,6 @@ import math
 
 from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.hooks import call_sight
 from zfcal.model.kernels.perception import Sight, in_vectors, see, see_first
 from zfcal.model.kernels.state import (
@@ -19,7 +18,8 @@ from zfcal.model.kernels.state import (
     Packed,
     X,
     Y,
-    has_effects,
+    parameters_at,
+    sight_row,
 )
 
 
@@ -54,13 +54,6 @@ def look_back(
 
 
 @inlined
-def splits(model: int, packed: Packed) -> bool:
-    """Tell whether some of what agents see is late, and some is not."""
-    late = packed.lates[model]
-    return packed.lags[model] > 0 and (late[LATE_SHARE] < 1.0 or late[LATE_WHOLE] == 0.0)
-
-
-@inlined
 def note_late(
     state: Floats, past: Floats, slot: int, late: Floats, sight: Sight, out: Floats
 ) -> None:
@@ -88,12 +81,6 @@ def note_late(
             length = math.hypot(dx, dy)
             if length > 0.0:
                 out[k, 1], out[k, 2] = dx / length, dy / length
-
-
-@inlined
-def sight_row(n: int, packed: Packed) -> int:
-    """Return how many pairs an agent's row of `Sight` has; effects find the agent itself there."""
-    return n if has_effects(packed) else n - 1
 
 
 @inlined

@@ -6,9 +6,7 @@ import math
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
-from zfcal.model.kernels.curves import parameters_at
 from zfcal.model.kernels.hooks import call_component, call_factor, call_rotation
-from zfcal.model.kernels.looking import sight_row, splits
 from zfcal.model.kernels.perception import Sight
 from zfcal.model.kernels.random import vonmises_r
 from zfcal.model.kernels.state import (
@@ -19,6 +17,9 @@ from zfcal.model.kernels.state import (
     ZONE,
     Packed,
     Work,
+    parameters_at,
+    sight_row,
+    splits,
 )
 
 

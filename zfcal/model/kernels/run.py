@@ -12,7 +12,7 @@ from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel, lean
 from zfcal.model.kernels.geometry import Tank
 from zfcal.model.kernels.heading import apply_move, draw_move
-from zfcal.model.kernels.looking import look, look_back, note_late, splits
+from zfcal.model.kernels.looking import look, look_back, note_late
 from zfcal.model.kernels.pairs import bin_of
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
 from zfcal.model.kernels.random import seeded
@@ -37,6 +37,7 @@ from zfcal.model.kernels.state import (
     place_at,
     remember,
     settle,
+    splits,
 )
 
 Random = NDArray[np.uint64]

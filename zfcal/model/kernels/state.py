@@ -10,6 +10,19 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.curves import (
+    BY_BEARING,
+    BY_NEAREST,
+    BY_NUMBER,
+    BY_SPEED,
+    BY_TIME,
+    BY_TURN,
+    BY_ZONE,
+    CUE,
+    FIRST,
+    KNOT,
+    level_of,
+)
 from zfcal.model.kernels.geometry import Tank, clearance, nearest_wall, zone_of
 from zfcal.model.kernels.random import uniform
 
@@ -284,3 +297,96 @@ def _find_mouth(i: int, state: Floats, tank: Tank) -> None:
             if 0.0 < away < state[MOUTH_M, i]:
                 state[MOUTH_X, i], state[MOUTH_Y, i] = dx / away, dy / away
                 state[MOUTH_M, i] = away
+
+
+@kernel
+def nearest_other(state: Floats, i: int) -> int:
+    """Return the nearest other agent, seen or not; -1 for nobody."""
+    found, least = -1, NEVER_S
+    for k in range(state.shape[1]):
+        if k != i and state[ZONE, k] > 0.0:
+            away = math.hypot(state[X, k] - state[X, i], state[Y, k] - state[Y, i])
+            if away < least:
+                found, least = k, away
+    return found
+
+
+@kernel
+def cue_of(cue: int, state: Floats, sight: Floats, i: int, j: int) -> float:
+    """Return what a strength goes by, of agent i.
+
+    Parameters
+    ----------
+    state : ndarray, shape (row, agent)
+    sight : ndarray, shape (agent * agent,)
+        Solid angles.
+    j
+        The neighbour that is attended to; -1 for the nearest.
+    """
+    n = state.shape[1]
+    if cue == BY_TIME:
+        return state[TIME, i]
+    if cue == BY_SPEED:
+        return state[SPEED, i]
+    if cue == BY_ZONE:
+        return state[ZONE, i]
+    if cue == BY_TURN:
+        x, y = state[HX, i], state[HY, i]
+        return _apart(state[PAST_HX, i], state[PAST_HY, i], x, y)
+    if cue == BY_NUMBER:
+        seen = 0.0
+        for k in range(n):
+            if k != i and sight[i * n + k] > 0.0:
+                seen += 1.0
+        return seen
+    if j < 0 or cue == BY_NEAREST:
+        j = nearest_other(state, i)
+    if j < 0:
+        return NEVER_S
+    dx, dy = state[X, j] - state[X, i], state[Y, j] - state[Y, i]
+    if cue == BY_BEARING:
+        return _apart(state[HX, i], state[HY, i], dx, dy)
+    return math.hypot(dx, dy)
+
+
+@inlined
+def _apart(x: float, y: float, to_x: float, to_y: float) -> float:
+    """Return the angle between two vectors, from 0 to pi."""
+    return abs(math.atan2(x * to_y - y * to_x, x * to_x + y * to_y))
+
+
+@inlined
+def parameters_at(
+    packed: Packed, model: int, row: int, state: Floats, sight: Floats, i: int, j: int
+) -> int:
+    """Return the address of an effect's parameters, by its curve if it has one.
+
+    Parameters
+    ----------
+    row
+        Of ``packed.effects``.
+    state, sight
+        As `cue_of` takes them.
+    i, j
+        The agent, and the neighbour that is attended to; -1 for none.
+    """
+    if packed.curves.shape[1] > 0:
+        curve = packed.curves[model, row]
+        if curve[CUE] > 0.0:
+            value = cue_of(int(curve[CUE]), state, sight, i, j)
+            level = level_of(value, curve[KNOT], curve[KNOT + 1], curve[KNOT + 2])
+            row = int(curve[FIRST]) + level
+    return packed.effects[model, row].ctypes.data
+
+
+@inlined
+def splits(model: int, packed: Packed) -> bool:
+    """Tell whether some of what agents see is late, and some is not."""
+    late = packed.lates[model]
+    return packed.lags[model] > 0 and (late[LATE_SHARE] < 1.0 or late[LATE_WHOLE] == 0.0)
+
+
+@inlined
+def sight_row(n: int, packed: Packed) -> int:
+    """Return how many pairs an agent's row of `Sight` has; effects find the agent itself there."""
+    return n if has_effects(packed) else n - 1
