@@ -63,7 +63,14 @@ class FirstLook:
         """
         if feature.over is None or isinstance(feature, Landing):
             return self._nats(feature)
-        return self._nats(feature) - self._nats(feature.over)
+        if feature.over not in self._commons:
+            self._commons[feature.over] = self._nats(feature.over)
+        return self._nats(feature) - self._commons[feature.over]
+
+    @cached_property
+    def _commons(self) -> dict[Choosable, float]:
+        """Nats of what has to be gained more than, by feature: several share one."""
+        return {}
 
     def _nats(self, feature: Choosable) -> float:
         if isinstance(feature, Landing):

@@ -179,16 +179,28 @@ class Fits:
         made, n = fit.log_p, len(fit.strengths)
         over = getattr(feature, "over", None)
         if over is not None and n:
-            common = self.fit(over)
-            made = made - common.log_p
+            common, n_common = self._common(over)
+            made = made - common
             # What a landing has to gain more than is no part of it: all its strengths are its own.
-            n -= 0 if isinstance(feature, Landing) else min(n, len(common.strengths))
+            n -= 0 if isinstance(feature, Landing) else min(n, n_common)
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n,
             without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
+
+    def _common(self, over: Single) -> tuple[Floats, int]:
+        """Return what has to be gained more than adds to each step, and its strengths."""
+        if over not in self._commons:
+            fit = self.fit(over)
+            self._commons[over] = fit.log_p, len(fit.strengths)
+        return self._commons[over]
+
+    @cached_property
+    def _commons(self) -> dict[Single, tuple[Floats, int]]:
+        """These, by feature: several share one."""
+        return {}
 
     def nothing(self, name: str, feature: Single) -> Gain:
         """Return that a feature of an effect adds nothing, without a fit."""
