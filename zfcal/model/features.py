@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -131,6 +131,15 @@ class Seen:
     each_left_s: Floats
     in_open: Floats
     stayed_s: Floats
+    _made: dict[Callable[[Seen], Floats], Floats] = field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    def once(self, make: Callable[[Seen], Floats]) -> Floats:
+        """Return what a function makes of what is seen, worked out once: not to be written to."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]
 
     @property
     def nearest(self) -> Floats:

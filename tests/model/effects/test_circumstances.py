@@ -11,6 +11,7 @@ from zfcal.model.effects.circumstances import (
     PACED,
     by_circumstances,
     each_fish,
+    each_under,
     paces_by,
 )
 from zfcal.model.features import Component, Leaving, Tilt, Turned
@@ -99,10 +100,29 @@ def test_what_has_to_be_gained_more_than_is_part_of_the_feature(seen):
     alone = dataclasses.replace(
         DRAWN, label="all", weights=lambda seen: seen.attention[..., None] ** 0
     )
-    for each in by_circumstances(DRAWN, alone=alone).features:
+    for each in by_circumstances(DRAWN, alone=each_under(alone)).features:
         whole, over = each.weights(seen), each.over.weights(seen)
         np.testing.assert_array_equal(whole[..., -over.shape[-1] :], over)
         assert whole.shape[-1] == 3 * over.shape[-1]
+
+
+def test_what_has_to_be_gained_more_than_is_one_for_all_that_share_it(seen):
+    """So it is fitted once; and what steps have about them is worked out once."""
+    alone = each_under(dataclasses.replace(DRAWN, label="all"))
+    one, other = (
+        by_circumstances(dataclasses.replace(DRAWN, label=label), alone=alone).features
+        for label in ("near", "far")
+    )
+    assert [each.over for each in one] == [each.over for each in other]
+    asked = []
+
+    def once(what):
+        asked.append(what)
+        return what.time
+
+    assert seen.once(once) is seen.once(once)
+    assert asked == [seen]
+    assert dataclasses.replace(seen, time=1 - seen.time).once(once)[0] == 1 - seen.time[0]
 
 
 def test_names_that_are_left_out_and_names_that_are_asked_for():

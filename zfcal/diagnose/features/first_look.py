@@ -18,6 +18,12 @@ from zfcal.arrays import Floats
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.score_kernels import (
+    lengths_of,
+    sums_of,
+    write_scores,
+    write_tried,
+)
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import Choosable, Landing, Leaving, Tilt, Turned
 
@@ -63,7 +69,14 @@ class FirstLook:
         """
         if feature.over is None or isinstance(feature, Landing):
             return self._nats(feature)
-        return self._nats(feature) - self._nats(feature.over)
+        if feature.over not in self._commons:
+            self._commons[feature.over] = self._nats(feature.over)
+        return self._nats(feature) - self._commons[feature.over]
+
+    @cached_property
+    def _commons(self) -> dict[Choosable, float]:
+        """Nats of what has to be gained more than, by feature: several share one."""
+        return {}
 
     def _nats(self, feature: Choosable) -> float:
         if isinstance(feature, Landing):
@@ -87,8 +100,9 @@ class FirstLook:
 
     def _scores_of(self, columns: Columns) -> Floats:
         """Return the scores of what adds to the mixture, shape (step, weight)."""
-        (at, over), (base_at, base_over) = columns, self.law.base
-        return np.asarray(self._no_lapse[:, None] * (at / base_at - over / base_over))
+        made = np.empty(columns[0].shape)
+        write_scores(columns, self.law.base, self._no_lapse, made)
+        return made
 
     @cached_property
     def _own_basis(self) -> Floats:
@@ -102,28 +116,36 @@ class FirstLook:
         """
         at, over = columns
         alike = self._best_tried(at.sum(axis=1), over.sum(axis=1))
-        each = (self._best_tried(*pair) for pair in zip(at.T, over.T, strict=True))
+        each = (self._best_tried(*pair) for pair in zip(at.T.copy(), over.T.copy(), strict=True))
         return max(alike, sum(max(nats, 0.0) for nats in each)) - at.shape[1]
 
     def _best_tried(self, at: Floats, over: Floats) -> float:
         lapse, (base_at, base_over) = self.law.lapses.likely, self.law.base
-        here = (1 - lapse) * np.exp(self.law.log_here)
-        gains = [
-            float(
-                np.log(
-                    here * (base_at[:, 0] + share * at) / (base_over[:, 0] + share * over)
-                    + lapse * UNIFORM
-                ).sum()
-            )
-            for share in (0.0, *_TRIED)
-        ]
-        return max(gains[1:]) - gains[0]
+        base, added = (base_at[:, 0], base_over[:, 0]), (at, over)
+        density, uniform = np.empty(len(at)), lapse * UNIFORM
+        gains = []
+        for share in _TRIED:
+            write_tried(self._here, base, added, share, uniform, density)
+            gains.append(float(np.log(density).sum()))
+        return max(gains) - self._untried
+
+    @cached_property
+    def _here(self) -> Floats:
+        """Attraction of where each step landed, times that it was no lapse, shape (step,)."""
+        return np.asarray((1 - self.law.lapses.likely) * np.exp(self.law.log_here))
+
+    @cached_property
+    def _untried(self) -> float:
+        """Log likelihood of the law as it is."""
+        base_at, base_over = self.law.base
+        density = self._here * base_at[:, 0] / base_over[:, 0]
+        return float(np.log(density + self.law.lapses.likely * UNIFORM).sum())
 
     @cached_property
     def _no_lapse(self) -> Floats:
         """Probability of each step that it was none, shape (step,)."""
         (base_at, base_over), lapse = self.law.base, self.law.lapses.likely
-        density = (1 - lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
+        density = self._here * (base_at / base_over)[:, 0]
         return np.asarray(density / (density + lapse * UNIFORM))
 
     @cached_property
@@ -151,8 +173,8 @@ def off(scores: Floats, basis: Floats) -> Floats:
         Orthonormal.
     """
     left = scores - basis @ (basis.T @ scores)
-    gone = np.linalg.norm(left, axis=0) <= _NEXT_TO_NOTHING * np.linalg.norm(scores, axis=0)
-    return np.where(gone, 0.0, left)
+    left[:, lengths_of(left) <= _NEXT_TO_NOTHING * lengths_of(scores)] = 0.0
+    return left
 
 
 def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = None) -> float:
@@ -168,15 +190,15 @@ def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = N
     low, high
         Bounds of the strengths.
     """
-    n, size = scores.shape[1], np.linalg.norm(scores, axis=0)
+    n, size = scores.shape[1], lengths_of(scores)
     some = np.isfinite(size) & (size > 0)
     if not some.any():
         return -float(n)
-    units = scores[:, some] / size[some]
+    units = (scores if some.all() else scores[:, some]) / size[some]
     values, ways = np.linalg.eigh(units.T @ units)
     kept = values > _NEXT_TO_NOTHING * values[-1]
     root = np.sqrt(values[kept])
-    square, aim = root[:, None] * ways[:, kept].T, ways[:, kept].T @ units.sum(axis=0) / root
+    square, aim = root[:, None] * ways[:, kept].T, ways[:, kept].T @ sums_of(units) / root
     missed = 0.0
     if low is not None and low >= 0:
         missed = float(nnls(square, aim)[1])

@@ -33,6 +33,7 @@ from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
 from zfcal.diagnose.features.law import SHARPER, Law
 from zfcal.diagnose.features.leavings import Leavings
+from zfcal.diagnose.features.score_kernels import sums_of, write_slopes
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
     Landing,
@@ -179,16 +180,28 @@ class Fits:
         made, n = fit.log_p, len(fit.strengths)
         over = getattr(feature, "over", None)
         if over is not None and n:
-            common = self.fit(over)
-            made = made - common.log_p
+            common, n_common = self._common(over)
+            made = made - common
             # What a landing has to gain more than is no part of it: all its strengths are its own.
-            n -= 0 if isinstance(feature, Landing) else min(n, len(common.strengths))
+            n -= 0 if isinstance(feature, Landing) else min(n, n_common)
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n,
             without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
+
+    def _common(self, over: Single) -> tuple[Floats, int]:
+        """Return what has to be gained more than adds to each step, and its strengths."""
+        if over not in self._commons:
+            fit = self.fit(over)
+            self._commons[over] = fit.log_p, len(fit.strengths)
+        return self._commons[over]
+
+    @cached_property
+    def _commons(self) -> dict[Single, tuple[Floats, int]]:
+        """These, by feature: several share one."""
+        return {}
 
     def nothing(self, name: str, feature: Single) -> Gain:
         """Return that a feature of an effect adds nothing, without a fit."""
@@ -251,7 +264,7 @@ class Fits:
         at = np.concatenate([c[0] for c in (*own, *added)], axis=1)
         over = np.concatenate([c[1] for c in (*own, *added)], axis=1)
         base_at, base_over = (column[:, 0] for column in self.law.base)
-        scale = np.maximum(np.abs(at).mean(axis=0) / base_at.mean(), 1e-9)
+        scale = np.maximum(sums_of(np.abs(at)) / len(at) / base_at.mean(), 1e-9)
         at, over = at / scale, over / scale
         here, least = np.exp(self.law.log_here), _OWN * self.law.own[1][:, 0]
         n, lapses = at.shape[1], self.law.lapses
@@ -270,7 +283,10 @@ class Fits:
                 nothing = np.zeros_like(share)
                 by_top = np.divide(share, top, out=nothing.copy(), where=top > _LEAST * base_at)
                 by_whole = np.divide(share, whole, out=nothing, where=whole > least)
-                return np.column_stack([by_top[:, None] * at - by_whole[:, None] * over, slopes])
+                made = np.empty((len(share), n + slopes.shape[1]))
+                write_slopes(at, over, by_top, by_whole, made)
+                made[:, n:] = slopes
+                return made
 
             return value, scores
 

@@ -22,6 +22,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Fit, climb, lapses_alone
 from zfcal.diagnose.features.columns import Columns
+from zfcal.diagnose.features.landing_kernels import expected_hats, hats_within, wall_distances
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
@@ -43,13 +44,29 @@ class _Near:
     ----------
     rows : ndarray of int, shape (row,)
         Of these steps, among those of the law.
-    cells : ndarray, shape (row, cell, weight)
+    away_m : ndarray, shape (row, cell)
+        How far from the thing each cell's end is.
+    knots_m : ndarray, shape (weight + 1,)
     taken : ndarray, shape (row, weight)
     """
 
     rows: NDArray[np.intp]
-    cells: Floats
+    away_m: Floats
+    knots_m: Floats
     taken: Floats
+
+    @property
+    def cells(self) -> Floats:
+        """Weights of each cell, shape (row, cell, weight)."""
+        made = np.empty((*self.away_m.shape, len(self.knots_m) - 1))
+        hats_within(self.away_m, self.knots_m, made)
+        return made
+
+    def expected(self, chances: Floats) -> Floats:
+        """Return the mean weights, by chances of shape (step, cell), shape (row, weight)."""
+        made = np.empty((len(self.rows), len(self.knots_m) - 1))
+        expected_hats(chances, self.rows, self.away_m, self.knots_m, made)
+        return made
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,11 +137,13 @@ class Landings:
         away = feature.away_m(seen, every, xy[:, None])[:, 0]
         rows = np.flatnonzero(away - reach < feature.knots_m[-1])
         ended = xy[rows, None] + reach[rows, None, None] * self.law.turns.taken[rows, None]
-        cells, taken = (
-            hats(feature.away_m(seen, rows, ends), feature.knots_m)[..., :-1]
-            for ends in (self._ends[rows], ended)
+        away, away_taken = (feature.away_m(seen, rows, at) for at in (self._ends[rows], ended))
+        return _Near(
+            rows=rows,
+            away_m=np.ascontiguousarray(away),
+            knots_m=np.array(feature.knots_m),
+            taken=hats(away_taken, feature.knots_m)[:, 0, :-1],
         )
-        return _Near(rows=rows, cells=cells, taken=taken[:, 0])
 
     def scores(self, feature: Landing) -> Floats:
         """Return the scores of a feature's weights where none has a strength, shape (row, weight).
@@ -132,10 +151,9 @@ class Landings:
         Of the steps alone that may end near what it is about.
         """
         near = self._near(feature)
-        expected = np.einsum("sc,scb->sb", self.chances[near.rows], near.cells)
         own, lapse = self._at[near.rows], self.law.lapses.likely[near.rows]
         share = (1 - lapse) * own / ((1 - lapse) * own + lapse * UNIFORM)
-        return np.asarray(share[:, None] * (near.taken - expected))
+        return np.asarray(share[:, None] * (near.taken - near.expected(self.chances)))
 
     def fit(self, feature: Landing) -> Fit:
         """Return a feature at the maximum, and what it adds to each step."""
@@ -195,7 +213,10 @@ def _at_any_wall(arena: Arena) -> Landing:
     """Return landings by how far they are from the nearest wall."""
 
     def away_m(_seen: Seen, _rows: NDArray[np.intp], xy_m: Floats) -> Floats:
-        return arena.wall_distance(xy_m)
+        away = np.empty(xy_m.shape[:-1])
+        flat = np.ascontiguousarray(xy_m).reshape(-1, 2)
+        wall_distances(flat, arena.segments_m, away.reshape(-1))
+        return away
 
     return Landing(label="landing at any wall", away_m=away_m, knots_m=_OFF_WALLS_M)
 

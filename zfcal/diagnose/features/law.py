@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 from scipy.special import i0e
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.columns import Columns, both, less, weighed
+from zfcal.diagnose.features.columns import Columns, both, less
 from zfcal.diagnose.features.draws import Draw, Steps, draw_of, drawn, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells
 from zfcal.diagnose.features.lapses import Lapses
-from zfcal.diagnose.features.waves import series_of, waves_of
+from zfcal.diagnose.features.score_kernels import weighed
+from zfcal.diagnose.features.waves import concentrated, waves_of
 from zfcal.model.directions import turned_by
 from zfcal.model.features import MOST_SHARPER, Component, Sharper, Turned
 from zfcal.model.fitted import SCALES, Fitted
@@ -210,6 +211,8 @@ class Law:
 
     def mean(self, parts: list[Columns]) -> Columns:
         """Return the average of columns over the draws."""
+        if len(parts) == 1:
+            return parts[0]
         at, over = (
             np.sum([w[:, None] * each for w, each in zip(self._weights, some, strict=True)], axis=0)
             for some in zip(*parts, strict=True)
@@ -219,15 +222,13 @@ class Law:
     def bells(self, toward: Floats, kappa: Floats | float) -> Columns:
         """Return von Mises laws about directions, shape (step, source)."""
         shape = toward.shape[:2]
-        k = np.broadcast_to(np.asarray(kappa, dtype=np.float64), shape[:1]).copy()
         at, over = np.empty(shape), np.empty(shape)
-        order, series = series_of(k)
+        k, order, series, scale = concentrated(kappa, shape[0])
         bells(
             np.ascontiguousarray(toward), k, order, series, self._waves, self.weight,
             self.turns.taken, at, over,
         )  # fmt: skip
-        scale = (1 / (2 * math.pi * i0e(k)))[:, None]
-        return at * scale, over * scale
+        return np.multiply(at, scale, out=at), np.multiply(over, scale, out=over)
 
     def component(self, feature: Component, *, first: bool = False) -> Columns:
         """Return the columns of a component, shape (step, weight); of the first draw, if asked."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from scipy.special import ive
+from scipy.special import i0e, ive
 
 from zfcal.arrays import Floats, Ints
 
@@ -34,6 +36,30 @@ def series_of(kappa: Floats) -> tuple[Ints, Floats]:
     series = np.asarray(ive(m, known[:, None]) * np.where(m > 0, 2.0, 1.0), dtype=np.float64)
     series[series < _LEAST * series[:, :1]] = 0.0
     return np.asarray(order, dtype=np.int64), series
+
+
+def concentrated(kappa: Floats | float, n_steps: int) -> tuple[Floats, Ints, Floats, Floats]:
+    """Return kappa at each step, its series, and what makes a law of it whole.
+
+    Parameters
+    ----------
+    kappa : float or ndarray, shape (step,)
+    n_steps
+
+    Returns
+    -------
+    kappa : ndarray, shape (step,)
+    order, series
+        As of `series_of`.
+    scale : ndarray, shape (step, 1)
+    """
+    known = np.atleast_1d(np.asarray(kappa, dtype=np.float64))
+    order, series = series_of(known)
+    scale = 1 / (2 * math.pi * i0e(known))
+    if len(known) == n_steps:
+        return known, order, series, scale[:, None]
+    # One for all steps, of which none is looked up by itself.
+    return np.full(n_steps, known[0]), np.zeros(n_steps, dtype=np.int64), series, scale[:, None]
 
 
 def waves_of(weight: Floats) -> Floats:

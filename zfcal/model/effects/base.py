@@ -39,7 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
-from zfcal.model.kernels.curves import KNOTS, MORE, has_curve, knots_of
+from zfcal.model.kernels.curves import CUES, KNOTS, MORE, has_curve, knots_of
 from zfcal.model.paces import Pace, PaceFeature
 
 MAX_PARAMETERS = 8

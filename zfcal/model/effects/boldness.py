@@ -8,7 +8,7 @@ import shapely
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Company, Effect, EffectParameter, Shapes
-from zfcal.model.effects.circumstances import by_circumstances, each_fish
+from zfcal.model.effects.circumstances import by_circumstances, each_fish, each_under
 from zfcal.model.effects.forms import tilt, way_out
 from zfcal.model.effects.weights import aside_of, every_step, only, who
 from zfcal.model.features import Component, Feature, Leaving, Seen, Tilt, Turned, Weights
@@ -90,7 +90,7 @@ def _leaning(between: shapely.Geometry) -> Tilt:
         return np.stack([near, 1 - near], axis=1)[..., None] * seen.way_out[:, None]
 
     def by_who(seen: Seen) -> Floats:
-        each = each_fish(seen)[:, :, None, None] * common(seen)[:, None]
+        each = seen.once(each_fish)[:, :, None, None] * common(seen)[:, None]
         return np.asarray(each.reshape(len(each), -1, 2))
 
     return Tilt(
@@ -101,7 +101,7 @@ def _leaning(between: shapely.Geometry) -> Tilt:
 
 def _near_way_out(between: shapely.Geometry) -> Weights:
     """Return one for each fish near the way out, shape (step, fish)."""
-    return lambda seen: np.asarray(each_fish(seen) * _nearness(between, seen)[:, None])
+    return lambda seen: np.asarray(seen.once(each_fish) * _nearness(between, seen)[:, None])
 
 
 def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
@@ -140,7 +140,7 @@ def _crossing(between: shapely.Geometry) -> Tilt:
         return inside[:, None] * seen.own_heading
 
     def by_who(seen: Seen) -> Floats:
-        return np.asarray(each_fish(seen)[..., None] * ahead(seen)[:, None])
+        return np.asarray(seen.once(each_fish)[..., None] * ahead(seen)[:, None])
 
     return Tilt(
         label="going on between the rooms, by who", vectors=by_who,
@@ -159,7 +159,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
         ),
         by_circumstances(
             Leaving(label="who", weights=who),
-            alone=Leaving(label="all", weights=every_step),
+            alone=each_under(Leaving(label="all", weights=every_step)),
             without=("who", "the time", "the zone"),
         ),
         Leaving(label="who, into the open", weights=who, into="open"),

@@ -8,7 +8,7 @@ is among them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -42,6 +42,7 @@ from zfcal.model.kernels.curves import (
     cue_named,
 )
 from zfcal.model.kernels.hats import hats
+from zfcal.model.kernels.products import products, vector_products
 from zfcal.model.paces import Pace, Swum
 
 Core = TypeVar("Core", Component, Tilt, Turned, Leaving)
@@ -151,7 +152,7 @@ PACED: dict[str, Callable[[Swum], Floats]] = {
 def by_circumstances(
     core: Core,
     *,
-    alone: Core | None = None,
+    alone: Mapping[str, Core] | None = None,
     without: Collection[str] = (),
     among: Collection[str] | None = None,
     of_each: bool = False,
@@ -165,6 +166,7 @@ def by_circumstances(
     alone
         What may depend on circumstances as well, and is no case of the effect: attention as a
         whole, of a feature of attention by distance. What is found has to gain more than that.
+        By circumstance, as `each_under` has it, so that it is fitted once for all that share it.
     without
         Names of circumstances that the feature goes by itself, or that make another effect of it.
     among
@@ -176,7 +178,7 @@ def by_circumstances(
     return OneOf(
         kind=f"{core.label}, by circumstances",
         features=tuple(
-            _under(core, name, of, alone)
+            _under(core, name, of, None if alone is None else alone[name])
             for name, of in known.items()
             if name not in without and (among is None or name in among)
         ),
@@ -200,7 +202,7 @@ def curve_under(
     Returns
     -------
     dict or None
-        Parameters of `zfcal.model.curves`; None where there is no such curve.
+        Parameters of `zfcal.model.kernels.curves`; None where there is no such curve.
     """
     by, knots = CURVES.get(label.rpartition(_BY)[2], (NOTHING, _TIMES))
     if by == NOTHING and along is not None and len(along.knots) >= len(KNOTS):
@@ -231,20 +233,32 @@ def along_under(label: str, n_strengths: int) -> Along | None:
     return Along(cue=cue, knots=knots)
 
 
-def _under(core: Core, name: str, of: Weights, alone: Core | None) -> Core:
+def each_under(core: Core) -> dict[str, Core]:
+    """Return a feature under each sort of circumstances, by their names.
+
+    Parameters
+    ----------
+    core
+        As of `by_circumstances`. Only of a component do others have circumstances of their own.
+    """
+    known = {**CIRCUMSTANCES, **(OF_EACH if isinstance(core, Component) else {})}
+    return {name: _under(core, name, of, None) for name, of in known.items()}
+
+
+def _under(core: Core, name: str, of: Weights, over: Core | None) -> Core:
     label = f"{core.label}{_BY}{name}"
     own = _times(core, of)
     if isinstance(core, Component) and callable(core.instead):
         same = core.instead is core.weights
         core = replace(core, instead=own if same else _times(core, of, core.instead))
-    if alone is None:
+    if over is None:
         return _with(core, own, label)
-    over = _times(alone, of)
+    common = _weights_of(over)
 
     def both(seen: Seen) -> Floats:
-        return np.concatenate([own(seen), over(seen)], axis=_axis(core))
+        return np.concatenate([own(seen), common(seen)], axis=_axis(core))
 
-    return replace(_with(core, both, label), over=_with(alone, over, f"{alone.label}{_BY}{name}"))
+    return replace(_with(core, both, label), over=over)
 
 
 def _axis(core: Core) -> int:
@@ -256,18 +270,15 @@ def _times(core: Core, of: Weights, weights: Weights | None = None) -> Weights:
     """Return the weights of a feature, or others of its kind, each for each circumstance."""
     of_core = weights or _weights_of(core)
 
-    def products(seen: Seen) -> Floats:
-        own, by = of_core(seen), of(seen)
+    def times(seen: Seen) -> Floats:
+        own, by = of_core(seen), seen.once(of)
         if isinstance(core, Component):
-            by = by if by.ndim == own.ndim else by[:, None]
-            made = own[..., None] * by[..., None, :]
-            return made.reshape(*own.shape[:2], own.shape[2] * by.shape[-1])
+            return products(own, by if by.ndim == own.ndim else by[:, None])
         if isinstance(core, Tilt):
-            return (own[:, :, None] * by[:, None, :, None]).reshape(len(own), -1, 2)
-        own = own.reshape(len(by), -1)
-        return np.asarray((own[..., None] * by[:, None]).reshape(len(by), -1))
+            return vector_products(own, by)
+        return products(own.reshape(len(by), 1, -1), by[:, None])[:, 0]
 
-    return products
+    return times
 
 
 def _weights_of(core: Core) -> Weights:

@@ -11,7 +11,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import in_tank
 from zfcal.model.effects.base import Company, Effect, EffectParameter
-from zfcal.model.effects.circumstances import by_circumstances
+from zfcal.model.effects.circumstances import by_circumstances, each_under
 from zfcal.model.effects.forms import (
     RAD_PER_STRENGTH,
     Hooked,
@@ -213,7 +213,7 @@ _FEATURES: tuple[Feature, ...] = (
     Leaving(label="time, though it came back", weights=_each_left, along=_BY_TIME),
     by_circumstances(
         Leaving(label="just after others", weights=_just_left),
-        alone=Leaving(label="at any time", weights=every_step),
+        alone=each_under(Leaving(label="at any time", weights=every_step)),
         without=("the zone",),
     ),
     Component(

@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
+from zfcal.model.effects.weights import ATTENTION, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -65,7 +65,7 @@ def _change(seen: Seen, knots: tuple[float, ...], counts: Floats) -> Floats:
 def _attention_of_each(seen: Seen) -> Floats:
     """Return a change for each fish: some may habituate, others not."""
     paid = seen.attention.sum(axis=1)
-    by = [_change(seen, _FEW, paid * fish) for fish in each_fish(seen).T]
+    by = [_change(seen, _FEW, paid * fish) for fish in seen.once(each_fish).T]
     each = np.concatenate(by, axis=1)[:, None]
     return np.broadcast_to(each, (*seen.here.shape, each.shape[2]))
 
@@ -84,7 +84,7 @@ _FEATURES: tuple[Feature, ...] = (
     precision_of_attention(_by_time, "precision"),
     by_circumstances(
         factor_on_attention(_steadily, label="attention, steadily"),
-        alone=factor_on_attention(evenly),
+        alone=ATTENTION,
         without=("the time", "whether it is a robot"),
         of_each=True,
     ),

@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import apart, beyond, cut, needs_neighbour
-from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
+from zfcal.model.effects.weights import LESS_ATTENTION, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Feature, Seen
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -71,7 +71,7 @@ _FEATURES: tuple[Feature, ...] = (
     precision_of_attention(_far, "precision of far ones", high=0.0),
     by_circumstances(
         factor_on_attention(_far, label="attention to far ones", high=0.0),
-        alone=factor_on_attention(evenly, high=0.0),
+        alone=LESS_ATTENTION,
         without=("the time",),
     ),
 )

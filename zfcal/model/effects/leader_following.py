@@ -10,7 +10,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
-from zfcal.model.effects.weights import evenly, factor_on_attention, precision_of_attention
+from zfcal.model.effects.weights import ATTENTION, factor_on_attention, precision_of_attention
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Weights
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -211,7 +211,7 @@ _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(lambda seen: seen.in_open[..., None], label="who is in the open"),
     by_circumstances(
         factor_on_attention(_fast, label="attention to the fast"),
-        alone=factor_on_attention(evenly),
+        alone=ATTENTION,
         without=("the time",),
         of_each=True,
     ),

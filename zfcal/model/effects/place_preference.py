@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.directions import lengths, of_tank
+from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
@@ -23,6 +23,7 @@ from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import FOLLOWS, X, Y
+from zfcal.model.kernels.ways_to import write_ways_to
 from zfcal.model.places import places
 
 _AT_IT_M = 0.02
@@ -124,6 +125,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
         if arena.outline.covers(shapely.Point(x, y))
     ]
     _, rooms = find_rooms(arena)
+    shapely.prepare(rooms)
     asked: list[_Asked] = [(spot, None) for spot in spots]
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
     apart = np.array([x_max - x_min, y_max - y_min]) * (_UP_TO[1] - _UP_TO[0])
@@ -200,10 +202,16 @@ def _at_spot(spot: Floats) -> Landing:
 
 
 def _toward(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
-    way = spot - seen.xy_m
-    far = lengths(way)
-    toward = of_tank(seen.x_axis, (way / np.maximum(far, 1e-9)[:, None])[:, None])
-    return toward[:, 0], hats(far, _KNOTS_M)
+    """Return unit vectors to a place, shape (step, 2), and the hat functions of how far it is."""
+    toward, far_m = _to(seen, spot)
+    return toward, hats(far_m, _KNOTS_M)
+
+
+def _to(seen: Seen, spot: Floats) -> tuple[Floats, Floats]:
+    """Return unit vectors to a place, shape (step, 2), and how far it is in metres."""
+    toward, far_m = np.empty((len(seen.xy_m), 2)), np.empty(len(seen.xy_m))
+    write_ways_to(seen.xy_m, seen.x_axis, spot, toward, far_m)
+    return toward, far_m
 
 
 def _within(seen: Seen, room: shapely.Polygon | None) -> Floats:
@@ -215,7 +223,7 @@ def _within(seen: Seen, room: shapely.Polygon | None) -> Floats:
 def _drawn(spot: Floats, room: shapely.Polygon | None) -> Component:
     return Component(
         label=f"drawn to {spot[0]:.2f}, {spot[1]:.2f}",
-        toward=lambda seen: only(_toward(seen, spot)[0]),
+        toward=lambda seen: only(_to(seen, spot)[0]),
         weights=lambda seen: only(_toward(seen, spot)[1] * _within(seen, room)[:, None]),
         kappa=_KAPPA,
         along=_BY_DISTANCE,
@@ -234,8 +242,8 @@ def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
 
 def _leaning_near(spot: Floats) -> Tilt:
     def vectors(seen: Seen) -> Floats:
-        far_m = lengths(spot - seen.xy_m)
-        return np.asarray((np.exp(-far_m / _NEAR_M)[:, None] * _toward(seen, spot)[0])[:, None])
+        toward, far_m = _to(seen, spot)
+        return np.asarray((np.exp(-far_m / _NEAR_M)[:, None] * toward)[:, None])
 
     return Tilt(label=f"leaning to {spot[0]:.2f}, {spot[1]:.2f}, near it", vectors=vectors)
 

@@ -23,8 +23,8 @@ from zfcal.model.effects.forms import (
     turn_to,
 )
 from zfcal.model.effects.weights import (
+    ATTENTION,
     aside_of,
-    evenly,
     factor_on_attention,
     precision_of_attention,
 )
@@ -194,7 +194,7 @@ _FEATURES: tuple[Feature, ...] = (
     precision_of_attention(_to_robots, "precision of robots"),
     by_circumstances(
         factor_on_attention(_to_robots, label="attention to robots"),
-        alone=factor_on_attention(evenly),
+        alone=ATTENTION,
         without=("the time", "whether it is a robot"),
         of_each=True,
     ),

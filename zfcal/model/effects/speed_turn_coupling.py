@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
-from zfcal.model.effects.circumstances import by_circumstances, paces_by
+from zfcal.model.effects.circumstances import by_circumstances, each_under, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.effects.weights import only
 from zfcal.model.features import Along, Component, Feature, Landing, Seen, Sharper, Tilt
@@ -108,7 +108,11 @@ _BY_SPEED = Tilt(label="by speed", vectors=_by_speed)
 
 _FEATURES: tuple[Feature, ...] = (
     _BY_SPEED,
-    by_circumstances(_BY_SPEED, alone=Tilt(label="ahead", vectors=_ahead), without=("the speed",)),
+    by_circumstances(
+        _BY_SPEED,
+        alone=each_under(Tilt(label="ahead", vectors=_ahead)),
+        without=("the speed",),
+    ),
     Sharper(label="sharper by speed", by=_quicker),
     # More than at all speeds alike, which would be another law of turns.
     Component(

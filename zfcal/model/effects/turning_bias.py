@@ -80,7 +80,7 @@ def _left(seen: Seen) -> Floats:
 
 
 def _left_by_who(seen: Seen) -> Floats:
-    return np.asarray(each_fish(seen)[..., None] * left_of(seen.own_heading)[:, None])
+    return np.asarray(seen.once(each_fish)[..., None] * left_of(seen.own_heading)[:, None])
 
 
 def _to_left(seen: Seen) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.model.effects.circumstances import each_fish
+from zfcal.model.effects.circumstances import each_fish, each_under
 from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Weights
 
 _LEAST = -0.98
@@ -25,7 +25,7 @@ def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats
 
 def who(seen: Seen) -> Floats:
     """Return one for each fish but one, shape (step, fish): what that one has, all have."""
-    return each_fish(seen)[:, :-1]
+    return seen.once(each_fish)[:, :-1]
 
 
 def both_senses(seen: Seen) -> Floats:
@@ -105,7 +105,9 @@ def factor_on_attention(
     )
 
 
-LEANING_OUT = Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None])
+LEANING_OUT = each_under(
+    Tilt(label="leaning to the way out", vectors=lambda seen: seen.way_out[:, None])
+)
 """What fish may do by circumstances and is no direction, no place and no answer to others."""
 
 
@@ -137,3 +139,8 @@ def precision_of_attention(
     return Component(
         label=label, toward="toward", weights=by, instead=by, kappa="sharper", low=low, high=high
     )
+
+
+ATTENTION = each_under(factor_on_attention(evenly))
+LESS_ATTENTION = each_under(factor_on_attention(evenly, high=0.0))
+"""What fish may attend to by circumstances, whoever it is: in any measure, and less alone."""
