@@ -12,7 +12,10 @@ import pytest
 
 from zfcal.artifacts.arenas import load_arena
 from zfcal.model.features import LAGS, Seen
+from zfcal.model.scene import make_scene
+from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import natural
+from zfcal.tracks import Samples
 
 # A neighbour just beside, one just ahead, one behind, one far: seen by the agent at (x, y).
 STATES = {
@@ -124,3 +127,23 @@ def seen():
         in_open=rng.uniform(0, 1, (n, others)),
         stayed_s=rng.uniform(0, 30, n),
     )
+
+
+@pytest.fixture(scope="session")
+def watch(two_rooms, model):
+    """Return what simulates fish with effects, and makes a scene of them."""
+
+    def scene_of(effects, *, seed, n_steps=1500, n_agents=5):
+        truth = dataclasses.replace(model, effects=effects)
+        xy, _ = simulate_tracks(truth, two_rooms, n_agents=n_agents, n_steps=n_steps, seed=seed)
+        samples = Samples(
+            dt_s=0.2,
+            k=np.arange(n_steps),
+            agent=np.arange(1, n_agents + 1, dtype=np.int32),
+            kind=np.zeros(n_agents, dtype=np.int8),
+            xy_m=xy[:n_steps],
+            confidence=np.ones((n_steps, n_agents), dtype=np.float32),
+        )
+        return make_scene(samples, two_rooms)
+
+    return scene_of

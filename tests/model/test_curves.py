@@ -17,9 +17,6 @@ from zfcal.model.kernels.curves import LEVELS, level_of, strengths_at
 from zfcal.model.kernels.state import cue_of
 from zfcal.model.onestep import heading_density
 from zfcal.model.packing import pack
-from zfcal.model.scene import make_scene
-from zfcal.model.simulate import simulate_tracks
-from zfcal.tracks import Samples
 
 AWAY_M = [(0.20, 0.77), (0.23, 0.77), (0.20, 0.87)]
 """Three fish: the first one's neighbours are 3 cm ahead and 10 cm to its left."""
@@ -134,7 +131,7 @@ def test_a_step_at_a_knot_has_the_strength_of_the_knot(model, two_rooms):
 
 
 @pytest.mark.parametrize("case", ["time", "zone"])
-def test_fish_with_a_curve_are_recovered(case, model, two_rooms):
+def test_fish_with_a_curve_are_recovered(case, model, watch):
     """Five minutes of five fish that turn left at first and right at last, or by zone."""
     by, knots, more_1 = {
         "time": (curves.BY_TIME, (0.0, 150.0, 300.0), 1.0),
@@ -142,18 +139,7 @@ def test_fish_with_a_curve_are_recovered(case, model, two_rooms):
         "zone": (curves.BY_ZONE, (1.0, 2.0, 3.0), 0.0),
     }[case]
     truth = {"strength": 0.5} | curve(by, knots, more_1=more_1, more_3=-1.5)
-    swims = dataclasses.replace(model, effects={"turning-bias": truth})
-    n_steps, n_agents = 1500, 5
-    xy, _ = simulate_tracks(swims, two_rooms, n_agents=n_agents, n_steps=n_steps, seed=4)
-    samples = Samples(
-        dt_s=0.2,
-        k=np.arange(n_steps),
-        agent=np.arange(1, n_agents + 1, dtype=np.int32),
-        kind=np.zeros(n_agents, dtype=np.int8),
-        xy_m=xy[:n_steps],
-        confidence=np.ones((n_steps, n_agents), dtype=np.float32),
-    )
-    scene = make_scene(samples, two_rooms)
+    scene = watch({"turning-bias": truth}, seed=4)
     start = {"strength": 0.1} | curve(by, knots)
     free = [("turning-bias", key) for key in find_effect("turning-bias").free(start)]
     assert {("turning-bias", "more_1"), ("turning-bias", "more_3")} < set(free)

@@ -4,40 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from zfcal.model.effects import find_effect
 from zfcal.model.likelihood import fit
-from zfcal.model.scene import make_scene
-from zfcal.model.simulate import simulate_tracks
-from zfcal.tracks import Samples
 
 HEADINGS = {
     "component": ("alignment", "weight", 15.0, {"kappa": 8.0}),
     "tilt": ("turning-bias", "strength", 1.0, {}),
     "sight": ("rear-blind-zone", "ignored", 0.6, {}),
 }
-
-
-@pytest.fixture(scope="module")
-def watch(two_rooms, model):
-    """Return what simulates fish with effects, and makes a scene of them."""
-
-    def scene_of(effects, *, seed, n_steps=1500, n_agents=5):
-        truth = dataclasses.replace(model, effects=effects)
-        xy, _ = simulate_tracks(truth, two_rooms, n_agents=n_agents, n_steps=n_steps, seed=seed)
-        samples = Samples(
-            dt_s=0.2,
-            k=np.arange(n_steps),
-            agent=np.arange(1, n_agents + 1, dtype=np.int32),
-            kind=np.zeros(n_agents, dtype=np.int8),
-            xy_m=xy[:n_steps],
-            confidence=np.ones((n_steps, n_agents), dtype=np.float32),
-        )
-        return make_scene(samples, two_rooms)
-
-    return scene_of
 
 
 def with_effects(model, **effects):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.hats import hat_at
 
 
 @kernel
@@ -61,10 +62,7 @@ def hats_within(away_m: Floats, knots_m: Floats, made: Floats) -> None:
                 made[s, c, k] = 0.0
             if x >= knots_m[last]:
                 continue
-            below = last - 1 if math.isnan(x) else 0
-            while below < last - 1 and x >= knots_m[below + 1]:
-                below += 1
-            share = (x - knots_m[below]) / (knots_m[below + 1] - knots_m[below])
+            below, share = hat_at(x, knots_m)
             made[s, c, below] = 1.0 - share
             if below + 1 < last:
                 made[s, c, below + 1] = share
@@ -95,10 +93,7 @@ def expected_hats(
             x = max(away_m[s, c], knots_m[0])
             if x >= knots_m[last]:
                 continue
-            below = last - 1 if math.isnan(x) else 0
-            while below < last - 1 and x >= knots_m[below + 1]:
-                below += 1
-            share = (x - knots_m[below]) / (knots_m[below + 1] - knots_m[below])
+            below, share = hat_at(x, knots_m)
             chance = chances[rows[s], c]
             made[s, below] += chance * (1.0 - share)
             if below + 1 < last:

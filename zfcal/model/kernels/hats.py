@@ -9,7 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.kernels.compiled import kernel
+from zfcal.model.kernels.compiled import inlined, kernel
+
+
+@inlined
+def hat_at(x: float, knots: Floats) -> tuple[int, float]:
+    """Return the knot at or below a value and the weight of the one after it; NaN for NaN.
+
+    Parameters
+    ----------
+    x
+        No lower than the first knot, and no higher than the last.
+    knots : ndarray, shape (knot,)
+        Two or more, ascending.
+    """
+    last = knots.size - 1
+    below = last - 1 if math.isnan(x) else 0
+    while below < last - 1 and x >= knots[below + 1]:
+        below += 1
+    return below, (x - knots[below]) / (knots[below + 1] - knots[below])
 
 
 @kernel
@@ -30,10 +48,7 @@ def write_hats(values: Floats, knots: Floats, made: Floats) -> None:
             x = knots[0]
         elif x > knots[last]:
             x = knots[last]
-        below = last - 1 if math.isnan(x) else 0
-        while below < last - 1 and x >= knots[below + 1]:
-            below += 1
-        share = (x - knots[below]) / (knots[below + 1] - knots[below])
+        below, share = hat_at(x, knots)
         for k in range(last + 1):
             made[i, k] = 0.0
         made[i, below] = 1.0 - share
