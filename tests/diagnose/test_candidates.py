@@ -173,6 +173,18 @@ def test_one_fish_is_asked_for_where_it_is_the_same_all_the_time(scene_of):
     assert forms_of(first, "leader-following", "who") == {-1.0}
 
 
+def test_near_ones_may_be_felt_at_once_and_far_ones_late(scene_of):
+    """By half a step of the recording and a whole one, beyond several distances."""
+    scene = scene_of()
+    found = {
+        (each.shape["felt_m"], each.shape["delay_s"])
+        for each in further_forms(find_effect("reaction-delay"), scene)
+        if each.shape["whole"] == 0.0
+    }
+    late = {0.5 * scene.dt_s, scene.dt_s}
+    assert {(felt_m, delay_s) for felt_m in (0.1, 0.14, 0.2) for delay_s in late} <= found
+
+
 def test_no_response_is_later_than_it_can_be(scene_of):
     """By half a step of a recording to two, of those that are 2 s at most."""
     scene = scene_of()

@@ -105,6 +105,9 @@ def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
 _LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
 """Steps of a recording by which a response may be late, beside those delays that a file names."""
 
+_FELT_M = (0.1, 0.14, 0.2)
+"""Distances within which it may be at once."""
+
 
 def _at(effect: Effect, values: Mapping[str, float]) -> Candidate:
     own = effect.spelt_out(values)
@@ -153,6 +156,12 @@ def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
             {effect.lag: steps * scene.dt_s, "felt_m": 0.0, "whole": whole}
             for whole in (1.0, 0.0)
             for steps in _LATE_STEPS
+            if steps * scene.dt_s <= longest_s
+        ]
+        shapes += [
+            {effect.lag: steps * scene.dt_s, "felt_m": felt_m, "whole": 0.0}
+            for felt_m in _FELT_M
+            for steps in _LATE_STEPS[:2]
             if steps * scene.dt_s <= longest_s
         ]
         shapes += [

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from zfcal.model.effects import find_effect
+from zfcal.model.features import OneOf
 from zfcal.model.onestep import heading_density
 
 HERE = (0.20, 0.77)
@@ -225,3 +227,24 @@ def test_fish_keep_away_from_the_robot(swim, bearings, flight):
     shunned = swim("robot-avoidance", {"strength": 2.0, "flight": flight}, n_robots=1)
     assert preference(*shunned) < -0.05
     assert abs(preference(*swim(n_robots=1))) < 0.03
+
+
+@pytest.mark.parametrize("reach_m", [0.06, 0.1, 0.14, 0.2])
+@pytest.mark.parametrize(("lag", "late"), [("half a step", "half"), ("a step", "late")])
+def test_those_beyond_a_distance_are_late_and_all_others_are_not(seen, reach_m, lag, late):
+    """What is seen late takes the place of what is seen at once, of far ones alone."""
+    (choice,) = (
+        each
+        for each in find_effect("reaction-delay").features(None)
+        if isinstance(each, OneOf) and each.kind == "sight, beyond a distance"
+    )
+    (own,) = (
+        each for each in choice.features if each.label == f"{lag}, sight, beyond {reach_m:g} m"
+    )
+    far = seen.distance_m > reach_m
+    assert far.any()
+    assert not far.all()
+    assert own.weights(seen)[..., 0] == pytest.approx(far * getattr(seen, f"{late}_attention"))
+    assert own.instead(seen)[..., 0] == pytest.approx(far * seen.attention)
+    toward = own.toward(seen) if callable(own.toward) else getattr(seen, own.toward)
+    np.testing.assert_array_equal(toward, getattr(seen, f"{late}_toward"))

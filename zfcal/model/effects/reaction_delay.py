@@ -12,7 +12,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import LAGS, Component, Feature, Seen, Weights
+from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Weights
 from zfcal.model.kernels.hats import hats_where
 
 
@@ -97,6 +97,28 @@ _FAR_LATER = replace(
 )
 
 
+_BEYOND_M = (0.06, 0.1, 0.14, 0.2)
+
+
+def _beyond(reach_m: float, lag: Literal["half a step", "a step"]) -> Component:
+    """Return that those beyond a distance are seen late, and all others at once."""
+    is_half = lag == "half a step"
+
+    def far(seen: Seen) -> Floats:
+        return (seen.here & (seen.distance_m > reach_m))[..., None].astype(np.float64)
+
+    def late(seen: Seen) -> Floats:
+        return (seen.half_attention if is_half else seen.late_attention)[..., None] * far(seen)
+
+    return Component(
+        label=f"{lag}, sight, beyond {reach_m:g} m",
+        toward="half_toward" if is_half else lambda seen: seen.late_toward,
+        weights=late,
+        instead=lambda seen: seen.attention[..., None] * far(seen),
+        high=1.0,
+    )
+
+
 def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
@@ -119,7 +141,12 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(_soon("far ones", _far), of_each=True),
     _FAR_SOON,
     by_circumstances(_FAR_SOON, of_each=True),
-    _FAR_LATER,
+    OneOf(
+        kind="sight, beyond a distance",
+        features=tuple(
+            _beyond(reach_m, lag) for lag in ("half a step", "a step") for reach_m in _BEYOND_M
+        ),
+    ),
     by_circumstances(_FAR_LATER, of_each=True),
 )
 
