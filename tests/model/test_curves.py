@@ -88,6 +88,12 @@ CASES = {
     "sight by bearing": ("rear-blind-zone", {"ignored": 0.4}, curves.BY_BEARING, (0.0, 1.2)),
     "tilt by the nearest": ("turning-bias", {"strength": 0.4}, curves.BY_NEAREST, (0.01, 0.03)),
     "component by number": ("alignment", {"weight": 9.0}, curves.BY_NUMBER, (1.0, 2.0)),
+    "a component of each by nearest": (
+        "group-cohesion",
+        {"weight": 1.0, "each": 1.0},
+        curves.BY_NEAREST,
+        (0.01, 0.04),
+    ),
     "turn by speed": ("alignment", {"weight": 9.0, "turning": 1.0}, curves.BY_SPEED, (0.0, 0.05)),
 }
 
