@@ -177,6 +177,22 @@ def test_models_of_one_population_have_curves_of_their_own(model, two_rooms):
     assert pack(models[:1], two_rooms).curves.shape[1] == 0
 
 
+def test_each_of_two_curves_has_rows_of_its_own(model, two_rooms):
+    """From the one's last level on come the other's."""
+    by_time, by_speed = (curve(by, (0.0, 1.0, 2.0)) for by in (curves.BY_TIME, curves.BY_SPEED))
+    both = {
+        "turning-bias": {"strength": 0.4, **by_time, "more_3": 0.2},
+        "rear-blind-zone": {"ignored": 0.5, **by_speed, "more_1": -0.3},
+    }
+    packed = pack([dataclasses.replace(model, effects=both)], two_rooms)
+    ends = {"turning-bias": (0.4, 0.6), "rear-blind-zone": (0.2, 0.5)}
+    for row, name in enumerate(both):
+        at = find_effect(name).names.index(find_effect(name).strength)
+        first = int(packed.curves[0, row, curves.FIRST])
+        found = packed.effects[0, [first, first + LEVELS - 1], at]
+        assert found == pytest.approx(ends[name])
+
+
 def test_a_genome_leaves_a_curve_as_it_is(model):
     """Its one gene is the strength: at its knot, as of all effects."""
     bent = {"strength": 0.4} | curve(curves.BY_TIME, (0.0, 1.0, 2.0), more_3=0.2)
