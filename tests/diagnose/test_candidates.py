@@ -208,6 +208,7 @@ def test_no_response_is_later_than_it_can_be(scene_of):
         ("turning-bias", "leaning to the left, by the zone", "BY_ZONE", (1.0, 2.0, 3.0)),
         ("interaction-range", "attention", "BY_DISTANCE", None),
         ("crowding", "company, by how many are near", "BY_NEAREST", (0.03, 0.1, 0.25)),
+        ("group-cohesion", "drawn to each", "BY_NEAREST", None),
     ],
 )
 def test_a_curve_goes_by_what_a_feature_does(candidate, scene_of, name, label, cue, knots):
@@ -237,6 +238,7 @@ def test_a_curve_by_time_is_in_seconds_of_the_trial(candidate, scene_of):
         ("turning-bias", "leaning to the left"),
         ("reaction-delay", "attention, by the nearest"),
         ("freezing", "stops, by the time"),
+        ("group-cohesion", "drawn to each, by bearing"),
     ],
 )
 def test_no_curve_goes_by_what_a_model_does_not_know(candidate, scene_of, name, label):

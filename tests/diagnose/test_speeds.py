@@ -156,14 +156,35 @@ def test_speed_matching_is_found_again(screen, candidate):
 def test_a_curve_of_an_exponent_is_found_again(screen, candidate):
     """Fast after fast steps at first, slow after them at last: a mean of nothing."""
     bent = {"by": float(BY_TIME), "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}
+    bent |= {"more_1": 0.0, "more_3": 0.0}
     more = {"more_1": 0.5, "more_3": -0.5}
     own = screen(53, {"burst-and-coast": {"exponent": 0.0} | bent | more})
     flat = fit_speed(own, candidate("burst-and-coast"), 0.1)
-    found = fit_speed(own, candidate("burst-and-coast", **bent), 0.1)
+    found = fit_speed(own, candidate("burst-and-coast", **bent), 0.1, bend=True)
     assert found.values["exponent"] == pytest.approx(0.0, abs=0.08)
     for key, value in more.items():
         assert found.values[key] == pytest.approx(value, abs=0.12)
     assert found.gain.sum() > flat.gain.sum() + 40
+    halves = [half_of(own.scene, own.scene.moves, which) for which in (0, 1)]
+    for learnt in halves:
+        gain = held_out_gain(own, candidate("burst-and-coast", **bent), 0.1, learnt)
+        assert np.nansum(gain[~learnt]) > 20
+
+
+def test_a_curve_is_found_far_from_where_it_starts(screen, candidate):
+    """A strength at the middle that no plain form has; it is kept where no curve is asked for."""
+    bent = {"by": float(BY_TIME), "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}
+    truth = {"more_1": -1.2, "more_3": -1.2}
+    own = screen(53, {"burst-and-coast": {"exponent": 0.6} | bent | truth})
+    flat = {"more_1": 0.0, "more_3": 0.0}
+    found = fit_speed(own, candidate("burst-and-coast", **bent, **flat), 0.01, bend=True)
+    assert found.values["exponent"] == pytest.approx(0.6, abs=0.1)
+    for key, value in truth.items():
+        assert found.values[key] == pytest.approx(value, abs=0.2)
+    given = {"more_1": -1.0, "more_3": -1.4}
+    moved = fit_speed(own, candidate("burst-and-coast", **bent, **given), 0.5)
+    assert given.items() <= moved.values.items()
+    assert moved.values["exponent"] == pytest.approx(0.6, abs=0.15)
 
 
 def test_no_effect_gains_next_to_nothing(screen, candidate):

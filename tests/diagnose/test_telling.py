@@ -40,6 +40,7 @@ def test_a_curve_is_told_knot_by_knot(candidate):
         "Fitted strength by distance to the nearest: 1 at 0.03 m, -0.1 at 0.1 m, -0.5 at 0.25 m."
         in text
     )
+    assert "4 at 0.03 m" in says(own, values | {"more_1": 9.0}, {})
     assert says(own, values | {"more_1": 0.2}, {}).startswith(own.effect.opposite)
 
 

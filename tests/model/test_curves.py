@@ -177,6 +177,24 @@ def test_models_of_one_population_have_curves_of_their_own(model, two_rooms):
     assert pack(models[:1], two_rooms).curves.shape[1] == 0
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 3, 2, 1), (0, 2, 1, 3)])
+def test_how_many_are_seen_does_not_depend_on_their_numbers(order, model, two_rooms):
+    """Those beyond a range are ignored, the more of all the more there are."""
+    xy_m = np.array([(0.20, 0.77), (0.28, 0.77), (0.20, 0.87), (0.22, 0.79)])[list(order)]
+    bent = {"ignored": 0.0, "range_m": 0.05, "sharp": 1.0} | curve(
+        curves.BY_NUMBER, (1.0, 2.0, 3.0), more_3=1.0
+    )
+    told = dataclasses.replace(model, effects={"interaction-range": bent}, fov_rad=math.pi)
+    seen = {"heading_rad": [0.4] * 4, "speed_m_s": 0.05}
+    # Of three in sight: the strength of the last knot.
+    all_ = {"ignored": 1.0, "range_m": 0.05, "sharp": 1.0}
+    plain = dataclasses.replace(told, effects={"interaction-range": all_})
+    found, expected = (
+        heading_density(each, two_rooms, xy_m=xy_m, **seen)[1] for each in (told, plain)
+    )
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
 def test_each_of_two_curves_has_rows_of_its_own(model, two_rooms):
     """From the one's last level on come the other's."""
     by_time, by_speed = (curve(by, (0.0, 1.0, 2.0)) for by in (curves.BY_TIME, curves.BY_SPEED))
@@ -210,10 +228,10 @@ def test_a_genome_leaves_a_curve_as_it_is(model):
 
 @pytest.mark.parametrize("effect", all_effects(), ids=lambda effect: effect.name)
 def test_every_effect_may_have_a_curve(effect):
-    """But for one that is a delay, which is the same for all that is seen."""
+    """But for a delay, which is the same for all that is seen, and for rests."""
     bent = curve(curves.BY_NEAREST, (0.03, 0.1, 0.25))
-    if effect.lag is not None:
-        with pytest.raises(InputError, match="has no curve"):
+    if effect.lag is not None or effect.rests:
+        with pytest.raises(InputError, match="has no parameter 'by'"):
             effect.values(bent)
         return
     assert effect.spelt_out(bent).keys() == {*effect.names, *bent}
@@ -228,6 +246,7 @@ def test_every_effect_may_have_a_curve(effect):
         ({"by": 1.5}, "by must be a whole number"),
         ({"by": 9.0}, r"by must be in \[0, 8\]"),
         ({"more_2": 1.0}, "has no parameter 'more_2'"),
+        ({"by": 0.0}, "knot_1, knot_2, knot_3, more_1, more_3 stand without `by`"),
     ],
 )
 def test_a_wrong_curve_is_refused(wrong, says):

@@ -12,7 +12,7 @@ from zfcal.model.effects import Effect, all_effects, find_effect
 from zfcal.model.effects.base import Company
 from zfcal.model.effects.circumstances import curve_under
 from zfcal.model.features import LAGS, OneOf
-from zfcal.model.kernels.curves import BY_ZONE, KNOTS
+from zfcal.model.kernels.curves import BY_BEARING, BY_DISTANCE, BY_NEAREST, BY_ZONE, KNOTS
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import KIND, TIME
 from zfcal.model.scene import Scene
@@ -185,7 +185,7 @@ def curved(candidate: Candidate, label: str, scene: Scene) -> Candidate | None:
     scene
         Of the recording.
     """
-    if candidate.effect.lag is not None or candidate.effect.rests:
+    if not candidate.effect.curve:
         return None
     time_s = scene.states[:, TIME]
     along = next(
@@ -200,6 +200,11 @@ def curved(candidate: Candidate, label: str, scene: Scene) -> Candidate | None:
     by = curve_under(label, along, float(time_s.min()), float(time_s.max()))
     if by is None or (by["by"] == BY_ZONE and len(scene.arena.zones) != len(KNOTS)):
         return None
+    if candidate.effect.sight is None:
+        # Such an effect is not asked of each other one by itself: see `parameters_at`.
+        if by["by"] == BY_BEARING:
+            return None
+        by["by"] = float(BY_NEAREST) if by["by"] == BY_DISTANCE else by["by"]
     return Candidate(effect=candidate.effect, shape=candidate.shape | by)
 
 

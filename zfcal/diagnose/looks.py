@@ -25,7 +25,7 @@ from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
 from zfcal.model.extended import maximise
-from zfcal.model.kernels.curves import MORE, strengths_of
+from zfcal.model.kernels.curves import MORE, strengths_at_knots
 
 BY_ITSELF = 4.0
 """Standard errors by which features of a name must lead those of all others where no form of ours
@@ -203,7 +203,8 @@ def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
     if not left:
         return None
     (best, score), *others = left
-    if not any(strengths_of(best.values, best.candidate.effect.strength)):
+    own = best.candidate.effect.parameter(best.candidate.effect.strength)
+    if not any(strengths_at_knots(best.values, own.name, (own.low, own.high))):
         return None
     ties = tuple(tie for tie, _ in others if not best.over(tie) > SURE)
     return Step(

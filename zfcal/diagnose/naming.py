@@ -192,7 +192,7 @@ def _intervals(
 
 def _refit_speed(screen: Screen, score: Score) -> Refit:
     candidate = score.candidate
-    found = fit_speed(screen, candidate, score.strength)
+    found = fit_speed(screen, candidate, score.strength, bend=True)
     parameters = with_effect(screen.fitted.parameters, candidate.name, found.values)
     # Headings are judged given the speed: the rest of the fit stands.
     fitted = replace(screen.fitted, parameters=parameters)

@@ -148,8 +148,10 @@ def _polygon(place: Floats, known: NDArray[np.bool_], n_bins: int) -> Floats:
     return np.asarray(np.log((1 - share) * density[below] + share * density[above]))
 
 
-def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
-    """Return an effect on speed at its maximum likelihood, its shape as it is but for its curve.
+def fit_speed(
+    screen: Screen, candidate: Candidate, start: float, *, bend: bool = False
+) -> SpeedFit:
+    """Return an effect on speed at its maximum likelihood, its shape as it is.
 
     Parameters
     ----------
@@ -159,13 +161,15 @@ def fit_speed(screen: Screen, candidate: Candidate, start: float) -> SpeedFit:
         The effect, at a shape.
     start
         A strength to start from.
+    bend
+        Whether its curve is fitted as well, if it has one.
     """
     if candidate.effect.rests:
         return _fit_stops(screen, candidate)
     all_ = np.ones(len(screen.scene.moves), dtype=bool)
     likelihood = _Likelihood.of(screen, candidate, all_)
-    if has_curve(candidate.shape):
-        likelihood = likelihood.bent(start)
+    if bend and has_curve(candidate.shape):
+        likelihood, start = likelihood.bent(start)
         candidate = likelihood.candidate
     low, high = bounds_of(candidate.name, candidate.effect.strength)
     best = likelihood.maximum(start)
@@ -212,6 +216,8 @@ def held_out_gain(
         found = chain_of(runs, candidate, screen.scene.dt_s, learnt)
         return runs.log_chance(found.chain) - runs.log_chance(found.alike)
     likelihood = _Likelihood.of(screen, candidate, learnt)
+    if has_curve(candidate.shape):
+        likelihood, start = likelihood.bent(start)
     gain = likelihood.log_p(likelihood.maximum(start)) - likelihood.without()
     field = likelihood.field
     return gain if field is None else np.where(is_known(field, learnt), gain, np.nan)
@@ -257,12 +263,12 @@ class _Likelihood:
         )
         return float(found.x)
 
-    def bent(self, start: float) -> _Likelihood:
-        """Return them with the curve of the strength that is most likely (Nelder and Mead 1965)."""
+    def bent(self, start: float) -> tuple[_Likelihood, float]:
+        """Return them with the most likely curve, and the strength there (Nelder and Mead 1965)."""
         effect = self.candidate.effect
         keys = (effect.strength, *MORE)
         limits = [bounds_of(effect.name, key) for key in keys]
-        first = np.array([start, 0.0, 0.0])
+        first = np.array([start, *(self.candidate.shape[key] for key in MORE)])
         by = np.array([0.05 * (high - low) for low, high in limits])
 
         def at(x: Floats) -> tuple[_Likelihood, float]:
@@ -286,7 +292,7 @@ class _Likelihood:
                 "fatol": 0.05,
             },
         )
-        return at(found.x)[0]
+        return at(found.x)
 
 
 class _alone:  # noqa: N801 - a function of two steps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from zfcal.diagnose.candidates import Candidate
 from zfcal.model.effects.base import EffectParameter
-from zfcal.model.kernels.curves import CUES, has_curve, knots_of, strengths_of
+from zfcal.model.kernels.curves import CUES, has_curve, knots_of, strengths_at_knots
 
 _AT_ITS_END = 0.01
 """Share of a range within which a strength is at its end: the fit went as far as it may."""
@@ -24,9 +24,13 @@ def says(
     """
     effect = candidate.effect
     (strength,) = (each for each in effect.parameters if each.name == effect.strength)
-    turned = max(strengths_of(values, effect.strength), key=abs) < 0 and effect.opposite
+    turned = max(_at_knots(strength, values), key=abs) < 0 and effect.opposite
     size = _curve(strength, values) if has_curve(values) else _size(strength, values, interval)
     return f"{effect.opposite if turned else effect.says} {size}"
+
+
+def _at_knots(strength: EffectParameter, values: dict[str, float]) -> tuple[float, ...]:
+    return strengths_at_knots(values, strength.name, (strength.low, strength.high))
 
 
 def _curve(strength: EffectParameter, values: dict[str, float]) -> str:
@@ -34,7 +38,7 @@ def _curve(strength: EffectParameter, values: dict[str, float]) -> str:
     says, unit = CUES[int(values["by"])]
     at = [
         f"{own:.3g} at {knot:.3g}{f' {unit}' if unit else ''}"
-        for knot, own in zip(knots_of(values), strengths_of(values, strength.name), strict=True)
+        for knot, own in zip(knots_of(values), _at_knots(strength, values), strict=True)
     ]
     name = strength.name.replace("_", " ")
     return f"Fitted {name} by {says}: {', '.join(at)}. {strength.says}"

@@ -166,7 +166,7 @@ class _TerminatedError(BaseException):
 def _serve(pipe: Connection, job: Job, niceness: int) -> None:
     """Carry out orders until nobody gives any."""
     # SIGTERM may come at any moment, while the process still prepares itself too.
-    with contextlib.suppress(EOFError, OSError, _TerminatedError):
+    with contextlib.suppress(_TerminatedError):
         signal.signal(signal.SIGTERM, _terminate)
         # Ctrl-C goes to all processes of the terminal; whoever gives the orders ends this one.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -174,8 +174,9 @@ def _serve(pipe: Connection, job: Job, niceness: int) -> None:
         if hasattr(os, "nice"):
             os.nice(niceness)
         _hand_on_logs(pipe.send)
-        while True:
-            pipe.send(_answer(job, pipe.recv(), pipe.send))
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                pipe.send(_answer(job, pipe.recv(), pipe.send))
 
 
 def _answer(job: Job, order: object, tell: Tell) -> Done | Failure:

@@ -25,8 +25,8 @@ This page is made by `make effects-page` from the files in `zfcal/model/effects/
 _CURVES = """
 ## Curves
 
-The strength of any effect that is no delay may go by something, such as the distance to the
-nearest:
+The strength of any effect that is no delay and no rest may go by something, such as the distance to
+the nearest:
 
     [effects.{name}]
     {strength} = 0.1

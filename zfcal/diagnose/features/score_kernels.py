@@ -136,6 +136,8 @@ def weighed(columns: tuple[Floats, Floats], weights: Floats) -> tuple[Floats, Fl
         Of each source, shape (step, source).
     weights : ndarray, shape (step, source, weight)
     """
+    if columns[0].shape != weights.shape[:2]:  # Which compiled code would not notice.
+        raise ValueError(f"Weights {weights.shape} are of other sources than {columns[0].shape}.")
     at, over = np.empty((2, len(weights), weights.shape[2]))
     write_weighed(columns, np.ascontiguousarray(weights), (at, over))
     return at, over

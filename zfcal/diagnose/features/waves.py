@@ -58,6 +58,8 @@ def concentrated(kappa: Floats | float, n_steps: int) -> tuple[Floats, Ints, Flo
     scale = 1 / (2 * math.pi * i0e(known))
     if len(known) == n_steps:
         return known, order, series, scale[:, None]
+    if len(known) != 1:
+        raise ValueError(f"Expected one kappa, or one for each of {n_steps} steps: {len(known)}.")
     # One for all steps, of which none is looked up by itself.
     return np.full(n_steps, known[0]), np.zeros(n_steps, dtype=np.int64), series, scale[:, None]
 

@@ -39,7 +39,7 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.errors import InputError
 from zfcal.model.features import Feature
-from zfcal.model.kernels.curves import CUES, KNOTS, MORE, has_curve, knots_of
+from zfcal.model.kernels.curves import CUES, KNOTS, MORE, check_curve, has_curve
 from zfcal.model.paces import Pace, PaceFeature
 
 MAX_PARAMETERS = 8
@@ -85,7 +85,7 @@ def curve_of(low: float, high: float) -> tuple[EffectParameter, ...]:
     cues = ", ".join(f"{number} {says}" for number, (says, _) in enumerate(CUES))
     own = [
         ("by", 0.0, len(CUES) - 1.0, f"What the strength goes by: {cues}."),
-        *((name, -1e5, 1e5, "Of the cue, ascending.") for name in KNOTS),
+        *((name, -1e9, 1e9, "Of the cue, ascending.") for name in KNOTS),
         ("more_1", low - high, high - low, "Strength beyond its own at and below the first knot."),
         ("more_3", low - high, high - low, "Strength beyond its own at and above the last knot."),
     ]
@@ -306,9 +306,13 @@ class Effect:
 
     @property
     def curve(self) -> tuple[EffectParameter, ...]:
-        """Parameters that it may have besides: see `curve_of`."""
+        """Parameters that it may have besides: see `curve_of`.
+
+        A delay is the same for all that is seen, and how often fish rest goes by the zone alone.
+        """
         own = next((each for each in self.parameters if each.name == self.strength), None)
-        return () if own is None else curve_of(own.low, own.high)
+        none = own is None or self.lag is not None or self.rests
+        return () if own is None or none else curve_of(own.low, own.high)
 
     def parameter(self, name: str) -> EffectParameter:
         """Return the parameter of a name, one of its curve as well."""
@@ -378,20 +382,17 @@ class Effect:
         InputError
             A name that the effect does not have, or a value out of bounds.
         """
-        known = {parameter.name: parameter for parameter in self.parameters}
-        curve = {parameter.name: parameter for parameter in self.curve}
+        curve = self.curve if given.keys() - set(self.names) else ()
+        known = {parameter.name: parameter for parameter in (*self.parameters, *curve)}
         for name, value in given.items():
-            if name not in {**known, **curve}:
+            if name not in known:
                 raise InputError(
                     f"Effect {self.name!r} has no parameter {name!r}; it has {list(known)}."
                 )
-            found = {**known, **curve}[name]
-            low, high = found.low, found.high
+            low, high = known[name].low, known[name].high
             if not (low <= value <= high and math.isfinite(value)):
                 raise InputError(
                     f"Effect {self.name!r}: {name} must be in [{low:g}, {high:g}], got {value!r}."
                 )
-        if has_curve(given) and self.lag is not None:
-            raise InputError(f"Effect {self.name!r} has no curve: a delay is the same for all.")
-        knots_of(given)
-        return tuple(given.get(name, parameter.default) for name, parameter in known.items())
+        check_curve(self.name, given)
+        return tuple(given.get(each.name, each.default) for each in self.parameters)

@@ -67,25 +67,46 @@ def has_curve(given: Mapping[str, float]) -> bool:
 
 
 def knots_of(given: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return the knots of an effect's curve; zeros where it has none.
+    """Return the knots of an effect's curve; zeros where it has none."""
+    first, middle, last = (given.get(name, 0.0) for name in KNOTS)
+    return first, middle, last
+
+
+def check_curve(name: str, given: Mapping[str, float]) -> None:
+    """Refuse a curve that is none.
+
+    Parameters
+    ----------
+    name
+        Of the effect.
+    given
+        Its parameters.
 
     Raises
     ------
     InputError
-        They do not ascend, or there is no such cue.
+        The knots do not ascend, there is no such cue, or there are knots and none.
     """
-    first, middle, last = (given.get(name, 0.0) for name in KNOTS)
     if has_curve(given):
-        if not first < middle < last:
-            raise InputError(
-                f"knot_1, knot_2 and knot_3 must ascend, got {first:g}, {middle:g} and {last:g}.",
-                hint="They are values of what the strength goes by, from the lowest on.",
-            )
+        first, middle, last = knots_of(given)
         if given["by"] != int(given["by"]):
             raise InputError(
-                f"by must be a whole number, 0 to {len(CUES) - 1}, got {given['by']:g}."
+                f"Effect {name!r}: by must be a whole number from 0 to {len(CUES) - 1}, "
+                f"got {given['by']:g}."
             )
-    return first, middle, last
+        if not first < middle < last:
+            raise InputError(
+                f"Effect {name!r}: knot_1, knot_2 and knot_3 must ascend, got {first:g}, "
+                f"{middle:g} and {last:g}.",
+                hint="With `by` each of them is needed: a value of what the strength goes by.",
+            )
+        return
+    idle = [key for key in (*KNOTS, *MORE) if key in given]
+    if idle:
+        raise InputError(
+            f"Effect {name!r}: {', '.join(idle)} stand without `by`, and would do nothing.",
+            hint="Say by what the strength goes, such as by = 4, or leave them out.",
+        )
 
 
 def strengths_at(given: Mapping[str, float], strength: float, ends: tuple[float, float]) -> Floats:
@@ -105,7 +126,9 @@ def strengths_at(given: Mapping[str, float], strength: float, ends: tuple[float,
     return np.clip(strength + more, *ends)
 
 
-def strengths_of(given: Mapping[str, float], strength: str) -> tuple[float, ...]:
+def strengths_at_knots(
+    given: Mapping[str, float], strength: str, ends: tuple[float, float]
+) -> tuple[float, ...]:
     """Return the strength at each knot of an effect's curve; the one that it has without a curve.
 
     Parameters
@@ -114,11 +137,12 @@ def strengths_of(given: Mapping[str, float], strength: str) -> tuple[float, ...]
         Parameters of an effect.
     strength
         Name of its strength.
+    ends
+        Bounds of it, within which it stays.
     """
     own = given[strength]
-    if not has_curve(given):
-        return (own,)
-    return own + given[MORE[0]], own, own + given[MORE[1]]
+    more = (given[MORE[0]], 0.0, given[MORE[1]]) if has_curve(given) else (0.0,)
+    return tuple(min(max(own + each, ends[0]), ends[1]) for each in more)
 
 
 def cue_named(given: Mapping[str, float]) -> str:

@@ -16,7 +16,7 @@ from zfcal.model.kernels.hooks import (
     call_sight,
     call_speed,
 )
-from zfcal.model.kernels.state import Packed, parameters_at
+from zfcal.model.kernels.state import Packed, goes_by_each, parameters_at
 
 _HARDLY = 1e-6
 
@@ -44,11 +44,16 @@ def attend(
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
         for h in range(packed.sights.shape[0]):
+            kind = packed.sights[h, 1]
+            each = goes_by_each(packed, 0, kind)
+            own = parameters_at(packed, 0, kind, states[at[s]], row, i, -1)
             for j in range(n):
                 if row[i * n + j] > 0.0:
+                    if each:
+                        own = parameters_at(packed, 0, kind, states[at[s]], row, i, j)
                     row[i * n + j] *= call_sight(
                         packed.sights[h, 0], states[at[s]].ctypes.data, row.ctypes.data, n, i,
-                        parameters_at(packed, 0, packed.sights[h, 1], states[at[s]], row, i, j), j,
+                        own, j,
                     )  # fmt: skip
         for j in range(n):
             changed[s, j] = row[i * n + j]

@@ -18,6 +18,7 @@ from zfcal.model.kernels.state import (
     Packed,
     X,
     Y,
+    goes_by_each,
     parameters_at,
     sight_row,
 )
@@ -106,12 +107,17 @@ def look(state: Floats, model: int, packed: Packed, sight: Sight) -> None:
 def _attend(state: Floats, model: int, packed: Packed, sight: Sight) -> None:
     n = state.shape[1]
     for h in range(packed.sights.shape[0]):
-        for k in range(n * n):
-            if sight.angle_sr[k] > 0.0:
-                i, j = k // n, k % n
-                sight.angle_sr[k] *= call_sight(
-                    packed.sights[h, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
-                    n, i,
-                    parameters_at(packed, model, packed.sights[h, 1], state, sight.angle_sr, i, j),
-                    j,
-                )  # fmt: skip
+        row = packed.sights[h, 1]
+        each = goes_by_each(packed, model, row)
+        for i in range(n):
+            # Before any is changed: how many are seen does not depend on their order.
+            own = parameters_at(packed, model, row, state, sight.angle_sr, i, -1)
+            for j in range(n):
+                k = i * n + j
+                if sight.angle_sr[k] > 0.0:
+                    if each:
+                        own = parameters_at(packed, model, row, state, sight.angle_sr, i, j)
+                    sight.angle_sr[k] *= call_sight(
+                        packed.sights[h, 0], state.ctypes.data, sight.angle_sr.ctypes.data,
+                        n, i, own, j,
+                    )  # fmt: skip

@@ -58,6 +58,8 @@ def products(own: Floats, by: Floats) -> Floats:
         The circumstances of the first weight come first.
     """
     n_steps, n_sources, n_weights = own.shape
+    if by.shape[:2] not in {(n_steps, n_sources), (n_steps, 1)}:
+        raise ValueError(f"Circumstances {by.shape} are of other sources than {own.shape}.")
     made = np.empty((n_steps, n_sources, n_weights, by.shape[2]))
     write_products(_plain(own), _plain(by), made)
     return made.reshape(n_steps, n_sources, n_weights * by.shape[2])

@@ -12,6 +12,7 @@ from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.curves import (
     BY_BEARING,
+    BY_DISTANCE,
     BY_NEAREST,
     BY_NUMBER,
     BY_SPEED,
@@ -353,6 +354,12 @@ def cue_of(cue: int, state: Floats, sight: Floats, i: int, j: int) -> float:
 def _apart(x: float, y: float, to_x: float, to_y: float) -> float:
     """Return the angle between two vectors, from 0 to pi."""
     return abs(math.atan2(x * to_y - y * to_x, x * to_x + y * to_y))
+
+
+@inlined
+def goes_by_each(packed: Packed, model: int, row: int) -> bool:
+    """Tell whether the strength of an effect on sight goes by each neighbour by itself."""
+    return packed.curves.shape[1] > 0 and packed.curves[model, row, CUE] >= BY_DISTANCE
 
 
 @inlined
