@@ -1,6 +1,7 @@
 """Features of effects: hat functions, and what each name asks of a step."""
 
 import dataclasses
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -325,7 +326,9 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     for each in late:
         if each.instead is not True:
             is_far = any(word in each.label for word in ("by the", "by who", "far ones"))
-            counts = seen.distance_m > 0.06 if is_far else seen.distance_m > 0
+            beyond_m = re.search(r"beyond ([\d.]+) m", each.label)
+            least_m = float(beyond_m[1]) if beyond_m else 0.06 if is_far else 0.0
+            counts = seen.distance_m > least_m
             np.testing.assert_allclose(
                 each.instead(seen).sum(axis=-1), seen.attention * counts, err_msg=each.label
             )
