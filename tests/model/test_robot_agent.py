@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from zfcal.artifacts.arenas import load_arena
+from zfcal.model.kernels.curves import BY_NEAREST
 from zfcal.model.onestep import draw_headings
 from zfcal.model.packing import pack
 from zfcal.model.robot_agent import Among
@@ -98,6 +99,20 @@ def test_effects_take_part():
     aligned = headings(among(others), with_effects(alignment={"weight": 50.0, "kappa": 12.0}), 1500)
     near = [np.mean(np.cos(found - 2.5)) for found in (plain, aligned)]
     assert near[1] > near[0] + 0.2
+
+
+def test_curves_take_part():
+    """A robot among others that are near turns as one with the strength of its curve there."""
+    knots = {"knot_1": 1.0, "knot_2": 2.0, "knot_3": 3.0}
+    bent = {"weight": 0.0, "more_1": 50.0, "more_3": 0.0, "by": float(BY_NEAREST)} | knots
+    others = OTHERS.copy()
+    others[:, 2] = 2.5
+    plain, flat, near = (
+        headings(among(others), with_effects(alignment={"kappa": 12.0} | values), 300)
+        for values in ({"weight": 50.0}, bent | {"more_1": 0.0}, bent)
+    )
+    np.testing.assert_array_equal(near, plain)
+    assert np.mean(np.cos(near - 2.5)) > np.mean(np.cos(flat - 2.5)) + 0.2
 
 
 def test_a_model_without_turns_forgets_those_of_the_one_before():
