@@ -130,6 +130,18 @@ def _cell_zone(share: NDArray[np.uint8], probability: Floats, s: int, g: int) ->
     return zone
 
 
+@inlined
+def _parameters_of(packed: Packed, state: Floats, row: Floats, i: int, own: Ints) -> None:
+    """Write the addresses of parameters of the effects' factors, the same for all headings.
+
+    Parameters
+    ----------
+    own : ndarray of int64, shape (factor,)
+    """
+    for h in range(own.size):
+        own[h] = parameters_at(packed, 0, packed.factors[h, 1], state, row, i, -1)
+
+
 @kernel
 def ask_factors(
     states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
@@ -151,7 +163,7 @@ def ask_factors(
         At the heading taken.
     """
     n, cells = states.shape[2], share.shape[1]
-    row = np.zeros(n * n)
+    row, own = np.zeros(n * n), np.zeros(packed.factors.shape[0], dtype=np.int64)
     gx, gy = np.empty(cells), np.empty(cells)
     for g in range(cells):
         gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
@@ -160,6 +172,7 @@ def ask_factors(
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
         state = states[at[s]]
+        _parameters_of(packed, state, row, i, own)
         for g in range(-1, cells):
             ux, uy, zone = taken[s, 0], taken[s, 1], landing[s]
             if g >= 0:
@@ -168,8 +181,7 @@ def ask_factors(
             if zone > 0:
                 for h in range(packed.factors.shape[0]):
                     product *= call_factor(
-                        packed.factors[h, 0], state.ctypes.data, row.ctypes.data, n, i,
-                        parameters_at(packed, 0, packed.factors[h, 1], state, row, i, -1),
+                        packed.factors[h, 0], state.ctypes.data, row.ctypes.data, n, i, own[h],
                         ux, uy, speed_m_s[s], zone,
                     )  # fmt: skip
             if g >= 0:
@@ -182,13 +194,15 @@ def ask_factors(
 
 @inlined
 def _log_factor(
-    packed: Packed, state: Floats, row: Floats, i: int, heading: tuple[float, float],
-    speed_m_s: float, landing: int,
+    packed: Packed, own: Ints, state: Floats, row: Floats, i: int,
+    heading: tuple[float, float], speed_m_s: float, landing: int,
 ) -> float:  # fmt: skip
     """Return the log of the product of the effects' factors at one heading.
 
     Parameters
     ----------
+    own
+        As `_parameters_of` writes them.
     state : ndarray, shape (row, agent)
     row : ndarray, shape (agent * agent,)
         What is seen.
@@ -198,8 +212,7 @@ def _log_factor(
     product = 1.0
     for h in range(packed.factors.shape[0]):
         product *= call_factor(
-            packed.factors[h, 0], state.ctypes.data, row.ctypes.data, state.shape[1], i,
-            parameters_at(packed, 0, packed.factors[h, 1], state, row, i, -1),
+            packed.factors[h, 0], state.ctypes.data, row.ctypes.data, state.shape[1], i, own[h],
             heading[0], heading[1], speed_m_s, landing,
         )  # fmt: skip
     return math.log(max(product, 1e-300))
@@ -238,7 +251,7 @@ def ask_harmonics(
         At the heading taken.
     """
     n, points = states.shape[2], waves.shape[1]
-    row = np.zeros(n * n)
+    row, own = np.zeros(n * n), np.zeros(packed.factors.shape[0], dtype=np.int64)
     gx, gy = np.empty(points), np.empty(points)
     for p in range(points):
         gx[p], gy[p] = math.cos(2 * math.pi * p / points), math.sin(2 * math.pi * p / points)
@@ -248,8 +261,9 @@ def ask_harmonics(
         for j in range(n):
             row[i * n + j] = angle_sr[s, j]
         state = states[at[s]]
+        _parameters_of(packed, state, row, i, own)
         for p in range(points):
-            value[p] = _log_factor(packed, state, row, i, (gx[p], gy[p]), speed_m_s[s], 1)
+            value[p] = _log_factor(packed, own, state, row, i, (gx[p], gy[p]), speed_m_s[s], 1)
         waves[s] = 0.0
         for p in range(points):
             waves[s, 0] += value[p] / points
@@ -259,7 +273,7 @@ def ask_harmonics(
         zones[s] = 0.0
         if by_landing:
             for z in range(1, zones.shape[1]):
-                there = _log_factor(packed, state, row, i, (gx[0], gy[0]), speed_m_s[s], z + 1)
+                there = _log_factor(packed, own, state, row, i, (gx[0], gy[0]), speed_m_s[s], z + 1)
                 zones[s, z] = there - value[0]
         log_taken[s] = _polynomial(waves[s], taken[s, 0], taken[s, 1]) + zones[s, landing[s] - 1]
         for j in range(n):
