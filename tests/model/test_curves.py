@@ -1,4 +1,4 @@
-"""Effects whose strength goes by something: time, speed, turn, zone, company, who it is."""
+"""Effects whose strength goes by something: time, speed, turn, zone, company, the other."""
 
 from __future__ import annotations
 
@@ -74,6 +74,8 @@ def test_levels_are_even_between_knots_and_end_at_them():
     knots = (1.0, 2.0, 10.0)
     found = [level_of(value, *knots) for value in (-5.0, 1.0, 1.5, 2.0, 6.0, 10.0, 1e9)]
     assert found == [0, 0, LEVELS // 4, LEVELS // 2, 3 * LEVELS // 4, LEVELS - 1, LEVELS - 1]
+    # Of what nobody knows there is a level all the same: another one would be no row.
+    assert level_of(math.nan, *knots) == 0
 
 
 def test_a_strength_stays_within_its_bounds():
@@ -117,23 +119,26 @@ def test_a_step_is_that_of_the_strength_at_its_cue(case, model, two_rooms):
     assert np.abs(density(bent) - plain).max() > 1e-3
 
 
-def test_a_step_at_a_knot_has_the_strength_of_the_knot(model, two_rooms):
-    """The nearest of the first fish is at 3 cm, that of the others farther."""
+@pytest.mark.parametrize(
+    ("knots", "ends", "strength"),
+    [
+        ((0.03, 0.1, 0.2), (0.5, 0.0), 0.9),
+        ((0.02, 0.04, 0.2), (0.25, 0.0), 0.525),
+        ((0.0, 0.01, 0.02), (0.0, -0.3), 0.1),
+    ],
+    ids=["at the first", "half-way to the middle", "beyond the last"],
+)
+def test_a_step_has_the_strength_of_its_place_on_the_curve(knots, ends, strength, model, two_rooms):
+    """The nearest of the first fish is at 3 cm; at the middle knot the strength is 0.4."""
+    bent = {"strength": 0.4} | curve(curves.BY_NEAREST, knots, *ends)
     seen = {"xy_m": AWAY_M, "heading_rad": [0.4, 1.0, 2.0], "speed_m_s": 0.05}
-    for more, knots in (
-        (0.5, (0.03, 0.1, 0.2)),
-        (0.25, (0.02, 0.04, 0.2)),
-        (-0.3, (0.0, 0.01, 0.02)),
-    ):
-        ends = (more, 0.0) if knots[0] >= 0.02 else (0.0, more)
-        bent = {"strength": 0.4} | curve(curves.BY_NEAREST, knots, *ends)
-        found, expected = (
-            heading_density(
-                dataclasses.replace(model, effects={"turning-bias": values}), two_rooms, **seen
-            )[1]
-            for values in (bent, {"strength": 0.4 + (0.125 if knots[1] == 0.04 else more)})
-        )
-        assert found == pytest.approx(expected, abs=1e-9)
+    found, expected = (
+        heading_density(
+            dataclasses.replace(model, effects={"turning-bias": values}), two_rooms, **seen
+        )[1]
+        for values in (bent, {"strength": strength})
+    )
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("case", ["time", "zone"])

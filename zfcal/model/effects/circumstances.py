@@ -133,7 +133,7 @@ Those of the time are shares of a recording.
 _SHARE_OF_TIME = "share of the recording that has passed"
 
 _BY_CUE = {
-    **{cue_named({"by": by}): by for by in (BY_NEAREST, BY_DISTANCE, BY_BEARING)},
+    **{cue_named(by): by for by in (BY_NEAREST, BY_DISTANCE, BY_BEARING)},
     _SHARE_OF_TIME: BY_TIME,
 }
 """What a strength goes by where a feature's own weights go by a cue."""
@@ -229,7 +229,7 @@ def along_under(label: str, n_strengths: int) -> Along | None:
     by, knots = CURVES.get(label.rpartition(_BY)[2], (NOTHING, _TIMES))
     if by in {NOTHING, BY_ZONE} or n_strengths != len(knots):
         return None
-    cue = _SHARE_OF_TIME if by == BY_TIME else cue_named({"by": by})
+    cue = _SHARE_OF_TIME if by == BY_TIME else cue_named(by)
     return Along(cue=cue, knots=knots)
 
 

@@ -145,7 +145,7 @@ def strengths_at_knots(
     return tuple(min(max(own + each, ends[0]), ends[1]) for each in more)
 
 
-def cue_named(given: Mapping[str, float]) -> str:
-    """Return what the strength of an effect goes by, with its unit."""
-    says, unit = CUES[int(given["by"])]
+def cue_named(by: int) -> str:
+    """Return what a strength goes by, with its unit."""
+    says, unit = CUES[by]
     return f"{says} ({unit})" if unit else says
