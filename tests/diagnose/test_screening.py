@@ -130,6 +130,23 @@ def test_components_are_asked_for_where_a_whole_turn_would_draw_them(base, candi
     assert np.corrcoef(likely, np.tanh(gained[known]))[0, 1] > 0.8
 
 
+def test_a_component_about_another_way_below_zero_is_asked_on_both_sides(screen, candidate):
+    """Of fish drawn back from their last turn the score is that of headings drawn back.
+
+    They are not merely drawn on less: that says next to nothing of the headings drawn back.
+    """
+    own = screen(29, {"turning-memory": {"strength": -1.5, "drawn": 1.0}})
+    asked, model = candidate("turning-memory", drawn=1.0), own.fitted.parameters
+    score = own.ask(asked)
+    assert score.z < -5
+    assert score.strength < 0
+    added = with_effect(model, "turning-memory", asked.values(-asked.notable))
+    gained = maximise(own.scene, added, start=own.fitted.x, rounds=0).log_p - own.fitted.log_p
+    scores, known = own.heading_scores(own.scene, asked), np.isfinite(gained)
+    likely = np.tanh(-asked.notable * scores[known])
+    assert np.corrcoef(likely, np.tanh(gained[known]))[0, 1] > 0.8
+
+
 def test_a_mirrored_bias_has_the_other_sign(screen, candidate):
     """Left and right differ by nothing else: like sizes of z, other signs."""
     left = screen(23, {"turning-bias": {"strength": 0.4}}).ask(candidate("turning-bias"))

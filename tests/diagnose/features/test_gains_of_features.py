@@ -137,6 +137,56 @@ def test_lapses_of_one_zone_are_no_effect(base, hidden):
     assert tell(gains_of(law, all_effects())) is None
 
 
+def test_what_fish_swim_away_from_is_a_place(base, hidden):
+    """Near a spot some headings are drawn about the way from there: no spot draws them so."""
+    scene, fitted = base
+    mixture, _, _ = fitted.tables()
+    off = scene.states[scene.turns.at, :2, scene.turns.who] - (0.3, 0.7)
+    near, away = np.linalg.norm(off, axis=1) < 0.15, np.arctan2(off[:, 1], off[:, 0])
+
+    def factor(angle):
+        return 1 + 0.2 * near[:, None] * bump(angle, away, 4.0) / np.maximum(mixture, 1e-12)
+
+    kinds = {("place-preference", kind) for kind in ("drawn", "driven away", "leaning")}
+    found = gains_of(hidden(factor), [find_effect("place-preference")], kinds=kinds)
+    best = max(found, key=lambda each: each.nats)
+    assert best.kind == "driven away"
+    assert best.nats > 2 * max(each.nats for each in found if each.kind != best.kind)
+
+
+def test_fish_that_turn_less_when_fast_are_told(base, hidden):
+    """Beyond 0.1 m/s a turn of more than 60 degrees is seldom, below it as the model has it."""
+    scene, _ = base
+    turns = scene.turns
+    own = np.arctan2(turns.heading[:, 1], turns.heading[:, 0])
+    fast = turns.speed_m_s > 0.1
+
+    def factor(angle):
+        return np.where(fast[:, None] & (np.cos(angle - own[:, None]) < 0.5), 0.3, 1.0)
+
+    coupling = find_effect("speed-turn-coupling")
+    found = gains_of(hidden(factor), [coupling])
+    best = max(found, key=lambda each: each.nats)
+    assert best.label == "turning less, faster than 0.1 m/s"
+    assert best.p < 1e-6
+
+
+def test_turns_off_the_walls_are_those_everywhere_but_along_walls(nothing):
+    """Of all names that have both, and of each weight."""
+    seen, named = nothing.law.draws[0].seen, []
+    walls = seen.follows_walls
+    for effect in all_effects():
+        for feature in effect.features(nothing.law.scene.arena):
+            first = feature.features[0] if isinstance(feature, OneOf) else feature
+            if not isinstance(first, Turned) or len(getattr(feature, "features", ())) != 2:
+                continue
+            everywhere, off_walls = (each.by(seen) for each in feature.features)
+            np.testing.assert_array_equal(off_walls[~walls], everywhere[~walls])
+            assert not off_walls[walls].any()
+            named.append(effect.name)
+    assert len(named) == 7
+
+
 @pytest.mark.parametrize("name", ["alignment", "turning-bias", "collective-departure"])
 def test_more_strengths_never_lose(nothing, name):
     """At worst they are zero: the log likelihood is that of the base."""
@@ -187,6 +237,7 @@ def test_features_are_asked_by_kind(nothing):
     kinds = [kind_of(each) for each in effects[1].features(nothing.law.scene.arena)]
     assert kinds == [
         "drawn",
+        "driven away",
         "leaning",
         "turning",
         "turning as a whole",

@@ -49,6 +49,18 @@ def test_fish_gather_at_a_place_or_shun_it(swim):
     assert share(-1.5) < plain / 2
 
 
+def test_some_headings_are_drawn_to_a_place_or_from_it(ask):
+    """A component of the same weight about the bearing, or about the way from there."""
+    place = {"x_m": 0.4, "y_m": 0.6, "drawn": 1.0, "kappa": 5.0}
+    to, away = (
+        ask("place-preference", {"strength": strength, **place}, X=0.4, Y=0.5).component()
+        for strength in (0.7, -0.7)
+    )
+    assert to[0] == away[0] > 0
+    np.testing.assert_allclose(to[1], (0.0, 1.0, 5.0), atol=1e-12)
+    np.testing.assert_allclose(away[1], (0.0, -1.0, 5.0), atol=1e-12)
+
+
 def test_just_after_another_left_a_fish_heads_for_the_way_out(ask):
     """Toward the mouth against away from it: e^(2 s) at once, e^s after the memory's length."""
     asked = ask(

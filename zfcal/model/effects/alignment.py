@@ -28,6 +28,7 @@ from zfcal.model.effects.weights import (
     mean_heading,
     seen_and_nearest,
     to_one_sense,
+    turning_as_a_whole,
 )
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
@@ -287,7 +288,7 @@ _FEATURES: tuple[Feature, ...] = (
     _TURNING,
     by_circumstances(_TURNING),
     by_circumstances(_leaning_to_mean(_COMPANY_M, off_walls=False)),
-    Turned(label="turning as a whole", by=_toward_mean, neighbours=True, low=0.0),
+    turning_as_a_whole(_toward_mean, low=0.0),
     Turned(label="turning as the nearest", by=_toward_nearest, neighbours=True, low=0.0),
 )  # fmt: skip
 

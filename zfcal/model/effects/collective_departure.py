@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import shapely
@@ -21,7 +22,14 @@ from zfcal.model.effects.forms import (
     turn_to,
     way_out,
 )
-from zfcal.model.effects.weights import LEANING_OUT, aside_of, every_step, only, who
+from zfcal.model.effects.weights import (
+    LEANING_OUT,
+    aside_of,
+    every_step,
+    only,
+    turning_as_a_whole,
+    who,
+)
 from zfcal.model.features import (
     Along,
     Component,
@@ -181,8 +189,9 @@ def _leaning(seen: Seen) -> Floats:
     return np.asarray(_freshly_left(seen)[..., None] * seen.way_out[:, None])
 
 
-def _turning(seen: Seen) -> Floats:
-    return np.asarray(aside_of(seen, only(seen.way_out)) * _freshly_left(seen))
+def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
+    aside = aside_of(seen, only(seen.way_out), along_walls=along_walls)
+    return np.asarray(aside * _freshly_left(seen))
 
 
 def _elsewhere(rooms: Sequence[shapely.Geometry]) -> Weights:
@@ -226,6 +235,11 @@ _FEATURES: tuple[Feature, ...] = (
         alone=LEANING_OUT,
     ),
     Turned(label="turning to the way out", by=_turning, neighbours=False, along=_BY_TIME),
+    turning_as_a_whole(
+        partial(_turning, along_walls=True),
+        label="turning to the way out as a whole",
+        along=_BY_TIME,
+    ),
 )
 
 

@@ -22,7 +22,7 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import LEANING_OUT, aside_of, only
+from zfcal.model.effects.weights import LEANING_OUT, aside_of, only, turning_as_a_whole
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -205,7 +205,7 @@ _FEATURES: tuple[Feature, ...] = (
     OneOf(kind="leaning to and fro", features=tuple(_swinging(k / 2) for k in range(2, 25))),
     OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
-    Turned(label="turning as a whole", by=partial(_aside, along_walls=True), neighbours=True),
+    turning_as_a_whole(partial(_aside, along_walls=True)),
     Tilt(label="carried", vectors=_carried),
 )
 

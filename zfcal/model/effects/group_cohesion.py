@@ -24,7 +24,14 @@ from zfcal.model.effects.forms import (
     tilt,
     turn_to,
 )
-from zfcal.model.effects.weights import aside_of, every_step, halfway, only, seen_and_nearest
+from zfcal.model.effects.weights import (
+    aside_of,
+    every_step,
+    halfway,
+    only,
+    seen_and_nearest,
+    turning_as_a_whole,
+)
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats, hats_where
@@ -262,10 +269,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0, along=_TO_EACH),
     Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0, along=_TO_NEAREST),
     Turned(label="turning", by=_turning, neighbours=False, low=0.0, along=_TO_MIDDLE),
-    Turned(
-        label="turning as a whole", by=partial(_turning, along_walls=True), neighbours=True,
-        low=0.0, along=_TO_MIDDLE,
-    ),
+    turning_as_a_whole(partial(_turning, along_walls=True), low=0.0, along=_TO_MIDDLE),
     Turned(
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
         along=_TO_NEAREST,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -31,14 +32,19 @@ _AT_IT_M = 0.02
 
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Add a component about the bearing of the place; far from it less, and at it not at all."""
+    """Add a component about the bearing of the place; far from it less, and at it not at all.
+
+    Of a strength below 0 it is about the way from there.
+    """
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
     is_drawn = parameters[4] > 0.0 and not parameters[6] > 0.0
-    if not (away > 0.0 and is_drawn and parameters[0] > 0.0):
+    if not (away > 0.0 and is_drawn):
         return 0.0
-    out[0], out[1], out[2] = dx / away, dy / away, parameters[5]
-    return parameters[0] * away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    along = math.copysign(1.0, parameters[0]) / away
+    out[0], out[1], out[2] = along * dx, along * dy, parameters[5]
+    pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
+    return abs(parameters[0]) * pull
 
 
 @hook(FACTOR)
@@ -140,6 +146,7 @@ def _features(arena: Arena) -> tuple[Feature, ...]:
     walls = [end for end in arena.segments_m if np.hypot(*(end[2:] - end[:2])) > _WALL_M]
     sorts = (
         ("drawn", _drawn),
+        ("driven away", _driven_away),
         ("leaning", _leaning),
         ("turning", _turning),
         ("turning as a whole", _turning_as_a_whole),
@@ -230,6 +237,16 @@ def _drawn(spot: Floats, room: shapely.Polygon | None) -> Component:
     )
 
 
+def _driven_away(spot: Floats, room: shapely.Polygon | None) -> Component:
+    """Return a component about the way from a place."""
+    drawn = _drawn(spot, room)
+    return replace(
+        drawn,
+        label=f"driven from {spot[0]:.2f}, {spot[1]:.2f}",
+        toward=lambda seen: -only(_to(seen, spot)[0]),
+    )
+
+
 def _leaning(spot: Floats, room: shapely.Polygon | None) -> Tilt:
     def vectors(seen: Seen) -> Floats:
         toward, weights = _toward(seen, spot)
@@ -282,7 +299,7 @@ EFFECT = Effect(
             low=-4.0,
             high=4.0,
             default=1.0,
-            says="Log of the preference for headings toward the place.",
+            says="Log of the preference for headings toward the place; the weight of those drawn.",
         ),
         EffectParameter(
             name="x_m", low=-100.0, high=100.0, default=0.0, says="The place's x, in metres."
@@ -303,7 +320,7 @@ EFFECT = Effect(
             high=1.0,
             default=0.0,
             says="0: all headings lean toward the place; 1: some are drawn about its bearing, with "
-            "the strength as their weight beside the base's one.",
+            "the strength as their weight beside the base's one; below 0 about the way from it.",
         ),
         EffectParameter(
             name="kappa",

@@ -7,6 +7,7 @@ turning less at speed for the model: the same joint law.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,16 @@ from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_under, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
 from zfcal.model.effects.weights import only
-from zfcal.model.features import Along, Component, Feature, Landing, Seen, Sharper, Tilt
+from zfcal.model.features import (
+    Along,
+    Component,
+    Feature,
+    Landing,
+    OneOf,
+    Seen,
+    Sharper,
+    Tilt,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import FACTOR
@@ -88,6 +98,28 @@ def _aside_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
 _TURN_RAD = (0.0, 0.4, 0.8, 1.2, 1.8, 2.8)
 _ASIDE_M = (0.0, 0.01, 0.02, 0.03, 0.045, 0.07)
 
+_FAST_M_S = (0.06, 0.1, 0.14)
+_NO_TURN_RAD = 9.0
+"""More than any turn: what lands there has no weight."""
+
+_TURNING_LESS = Landing(label="turning less", away_m=_turn_rad, knots_m=_TURN_RAD)
+
+
+def _when_fast(least_m_s: float) -> Landing:
+    """Return landings by the turn that leads there, of steps that are faster than some speed."""
+
+    def away_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
+        fast = seen.own_speed_m_s[rows, None] > least_m_s
+        return np.where(fast, _turn_rad(seen, rows, xy_m), _NO_TURN_RAD)
+
+    return replace(
+        _TURNING_LESS,
+        label=f"turning less, faster than {least_m_s:g} m/s",
+        away_m=away_m,
+        over=_TURNING_LESS,
+    )
+
+
 _SCATTERED = 1.0
 """Concentration of headings that are hardly those of the fish."""
 
@@ -129,8 +161,9 @@ _FEATURES: tuple[Feature, ...] = (
         knots_m=_ASIDE_M,
         along=Along(cue="turn times length of the step (m)", knots=_ASIDE_M[:-1]),
         # More than by the turn alone, which would be another law of turns.
-        over=Landing(label="turning less", away_m=_turn_rad, knots_m=_TURN_RAD),
+        over=_TURNING_LESS,
     ),
+    OneOf(kind="turning less when fast", features=tuple(map(_when_fast, _FAST_M_S))),
 )
 
 

@@ -11,7 +11,7 @@ from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import RAD_PER_STRENGTH, leftward, tilt
-from zfcal.model.effects.weights import both_senses, only, to_one_sense
+from zfcal.model.effects.weights import both_senses, only, to_one_sense, turning_as_a_whole
 from zfcal.model.features import Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -98,7 +98,7 @@ _ALONG_WALL = Component(
 )
 
 _FEATURES: tuple[Feature, ...] = (
-    Turned(label="offset", by=_everywhere, neighbours=True),
+    turning_as_a_whole(_everywhere, label="offset"),
     # The base's own direction alone: what is drawn to others stays as it is.
     _OWN_OFFSET,
     by_circumstances(_OWN_OFFSET, without=("who",)),

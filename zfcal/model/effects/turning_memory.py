@@ -11,7 +11,7 @@ from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.effects.weights import only
+from zfcal.model.effects.weights import only, turning_as_a_whole
 from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Sharper, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
@@ -190,6 +190,7 @@ _LEANING = Tilt(label="leaning to the heading before", vectors=_leaning)
 _FEATURES: tuple[Feature, ...] = (
     _OFFSET,
     by_circumstances(_OFFSET, without=("the last turn",)),
+    turning_as_a_whole(lambda seen: seen.last_turn_rad, label="offset as a whole"),
     Turned(label="offset by recent turns", by=lambda seen: seen.recent_turn_rad, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),

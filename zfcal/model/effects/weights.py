@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.circumstances import each_fish, each_under
-from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Weights
+from zfcal.model.features import MOST_SHARPER, Along, Component, OneOf, Seen, Tilt, Turned, Weights
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
@@ -26,6 +29,33 @@ def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats
 def who(seen: Seen) -> Floats:
     """Return one for each fish but one, shape (step, fish): what that one has, all have."""
     return seen.once(each_fish)[:, :-1]
+
+
+def turning_as_a_whole(
+    by: Callable[[Seen], Floats],
+    *,
+    label: str = "turning as a whole",
+    low: float | None = None,
+    along: Along | None = None,
+) -> OneOf:
+    """Return turns of all directions: everywhere, or where fish follow no wall.
+
+    Parameters
+    ----------
+    by
+        Which way the fish of each step turn, along walls too.
+    label
+        Of both.
+    low, along
+        Of a `Turned`.
+    """
+
+    def off_walls(seen: Seen) -> Floats:
+        return np.asarray((by(seen).T * ~seen.follows_walls).T)
+
+    everywhere = Turned(label=label, by=by, neighbours=True, low=low, along=along)
+    elsewhere = replace(everywhere, label=f"{label}, off the walls", by=off_walls)
+    return OneOf(kind=label, features=(everywhere, elsewhere))
 
 
 def both_senses(seen: Seen) -> Floats:
