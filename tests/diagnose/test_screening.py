@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from zfcal.diagnose.candidates import askable, candidates_of
+from zfcal.diagnose.candidates import askable, both_sides, candidate_of, candidates_of
+from zfcal.diagnose.naming import refit
 from zfcal.diagnose.scores import by_track, centred, excess_deviate, summed, tame
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.model.effects import find_effect
@@ -133,18 +134,39 @@ def test_components_are_asked_for_where_a_whole_turn_would_draw_them(base, candi
 def test_a_component_about_another_way_below_zero_is_asked_on_both_sides(screen, candidate):
     """Of fish drawn back from their last turn the score is that of headings drawn back.
 
-    They are not merely drawn on less: that says next to nothing of the headings drawn back.
+    They are not merely drawn on less: that says next to nothing of the headings drawn back. The
+    side is the effect's own, so that it is asked alike where the model has it.
     """
     own = screen(29, {"turning-memory": {"strength": -1.5, "drawn": 1.0}})
-    asked, model = candidate("turning-memory", drawn=1.0), own.fitted.parameters
-    score = own.ask(asked)
-    assert score.z < -5
+    on, back = both_sides(candidate("turning-memory", drawn=1.0))
+    assert (on.asked_at, back.asked_at) == (on.notable, -on.notable)
+    score, model = own.ask(back), own.fitted.parameters
+    assert score.clearness > 5 > own.ask(on).clearness
     assert score.strength < 0
-    added = with_effect(model, "turning-memory", asked.values(-asked.notable))
+    added = with_effect(model, "turning-memory", back.values(back.asked_at))
     gained = maximise(own.scene, added, start=own.fitted.x, rounds=0).log_p - own.fitted.log_p
-    scores, known = own.heading_scores(own.scene, asked), np.isfinite(gained)
-    likely = np.tanh(-asked.notable * scores[known])
+    scores, known = own.heading_scores(own.scene, back), np.isfinite(gained)
+    likely = np.tanh(back.asked_at * scores[known])
     assert np.corrcoef(likely, np.tanh(gained[known]))[0, 1] > 0.8
+    again = candidate_of("turning-memory", back.values(-0.2))
+    assert again == back
+    assert refit(own, score).values["strength"] == pytest.approx(-1.5, rel=0.3)
+    # Nobody is drawn on: less than none of a component is no evidence for it.
+    assert candidate_of("turning-memory", on.values(0.2)).side == 0
+
+
+def test_what_has_no_component_has_no_sides(candidate):
+    """A tilt below zero is less of the same, and nothing is drawn on the other side of none."""
+    for name in ("turning-memory", "collective-departure", "alignment"):
+        assert both_sides(candidate(name)) == (candidate(name),)
+    assert candidate_of("turning-memory", {"strength": -1.0}).side == 0
+
+
+def test_less_than_none_of_a_component_is_no_evidence_for_it(screen, candidate):
+    """Where fish are drawn on, the side on which they would be drawn back is not clear."""
+    own = screen(31, {"turning-memory": {"strength": 1.5, "drawn": 1.0}})
+    on, back = (own.ask(each) for each in both_sides(candidate("turning-memory", drawn=1.0)))
+    assert on.clearness > 5 > back.clearness
 
 
 def test_a_mirrored_bias_has_the_other_sign(screen, candidate):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,10 +31,14 @@ class Candidate:
         What is asked for.
     shape
         All of its parameters but the strength.
+    side
+        Of a component that is about another heading below a strength of zero: 1 or -1, the sign at
+        which it is asked for. Else 0.
     """
 
     effect: Effect
     shape: dict[str, float]
+    side: int = 0
 
     @property
     def name(self) -> str:
@@ -56,6 +60,16 @@ class Candidate:
         """A strength that one would want to notice."""
         (own,) = (p for p in self.effect.parameters if p.name == self.effect.strength)
         return own.default
+
+    @property
+    def asked_at(self) -> float:
+        """The strength at which a component is asked for."""
+        return -self.notable if self.side < 0 else self.notable
+
+    @property
+    def has_sides(self) -> bool:
+        """Whether it has a component, which is about another heading below zero."""
+        return self.signed and self.effect.calls("component", self.values(self.notable))
 
     @property
     def faint(self) -> float:
@@ -98,8 +112,20 @@ def company_of(scene: Scene) -> Company:
 
 
 def candidate_of(name: str, values: Mapping[str, float]) -> Candidate:
-    """Return an effect at the shape that its parameters have, defaults where they have none."""
-    return _at(find_effect(name), values)
+    """Return an effect at the shape that its parameters have, defaults where they have none.
+
+    A component is asked for on the side of its strength.
+    """
+    made = _at(find_effect(name), values)
+    is_below = values.get(made.effect.strength, 0.0) < 0 and made.has_sides
+    return replace(made, side=-1) if is_below else made
+
+
+def both_sides(candidate: Candidate) -> tuple[Candidate, ...]:
+    """Return an effect on both sides of zero, where it has a component that tells them apart."""
+    if not candidate.has_sides:
+        return (candidate,)
+    return replace(candidate, side=1), replace(candidate, side=-1)
 
 
 _LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
@@ -205,7 +231,7 @@ def curved(candidate: Candidate, label: str, scene: Scene) -> Candidate | None:
         if by["by"] == BY_BEARING:
             return None
         by["by"] = float(BY_NEAREST) if by["by"] == BY_DISTANCE else by["by"]
-    return Candidate(effect=candidate.effect, shape=candidate.shape | by)
+    return replace(candidate, shape=candidate.shape | by)
 
 
 def _lasting_fish(scene: Scene) -> list[int]:

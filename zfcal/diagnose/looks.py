@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.candidates import Candidate, curved, further_forms
+from zfcal.diagnose.candidates import Candidate, both_sides, curved, further_forms
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise, by_noise
 from zfcal.diagnose.features.gains import Gain
@@ -265,7 +265,8 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
     """
     own = [each for each in (*case.listed, *case.generic) if each.name == gain.name]
     own += further_forms(find_effect(gain.name), case.scene)
-    scores = ask_all(screen, own, case.question.n_workers)
+    asked = [side for each in own for side in both_sides(each)]
+    scores = ask_all(screen, asked, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -each.clearness):
         forms.setdefault(form_of(score.candidate), score)

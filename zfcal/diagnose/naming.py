@@ -162,7 +162,7 @@ def _start(scene: Scene, fitted: Fitted, score: Score) -> dict[str, float]:
     """
     candidate = score.candidate
     low, high = bounds_of(candidate.name, candidate.effect.strength)
-    strengths = np.copysign(np.multiply(_SHARES, candidate.notable), score.z)
+    strengths = np.copysign(np.multiply(_SHARES, candidate.notable), candidate.side or score.z)
     tried = [candidate.values(float(value)) for value in np.clip(strengths, low, high)]
     models = [with_effect(fitted.parameters, candidate.name, values) for values in tried]
     share = max(1, len(scene.turns) // _FEW)

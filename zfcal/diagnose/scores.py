@@ -53,7 +53,9 @@ class Score:
 
     @property
     def clearness(self) -> float:
-        """The size of z; where the effect has one sign only, z itself."""
+        """The size of z; where the effect has one sign only, or is asked on one side, z itself."""
+        if self.candidate.side:
+            return self.candidate.side * self.z
         return abs(self.z) if self.candidate.signed else self.z
 
 

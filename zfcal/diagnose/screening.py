@@ -15,7 +15,7 @@ effect responds to, within each zone; unless that is a place, within fields of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,7 +40,7 @@ from zfcal.diagnose.scores import (
 )
 from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
-from zfcal.model.extended import bounds_of, with_effect, without_effects
+from zfcal.model.extended import with_effect, without_effects
 from zfcal.model.fitted import SCALES, Fitted, constants
 from zfcal.model.kernels.scores import (
     component_score,
@@ -184,12 +184,15 @@ class Screen:
             return pack([replace(base, effects=asked)], scene.arena)
 
         # Mixtures are compared at a strength worth noticing, tilts next to none.
-        strong, total = candidate.notable, np.zeros(len(scene.turns))
+        tables, angle, strong = self._tables, fitted.view.seen_sr, candidate.asked_at
+        total, some = np.zeros(len(scene.turns)), np.empty(len(scene.turns))
         shape = candidate.values(strong)
         if effect.calls("component", shape):
-            low, _ = bounds_of(effect.name, effect.strength)
-            sides = (strong, max(-strong, low)) if low < 0 else (strong,)
-            total += self._component_scores(scene, {side: at(side) for side in sides})
+            parts = components_of(scene, at(strong), angle)
+            if len(fitted.view.whole_rad):
+                parts[:, :, 1:3] = turned_by(parts[:, :, 1:3], fitted.view.whole_rad[:, None])
+            component_score(parts, scene.turns.taken, *tables.mixtures(), some)
+            total += some / strong
         if effect.sight is not None:
             total += self._sight_scores(scene, at(strong)) / strong
         if any(effect.calls(kind, shape) for kind in ("rotation", "whole_rotation")):
@@ -199,25 +202,6 @@ class Screen:
             tilted = self._tilted_scores(scene, at(effect.probe), form)
             total += tilted * fitted.weight / effect.probe
         return total
-
-    def _component_scores(self, scene: Scene, sides: Mapping[float, Packed]) -> Floats:
-        """Return the scores of a component at that strength which says most for itself.
-
-        One of a strength below 0 is about another heading, so it is no less of the same.
-        """
-        most, made = -np.inf, np.zeros(len(scene.turns))
-        for strength, packed in sides.items():
-            parts = components_of(scene, packed, self.fitted.view.seen_sr)
-            if len(self.fitted.view.whole_rad):
-                turned = turned_by(parts[:, :, 1:3], self.fitted.view.whole_rad[:, None])
-                parts[:, :, 1:3] = turned
-            scores = np.empty(len(scene.turns))
-            component_score(parts, scene.turns.taken, *self._tables.mixtures(), scores)
-            size = float(np.linalg.norm(scores))
-            z = float(scores.sum()) / size if size > 0 else -np.inf
-            if z > most:
-                most, made = z, scores / strength
-        return made
 
     def _tilted_scores(self, scene: Scene, packed: Packed, form: Polynomial | None) -> Floats:
         """Return the change of the log density by factors on headings."""

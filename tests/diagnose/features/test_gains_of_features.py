@@ -167,24 +167,34 @@ def test_fish_that_turn_less_when_fast_are_told(base, hidden):
     coupling = find_effect("speed-turn-coupling")
     found = gains_of(hidden(factor), [coupling])
     best = max(found, key=lambda each: each.nats)
-    assert best.label == "turning less, faster than 0.1 m/s"
+    assert best.label == "turns of steps faster than 0.1 m/s"
     assert best.p < 1e-6
 
 
 def test_turns_off_the_walls_are_those_everywhere_but_along_walls(nothing):
     """Of all names that have both, and of each weight."""
-    seen, named = nothing.law.draws[0].seen, []
+    seen, named, end = nothing.law.draws[0].seen, [], ", off the walls"
     walls = seen.follows_walls
     for effect in all_effects():
-        for feature in effect.features(nothing.law.scene.arena):
-            first = feature.features[0] if isinstance(feature, OneOf) else feature
-            if not isinstance(first, Turned) or len(getattr(feature, "features", ())) != 2:
-                continue
-            everywhere, off_walls = (each.by(seen) for each in feature.features)
-            np.testing.assert_array_equal(off_walls[~walls], everywhere[~walls])
-            assert not off_walls[walls].any()
-            named.append(effect.name)
+        features = effect.features(nothing.law.scene.arena)
+        turned = {each.label: each for each in features if isinstance(each, Turned)}
+        for label, feature in turned.items():
+            if label.endswith(end):
+                off_walls = feature.by(seen)
+                everywhere = turned[label.removesuffix(end)].by(seen)
+                np.testing.assert_array_equal(off_walls[~walls], everywhere[~walls])
+                assert not off_walls[walls].any()
+                # Of fish without a robot nobody turns from one.
+                assert everywhere[walls].any() == (effect.name != "robot-avoidance")
+                named.append(effect.name)
     assert len(named) == 7
+
+
+def test_turns_of_the_whole_law_are_always_taken_along(base):
+    """A model's effect may have too much of them, which a first look at more of it does not see."""
+    scene, fitted = base
+    fits = fits_beside(Law(scene=scene, fitted=fitted), [find_effect("turning-bias")])
+    assert {"offset", "offset, off the walls"} <= {each.label for each in fits.also}
 
 
 @pytest.mark.parametrize("name", ["alignment", "turning-bias", "collective-departure"])

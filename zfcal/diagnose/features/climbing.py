@@ -26,6 +26,9 @@ _PART = 1e-3
 _RIDGE = 1e-9
 """Added to the squares of scores of length one: columns may be sums of each other."""
 
+_IDLE = 1e-30
+"""Sum of the squares of scores of an argument that no step asks for: the rest is rounding."""
+
 _AT_END = 1e-6
 _SIDES = 1.96
 """Standard errors to either side of a 95 % interval."""
@@ -212,7 +215,9 @@ def scaled(pair: Bounds, scale: float) -> Bounds:
 def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:
     """Return the change that sets the scores of single steps nearest to one, within bounds."""
     gram = scores.T @ scores
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    squares = np.diag(gram)
+    # What no step asks for stays as it is: in units of next to nothing rounding would move it.
+    size = np.sqrt(np.where(squares > _IDLE, squares, 1.0))
     square = gram / size / size[:, None] + _RIDGE * np.eye(len(size))
     root = np.linalg.cholesky(square)
     toward = solve_triangular(root, scores.sum(axis=0) / size, lower=True)

@@ -288,7 +288,7 @@ _FEATURES: tuple[Feature, ...] = (
     _TURNING,
     by_circumstances(_TURNING),
     by_circumstances(_leaning_to_mean(_COMPANY_M, off_walls=False)),
-    turning_as_a_whole(_toward_mean, low=0.0),
+    *turning_as_a_whole(_toward_mean, low=0.0),
     Turned(label="turning as the nearest", by=_toward_nearest, neighbours=True, low=0.0),
 )  # fmt: skip
 

@@ -235,7 +235,7 @@ _FEATURES: tuple[Feature, ...] = (
         alone=LEANING_OUT,
     ),
     Turned(label="turning to the way out", by=_turning, neighbours=False, along=_BY_TIME),
-    turning_as_a_whole(
+    *turning_as_a_whole(
         partial(_turning, along_walls=True),
         label="turning to the way out as a whole",
         along=_BY_TIME,

@@ -205,7 +205,7 @@ _FEATURES: tuple[Feature, ...] = (
     OneOf(kind="leaning to and fro", features=tuple(_swinging(k / 2) for k in range(2, 25))),
     OneOf(kind="leaning, from some time on", features=tuple(map(_from, _BEGINS))),
     Turned(label="turning", by=_aside, neighbours=False),
-    turning_as_a_whole(partial(_aside, along_walls=True)),
+    *turning_as_a_whole(partial(_aside, along_walls=True)),
     Tilt(label="carried", vectors=_carried),
 )
 

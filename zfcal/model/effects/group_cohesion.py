@@ -269,7 +269,7 @@ _FEATURES: tuple[Feature, ...] = (
     Tilt(label="leaning to each", vectors=_leaning_to_each, low=0.0, along=_TO_EACH),
     Tilt(label="leaning to the nearest", vectors=_leaning_to_nearest, low=0.0, along=_TO_NEAREST),
     Turned(label="turning", by=_turning, neighbours=False, low=0.0, along=_TO_MIDDLE),
-    turning_as_a_whole(partial(_turning, along_walls=True), low=0.0, along=_TO_MIDDLE),
+    *turning_as_a_whole(partial(_turning, along_walls=True), low=0.0, along=_TO_MIDDLE),
     Turned(
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
         along=_TO_NEAREST,

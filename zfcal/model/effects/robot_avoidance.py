@@ -188,7 +188,7 @@ _FEATURES: tuple[Feature, ...] = (
         along=Along(cue="distance to the robot (m)", knots=_LANDS_M[:-1]),
     ),
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
-    turning_as_a_whole(partial(_turning, along_walls=True), along=_TO_ROBOT),
+    *turning_as_a_whole(partial(_turning, along_walls=True), along=_TO_ROBOT),
     precision_of_attention(_to_robots, "precision of robots"),
     by_circumstances(
         factor_on_attention(_to_robots, label="attention to robots"),

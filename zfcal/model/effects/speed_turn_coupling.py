@@ -23,7 +23,6 @@ from zfcal.model.features import (
     Component,
     Feature,
     Landing,
-    OneOf,
     Seen,
     Sharper,
     Tilt,
@@ -102,6 +101,7 @@ _FAST_M_S = (0.06, 0.1, 0.14)
 _NO_TURN_RAD = 9.0
 """More than any turn: what lands there has no weight."""
 
+_BY_TURN = Along(cue="turn (rad)", knots=_TURN_RAD[:-1])
 _TURNING_LESS = Landing(label="turning less", away_m=_turn_rad, knots_m=_TURN_RAD)
 
 
@@ -114,8 +114,9 @@ def _when_fast(least_m_s: float) -> Landing:
 
     return replace(
         _TURNING_LESS,
-        label=f"turning less, faster than {least_m_s:g} m/s",
+        label=f"turns of steps faster than {least_m_s:g} m/s",
         away_m=away_m,
+        along=_BY_TURN,
         over=_TURNING_LESS,
     )
 
@@ -163,7 +164,7 @@ _FEATURES: tuple[Feature, ...] = (
         # More than by the turn alone, which would be another law of turns.
         over=_TURNING_LESS,
     ),
-    OneOf(kind="turning less when fast", features=tuple(map(_when_fast, _FAST_M_S))),
+    *map(_when_fast, _FAST_M_S),
 )
 
 

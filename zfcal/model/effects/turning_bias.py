@@ -98,7 +98,7 @@ _ALONG_WALL = Component(
 )
 
 _FEATURES: tuple[Feature, ...] = (
-    turning_as_a_whole(_everywhere, label="offset"),
+    *turning_as_a_whole(_everywhere, label="offset"),
     # The base's own direction alone: what is drawn to others stays as it is.
     _OWN_OFFSET,
     by_circumstances(_OWN_OFFSET, without=("who",)),

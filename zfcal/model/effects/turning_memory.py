@@ -190,7 +190,7 @@ _LEANING = Tilt(label="leaning to the heading before", vectors=_leaning)
 _FEATURES: tuple[Feature, ...] = (
     _OFFSET,
     by_circumstances(_OFFSET, without=("the last turn",)),
-    turning_as_a_whole(lambda seen: seen.last_turn_rad, label="offset as a whole"),
+    *turning_as_a_whole(lambda seen: seen.last_turn_rad, label="offset as a whole"),
     Turned(label="offset by recent turns", by=lambda seen: seen.recent_turn_rad, neighbours=False),
     Turned(label="offset by slight turns", by=_slight_turn, neighbours=True),
     Component(label="drawn to the heading before", toward=_before, weights=_one, kappa=5.0),

@@ -9,7 +9,7 @@ import numpy as np
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.circumstances import each_fish, each_under
-from zfcal.model.features import MOST_SHARPER, Along, Component, OneOf, Seen, Tilt, Turned, Weights
+from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Turned, Weights
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
@@ -37,8 +37,8 @@ def turning_as_a_whole(
     label: str = "turning as a whole",
     low: float | None = None,
     along: Along | None = None,
-) -> OneOf:
-    """Return turns of all directions: everywhere, or where fish follow no wall.
+) -> tuple[Turned, Turned]:
+    """Return turns of all directions: everywhere, and where fish follow no wall.
 
     Parameters
     ----------
@@ -54,8 +54,7 @@ def turning_as_a_whole(
         return np.asarray((by(seen).T * ~seen.follows_walls).T)
 
     everywhere = Turned(label=label, by=by, neighbours=True, low=low, along=along)
-    elsewhere = replace(everywhere, label=f"{label}, off the walls", by=off_walls)
-    return OneOf(kind=label, features=(everywhere, elsewhere))
+    return everywhere, replace(everywhere, label=f"{label}, off the walls", by=off_walls)
 
 
 def both_senses(seen: Seen) -> Floats:
