@@ -10,7 +10,7 @@ from scipy.special import logit
 from scipy.stats import chi2, ncx2
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
-from zfcal.diagnose.features.climbing import climb
+from zfcal.diagnose.features.climbing import climb, climb_within
 from zfcal.diagnose.features.false_gains import ByNoise
 from zfcal.diagnose.features.gains import Fits, Gain
 from zfcal.diagnose.features.law import Law
@@ -550,3 +550,19 @@ def test_features_see_most_of_what_a_form_of_the_name_makes(base, worlds, name, 
     best = best_by_name(gains_of(Law(scene=drawn, fitted=without), [find_effect(name)]))[0]
     assert form > 15
     assert best.log_p.sum() > 0.75 * form
+
+
+def test_an_argument_that_no_step_asks_for_stays_where_it_is():
+    """In units of next to nothing rounding would carry it to where no number has a meaning."""
+    random = np.random.default_rng(4)
+    scores = np.column_stack([random.normal(0.1, 1.0, (500, 3)), np.full(500, 1e-170)])
+    turned = scores @ np.diag([1.0, 1.0, 1.0, 0.0]) + scores[:, [3]]
+
+    def objective(x):
+        return float(
+            (turned @ x - (turned @ x) ** 2 / 2).sum()
+        ), lambda: turned * (1 - turned @ x)[:, None]
+
+    peak = climb_within(objective, np.full(4, 0.01), [(None, None)] * 4)
+    assert peak.x[3] == pytest.approx(0.01, abs=1e-6)
+    assert np.abs(peak.x[:3] - 0.01).max() > 1e-3
