@@ -178,7 +178,7 @@ def test_a_preference_more_than_another_counts_its_own_strengths(nothing):
     (aside,) = (
         each
         for each in find_effect("speed-turn-coupling").features(nothing.law.scene.arena)
-        if isinstance(each, Landing)
+        if isinstance(each, Landing) and each.label == "landing aside"
     )
     alone = nothing.gain("speed-turn-coupling", replace(aside, over=None))
     more = nothing.gain("speed-turn-coupling", aside)
