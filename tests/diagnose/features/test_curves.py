@@ -13,6 +13,8 @@ from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import find_effect
 from zfcal.model.extended import maximise, with_effect
+from zfcal.model.features import Along, Component
+from zfcal.model.kernels.hats import hats
 
 EFFECT = find_effect("interaction-range")
 RANGE = {"ignored": 1.0, "range_m": 0.12}
@@ -60,6 +62,22 @@ def test_the_form_of_the_fish_has_their_curve(curve):
     """Where the model has the effect as the fish do, both curves are alike."""
     assert ((curve.low - 0.25 < curve.form) & (curve.form < curve.high + 0.25)).all()
     assert curve.form[curve.at >= 0.3].max() < -0.4
+
+
+def test_the_curve_ends_where_no_step_asks_for_a_strength(law, with_it):
+    """Nobody is 2 m away, so a weight that begins there has any strength, and is not drawn."""
+    knots_m = (0.0, 0.5, 2.0, 5.0)
+    feature = Component(
+        label="attention by wide steps of distance", toward="toward",
+        weights=lambda seen: seen.attention[..., None] * hats(seen.distance_m, knots_m),
+        along=Along(cue="distance to the other (m)", knots=knots_m),
+    )  # fmt: skip
+    wide = dataclasses.replace(EFFECT, features=lambda _: (feature,))
+    found = curve_of(law, wide, with_it, nats=20.0)
+    np.testing.assert_array_equal(found.at, knots_m[:-1])
+    for values in (found.strength, found.low, found.high, found.form):
+        assert np.isfinite(values).all()
+        assert len(values) == len(found.at)
 
 
 def test_a_form_that_is_not_there_has_no_curve(law, there, curve):

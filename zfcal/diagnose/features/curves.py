@@ -1,5 +1,7 @@
 """The curve of a feature: how strong an effect is by what it goes by, whatever its form.
 
+It has no point where no step asks for a strength: nothing is known of it there.
+
 Beside it stands what the same feature shows of the form that the model has: of headings drawn from
 that model, where all were when each step began.
 """
@@ -11,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.features.asking import best_feature, fits_beside
@@ -58,7 +61,8 @@ def curve_of(
     if along is None:
         return made
     n = len(along.knots)
-    shown = _Knots(none_at=along.none_at)
+    known = np.isfinite(fit.interval[:n]).all(axis=1)
+    shown = _Knots(none_at=along.none_at, known=known)
     besides = fit.strengths[n:], fit.interval[n:]
     return replace(
         made,
@@ -82,17 +86,20 @@ def _n_own(fits: Fits, feature: Single, fit: Fit) -> int:
     return len(fit.strengths) - (0 if over is None else len(fits.fit(over).strengths))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Knots:
-    """Puts a knot at which there is nothing to fit before the others."""
+    """Puts a knot at which there is nothing to fit before those of which anything is known."""
 
     none_at: float | None
+    known: NDArray[np.bool_]
 
     def knots(self, values: Sequence[float]) -> Floats:
-        return np.array(values if self.none_at is None else (self.none_at, *values))
+        kept = np.array(values)[self.known]
+        return kept if self.none_at is None else np.append(self.none_at, kept)
 
     def values(self, values: Floats) -> Floats:
-        return np.asarray(values if self.none_at is None else np.append(0.0, values))
+        kept = values[self.known]
+        return kept if self.none_at is None else np.append(0.0, kept)
 
 
 def _of_the_form(fits: Fits, feature: Single, with_it: Screen) -> Floats:
