@@ -61,7 +61,7 @@ def curve_of(
     if along is None:
         return made
     n = len(along.knots)
-    known = np.isfinite(fit.interval[:n]).all(axis=1)
+    known = np.asarray(np.isfinite(fit.interval[:n]).all(axis=1))
     shown = _Knots(none_at=along.none_at, known=known)
     besides = fit.strengths[n:], fit.interval[n:]
     return replace(
