@@ -70,6 +70,7 @@ def counted(model, arena, **sizes):
     return {name: getattr(counts, name)[0, 0] for name in FEATURES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "ring", "circular", "open-square", "tight"])
 def test_the_kernel_counts_what_the_statistics_count(name):
     """One run of 5 agents and 3,000 samples: D, W, O, T and V are equal, count by count."""

@@ -162,6 +162,7 @@ def wait_until(condition, *, patience_s=20.0):
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_a_population_counts_the_same_as_here(two, group, genes):
     """Every genome with every seed, in the order given, to the last count."""
     here = group.simulate(genes, n_counted=5, n_steps=300, seeds=SEEDS)

@@ -111,6 +111,7 @@ def make_task(group, models, two_rooms, candidates):
     return make
 
 
+@pytest.mark.slow
 def test_from_where_they_were_the_true_model_is_the_better_one(make_task, starts, candidates):
     """Against long runs it is the worse one: fish are still where they have been.
 

@@ -48,6 +48,7 @@ def test_the_score_is_the_searchs_own(zfcal, analysed):
     assert model_of(analysed)["result"]["optimiser_S"] == best
 
 
+@pytest.mark.slow
 def test_an_option_given_beside_it_counts(zfcal, analysed):
     """One deviation at a time can be measured."""
     words = ("--as-published", "--renewal", "--confirm", "2", "--sampler", "grid")

@@ -205,6 +205,7 @@ def test_report_writes_a_page_once(zfcal, trial):
     )
 
 
+@pytest.mark.slow
 def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
     """Where the command was called; each has its own page as well, to which a table leads."""
     zfcal("analyse", "trial")
@@ -226,6 +227,7 @@ def test_a_report_over_several_trials_lies_beside_them(zfcal, trial):
     }
 
 
+@pytest.mark.slow
 def test_a_report_over_several_trials_stays_where_it_was_asked_for(zfcal, trial):
     """In the folder of one of them: the page of that trial alone is not written over it."""
     zfcal("analyse", "trial")

@@ -49,6 +49,7 @@ def screen_of(work, *, shown=True):
     return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", data.decode())
 
 
+@pytest.mark.slow
 def test_silent_work_says_what_works_and_for_how_long():
     """A bar without a length comes by itself; a stderr that is no terminal stays as it was."""
     screen = screen_of(SILENT)

@@ -83,6 +83,7 @@ def test_help_lists_one_of_the_two_words(zfcal):
         assert "--champion" not in said
 
 
+@pytest.mark.slow
 def test_calibrate_says_one_line_a_round(zfcal, analysed):
     """To those who look on; the same numbers stand in the JSON document."""
     done = zfcal("calibrate", "trial", *QUICK)
@@ -97,6 +98,7 @@ def test_calibrate_says_one_line_a_round(zfcal, analysed):
     assert "publishes" not in zfcal("calibrate", "trial", *QUICK, "--force", "-q").err
 
 
+@pytest.mark.slow
 def test_watch_says_the_same_line_and_logs_it(zfcal, analysed):
     """A note on standard error, and a line of JSON each for the note and the numbers."""
     done = zfcal("watch", "trial", "--once", *QUICK, "--json")

@@ -69,6 +69,7 @@ value = 0.9
     assert (contrast["name"], contrast["published"], contrast["n"]) == ("first", 0.9, 1)
 
 
+@pytest.mark.slow
 def test_the_authors_scoring_is_another_number(zfcal, archive, tmp_path):
     """Of the same models; W is not scored by it."""
     values = {}
@@ -90,6 +91,7 @@ def test_tracks_of_another_program_become_a_trial(zfcal, tracks_csv, tmp_path, m
     assert said(tmp_path / "again")["ways"][0]["trials"] == ["old"]
 
 
+@pytest.mark.slow
 def test_a_table_that_was_changed_is_made_again(zfcal, archive, tmp_path):
     """And said; the numbers are those that they were."""
     zfcal("reproduce", "trial", "-o", "again", *QUICK)

@@ -175,6 +175,7 @@ OWN = ("turning-bias", "directional-drift", "fatigue", "place-preference")
 """Effects that a fish shows wherever the others are."""
 
 
+@pytest.mark.slow
 def test_the_minutes_needed_are_the_same_however_long_the_recording(ask, record):
     """From one minute and from three; a change with the hour counts by its cube."""
     short, longer = (
@@ -186,6 +187,7 @@ def test_the_minutes_needed_are_the_same_however_long_the_recording(ask, record)
         assert 0.6 < short[name] / longer[name] < 1.7
 
 
+@pytest.mark.slow
 def test_one_fish_alone_can_be_asked(ask, record):
     """Of walls, places, turns and speeds; neighbours are lacking."""
     found = ask(record(5, {"turning-bias": {"strength": 0.6}}, n_fish=1))

@@ -313,6 +313,7 @@ def test_looks_share_a_level():
     assert 2 * sum(level_of(k) for k in range(1, 30)) == pytest.approx(LEVEL)
 
 
+@pytest.mark.slow
 def test_where_noise_is_not_known_it_is_that_of_the_likeliest_law(question):
     """Of exact positions that is none; the note says where it is from."""
     case = open_case(question(noise_m=None, noise_source="unknown"))
@@ -322,6 +323,7 @@ def test_where_noise_is_not_known_it_is_that_of_the_likeliest_law(question):
     assert not open_case(question(noise_m=0.0)).noise_is_likely
 
 
+@pytest.mark.slow
 def test_likely_noise_is_held_against_none(question):
     """Since a late response makes a law of noise likelier as well; known noise is not doubted."""
     case = open_case(question())

@@ -70,6 +70,7 @@ def test_fish_with_it_are_slow_along_the_walls(screen):
     assert mean_speed(slow, near=False) == pytest.approx(mean_speed(usual, near=False), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("added")
 def test_a_recording_of_such_fish_shows_it(record, tank, fish):
     """It is named and measured, drawn against the wall, and in the extended model."""

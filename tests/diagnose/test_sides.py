@@ -64,6 +64,7 @@ def test_a_place_on_one_side_must_gain_clearly_more_than_a_direction(suspect):
     assert feigned([little, other], WITHOUT) == []
 
 
+@pytest.mark.slow
 def test_beside_a_direction_in_the_model_a_place_must_gain_half_of_what_it_does(
     screen, candidate, suspect
 ):

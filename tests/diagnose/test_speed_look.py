@@ -51,6 +51,7 @@ def test_what_speeds_lack_is_named_one_after_the_other(case):
     assert speed_look(case(), nothing()).steps == ()
 
 
+@pytest.mark.slow
 def test_crowding_in_a_lit_room_is_named(case):
     """A lamp makes one room fast, and fish gather there: fish are fast in company."""
     shy = LIT | {"crowding": {"per_neighbour": 0.1, "radius_m": 0.35}}

@@ -153,6 +153,7 @@ def test_speed_matching_is_found_again(screen, candidate):
     assert found.values["exponent"] == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_curve_of_an_exponent_is_found_again(screen, candidate):
     """Fast after fast steps at first, slow after them at last: a mean of nothing."""
     bent = {"by": float(BY_TIME), "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}

@@ -154,6 +154,7 @@ def check_output(shown, said, place):
         assert any(is_said(line, each) for each in lines), f"{place}: {line!r}\n{said}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("story", CASES)
 def test_a_story(story, snippets, reading, shell, repository, request):
     """Each command ends well, in the order of the page, and says what the page shows."""

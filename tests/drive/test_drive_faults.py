@@ -152,6 +152,7 @@ def rig(template, forks, tmp_path):
     made.close()
 
 
+@pytest.mark.slow
 def test_silence_stops_the_robot_and_it_goes_on(rig):
     """STOP within 0.6 s of the last pose; no wheel turns until poses come again; all is logged."""
     rig.start()
@@ -284,6 +285,7 @@ def test_a_clock_that_is_set_by_an_hour_changes_nothing(rig, set_clock):
     assert np.diff([c["time_s"] for c in rig.items("command")]).max() < 0.35
 
 
+@pytest.mark.slow
 def test_unplugged_and_back(rig):
     """While the port is gone nothing is sent, which is said; afterwards it drives on by itself."""
     rig.start()
@@ -357,6 +359,7 @@ def test_new_parameters_drive_within_a_second_of_their_making(analysed, rig):
     assert "000180.toml" in said
 
 
+@pytest.mark.slow
 def test_poses_of_images_that_are_old_are_not_driven_by(rig):
     """The tracker falls 2 s behind and writes on: STOP; when it has caught up the robot goes on."""
     rig.start()

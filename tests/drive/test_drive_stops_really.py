@@ -230,6 +230,7 @@ def report(took, capsys):
             print(f"{fault:28} {len(values):4} {low:6.0f} {middle:6.0f} {most:6.0f}")  # noqa: T201
 
 
+@pytest.mark.slow
 def test_the_robot_of_a_real_drive_stops(drive, capsys):
     """A few of the faults; those that follow an expiry stop no sooner than half a second."""
     faults = ["driver SIGTSTP", "helper SIGKILL", "driver SIGSTOP, poses end", "robot outside"]

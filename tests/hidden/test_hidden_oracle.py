@@ -51,6 +51,7 @@ def test_the_fit_finds_the_parameters_back():
     np.testing.assert_allclose(ratio, base.gamma[2, 1:] / base.gamma[2, 2], rtol=0.3)
 
 
+@pytest.mark.slow
 def test_the_best_fit_is_the_best():
     """Each parameter of the walls, moved by 10 % either way, makes the headings less likely."""
     base, world = natural(), world_of(two_rooms())

@@ -56,6 +56,7 @@ def weights(n, *places):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [0.674, 1.96])
 def test_at_an_end_the_likelihood_has_fallen_by_half_the_square_of_the_depth(profile, depth):
     """No other point with that kappa is higher: five hundred random neighbours are tried."""

@@ -84,6 +84,7 @@ def test_a_trial_that_goes_and_comes_is_no_error(listening):
     assert has_hint(hints, 2 * RESCAN_S)
 
 
+@pytest.mark.slow
 @needs_watchfiles
 def test_what_came_before_it_listened_again_is_a_hint(listening):
     """A trial that comes back brings its news with it."""

@@ -49,6 +49,7 @@ def test_a_set_of_another_format_leaves_a_page_that_is_up_to_date(pair, tmp_path
     assert report_options(pair[1]) == PAPER
 
 
+@pytest.mark.slow
 def test_a_page_whose_inputs_have_changed_is_written_in_its_own_format(pair, tmp_path):
     """So is one that is forced."""
     (pair[0] / "tracks" / "000060.parquet").unlink()
@@ -64,6 +65,7 @@ def test_a_page_whose_inputs_have_changed_is_written_in_its_own_format(pair, tmp
     assert ".svg" not in endings(pair[0])
 
 
+@pytest.mark.slow
 def test_a_page_without_readable_numbers_is_made_with_the_options_of_the_set(pair, tmp_path):
     """Nobody knows how it was made."""
     (pair[0] / "report" / "integration.json").write_text("{")

@@ -101,6 +101,7 @@ def test_all_contrasts_have_to_be_within_the_margin():
     assert judge([]) == "undecided"
 
 
+@pytest.mark.slow
 def test_the_family_keeps_its_level():
     """Of 2,000 sets of three true contrasts 5 % disagree, within three standard errors."""
     rng = np.random.default_rng(3)

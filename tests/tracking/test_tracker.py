@@ -152,6 +152,7 @@ def test_light_fish_in_a_dark_tank_are_tracked_where_that_is_said(drawn):
     assert max(errors_px(told[-1], paths[-1])) < 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_light_fish_are_tracked_as_dark_ones_are_without_a_word(drawn, method):
     """The negative of a film: as sure, and at the same places to a fifth of a pixel."""
@@ -271,6 +272,7 @@ def test_what_lies_outside_the_region_is_not_seen(drawn):
     assert max(s.x_px for seen in told for s in seen) < 101
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("corner", [0, 64, 96])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_region_changes_nothing_about_those_within(drawn, method, corner):

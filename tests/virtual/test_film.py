@@ -69,6 +69,7 @@ def images(root, camera):
     return np.array([time_s for time_s, _ in frames]), pictures
 
 
+@pytest.mark.slow
 def test_there_is_an_image_for_each_frame_of_the_tracks(filmed):
     """With its time, in files of a minute; both cameras take them at once."""
     tracks = [read_tracks(path) for path in sorted((filmed / "tracks").glob("*.parquet"))]

@@ -68,6 +68,7 @@ def test_what_is_not_finite_is_taken_where_it_is_asked_for():
         json_of("[" * 100_000, not_finite=True)
 
 
+@pytest.mark.slow
 def test_a_large_file_is_not_read_unless_the_limit_is_raised(tmp_path, monkeypatch):
     """The message says how."""
     path = tmp_path / "model.toml"

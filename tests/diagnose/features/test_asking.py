@@ -95,6 +95,7 @@ def test_a_tank_without_rooms_has_nobody_leaving_them(law):
         assert sum(isinstance(each, Leaving) for each in in_rooms) > len(leaving)
 
 
+@pytest.mark.slow
 def test_what_an_effect_has_to_gain_more_than_is_not_taken_along_with_it(base, worlds):
     """Attention to the fast may change with time; attention to all that wanes is no part of that.
 

@@ -59,6 +59,7 @@ def bump(angle, centre, kappa):
     return law / law.sum(axis=1, keepdims=True) * len(angle) / (2 * math.pi)
 
 
+@pytest.mark.slow
 def test_nothing_is_gained_where_nothing_is_missing(base):
     """No name is told; the best gains a few nats less its strengths, as chance has it."""
     scene, fitted = base
@@ -68,6 +69,7 @@ def test_nothing_is_gained_where_nothing_is_missing(base):
     assert -10 < best_by_name(found)[0].nats < 6
 
 
+@pytest.mark.slow
 def test_what_each_fish_does_its_own_way_is_told(base, hidden):
     """Half of them lean to the north and half to the south: all together to no direction."""
     scene, _ = base
@@ -97,6 +99,7 @@ def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
     assert told.p < 1e-6
 
 
+@pytest.mark.slow
 def test_a_tilt_is_told_as_well(base, hidden):
     """All headings lean to the right of where they would go: handedness."""
     scene, _ = base
@@ -107,6 +110,7 @@ def test_a_tilt_is_told_as_well(base, hidden):
     assert told.gain.log_p.sum() > 20
 
 
+@pytest.mark.slow
 def test_a_tilt_along_an_axis_is_told(hidden):
     """As many go one way as the other: no direction of its own is preferred."""
     law = hidden(lambda angle: np.exp(0.25 * np.cos(2 * (angle - 0.8))))
@@ -121,6 +125,7 @@ def test_a_tilt_along_an_axis_is_told(hidden):
     np.testing.assert_allclose(fit.strengths, expected, atol=0.09)
 
 
+@pytest.mark.slow
 def test_lapses_of_one_zone_are_no_effect(base, hidden):
     """Off the walls one heading in 20 is anything at all: features begin where the model ended.
 
@@ -495,6 +500,7 @@ def test_what_fish_are_drawn_to_of_each_that_they_see_is_cohesion(base, hidden):
     assert nats["drawn to each seen"] > nats["drawn to each"] + 3
 
 
+@pytest.mark.slow
 def test_beside_an_effect_nothing_is_gained_by_less_than_none(base, worlds):
     """A model that has the effect, and fish that do as it says: no name is missing beside it.
 

@@ -210,6 +210,7 @@ def test_exact_positions_have_one_draw_and_noisy_ones_several(base):
     assert 0 < np.abs(apart).mean() < 0.05
 
 
+@pytest.mark.slow
 def test_draws_are_the_same_for_a_seed(base):
     """And others for another one."""
     scene, fitted = base

@@ -10,6 +10,7 @@ from zfcal.model.extended import maximise
 from zfcal.model.scene import make_scene
 
 
+@pytest.mark.slow
 def test_exact_positions_have_no_noise(base):
     """Of the simulated law itself any noise is less likely."""
     scene, fitted = base

@@ -212,6 +212,7 @@ def test_speeds_that_are_spread_more_at_times_are_no_bursts(nothing):
     assert max(bare) > 15
 
 
+@pytest.mark.slow
 def test_independent_speeds_of_short_tracks_do_not_swing(nothing):
     """The mean over two seconds is asked of tracks that are a hundred times as long."""
     scene = nothing.scene
@@ -258,6 +259,7 @@ def test_nor_what_one_fish_does_all_the_time(nothing, changed):
     assert tell(pace_gains(changed(times), ALL)) is None
 
 
+@pytest.mark.slow
 def test_tracks_in_pieces_have_means_of_their_own(nothing):
     """More than a dozen of them, of individuals that differ."""
     scene = nothing.scene

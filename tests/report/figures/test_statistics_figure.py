@@ -114,6 +114,7 @@ def test_bars_are_shares_of_each_zone(make_view):
         assert axes.title.get_color() == theme.INK or axes._left_title.get_color() == colour
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two-rooms", "circular", "ring", "own"])
 def test_no_text_covers_another(arenas, wander, covered_texts, name):
     """Long zone names are wrapped or slanted, and numbers have their room."""

@@ -56,6 +56,7 @@ def test_trials_side_by_side_end_in_the_bytes_of_trials_in_turn(
     assert stages[0] == stages[1]
 
 
+@pytest.mark.slow
 def test_another_number_of_threads_changes_no_lineage(make_trial, quick, cluster, heard):
     """What was made here is up to date there, and the other way round."""
     root = make_trial(seconds=120)

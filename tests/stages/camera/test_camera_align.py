@@ -79,6 +79,7 @@ def test_the_trial_uses_it_and_the_calibration_stays(trial):
     assert any(isinstance(event, UpToDate) for event in aligned(trial))
 
 
+@pytest.mark.slow
 def test_a_dry_run_looks_at_no_image(trial):
     """And writes nothing."""
     aligned(trial, dry_run=True)

@@ -121,6 +121,7 @@ def test_images_of_two_sizes_are_refused(shots, tmp_path):
     assert not (tmp_path / "lens.toml").exists()
 
 
+@pytest.mark.slow
 def test_a_floor_without_a_board_is_refused(shots, tmp_path):
     """The image is named."""
     floor = tmp_path / "floor.png"

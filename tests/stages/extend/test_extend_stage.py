@@ -277,6 +277,7 @@ def test_findings_of_another_trial_are_not_written_over(make_trial, trial, found
     assert findings.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_an_extended_model_is_extended_beside_itself(trial, found, options, quick):
     """Never over the file that it starts from; the first effect stays as it was fitted."""
     first = extend(trial, options, say_nothing)

@@ -60,6 +60,7 @@ def ids_by_side(tracks):
     return np.unique(tracks.agent[left]).tolist(), np.unique(tracks.agent[right]).tolist()
 
 
+@pytest.mark.slow
 def test_poses_are_told_by_what_is_believed(tracked):
     """Whoever drives by them hears the other's id for a while, and then nothing for a step."""
     poses = tracks_of(read_poses(tracked / "poses" / "000000.mcap"))

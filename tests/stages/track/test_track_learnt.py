@@ -72,6 +72,7 @@ def extras(root):
     return [read_extra(path)["learnt"] for path in sorted((root / "tracks").glob("*.parquet"))]
 
 
+@pytest.mark.slow
 def test_light_animals_need_no_word(new, film):
     """They are learnt, told, and kept with both segments."""
     root = new()
@@ -119,6 +120,7 @@ def test_an_empty_tank_has_no_exact_frame(new, drawn_tank, tmp_path):
     assert any("do not show whether" in note.text for note in notes if note.warning)
 
 
+@pytest.mark.slow
 def test_segments_that_arrive_one_by_one_give_what_the_video_gives(new, film, images, tmp_path):
     """The same is learnt from the first minute as from both, and all rows are the same."""
     folder = tmp_path / "overhead"

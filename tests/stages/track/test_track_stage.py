@@ -197,6 +197,7 @@ def test_the_second_run_opens_no_image(tracked, film, heard, read_all, monkeypat
     assert read_all(tracked) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gone", ["tracks/000000.parquet", "poses/000060.mcap"])
 def test_what_is_missing_comes_back_with_the_same_bytes(
     tracked, film, gone, heard, read_all, tmp_path
