@@ -232,6 +232,19 @@ def test_each_fish_is_drawn_to_the_way_out_near_to_it(arena, seen):
     assert not drawn.weights(inside).any()
 
 
+def test_each_fish_is_drawn_to_the_way_out_from_anywhere_in_its_room(arena, seen):
+    """However far it is from there; between the rooms it has no way out."""
+    for label in ("drawn to the way out from anywhere", "turning to the way out from anywhere"):
+        feature = labelled("boldness", f"{label}, by who", arena)
+        far = dataclasses.replace(seen, xy_m=np.tile((0.06, 0.94), (N, 1)))
+        between = dataclasses.replace(far, way_out=np.zeros((N, 2)))
+        weights = feature.by if isinstance(feature, Turned) else feature.weights
+        assert weights(far).any(axis=0).all()
+        assert not weights(between).any()
+    drawn = labelled("boldness", "drawn to the way out from anywhere, by who", arena)
+    np.testing.assert_allclose(drawn.weights(far).sum(axis=-1), 1.0)
+
+
 def test_turns_of_the_whole_law_count_along_walls_too(arena, seen):
     """Where those of the base's direction alone have none."""
     for name, label in (
@@ -262,11 +275,13 @@ def test_what_all_do_alike_is_gained_over(arena, seen):
     for name, label in (
         ("boldness", "drawn to the way out, by who"),
         ("boldness", "turning to the way out, by who"),
+        ("boldness", "drawn to the way out from anywhere, by who"),
         ("boldness", "leaning to the way out, by who"),
         ("leader-following", "leaning to the fast"),
     ):  # fmt: skip
         own = labelled(name, label, arena)
         assert type(own.over) is type(own)
+        assert getattr(own, "counts_whole", False) == (name == "boldness")
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     near = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
     leaning = labelled("boldness", "leaning to the way out, by who", arena)

@@ -219,6 +219,9 @@ class Component:
     over
         What it has to gain more than, where that is no case of the effect: what all fish do alike,
         of a feature of how they differ.
+    counts_whole
+        Whether both count together once it gains more than ``over`` beyond chance: that is then
+        nobody's effect but this one's.
     """
 
     label: str
@@ -230,6 +233,7 @@ class Component:
     high: float | None = None
     along: Along | None = None
     over: Component | None = None
+    counts_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -249,7 +253,7 @@ class Tilt:
         Lower bound of the strengths, where the opposite is no form of the effect.
     along
         What its weights go by, where that is one number: they are a curve then.
-    over
+    over, counts_whole
         As of a `Component`.
     """
 
@@ -259,6 +263,7 @@ class Tilt:
     low: float | None = None
     along: Along | None = None
     over: Tilt | None = None
+    counts_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -277,7 +282,7 @@ class Turned:
         Lower bound of the strengths, where the opposite is no form of the effect.
     along
         What its weights go by, where that is one number: they are a curve then.
-    over
+    over, counts_whole
         As of a `Component`.
     """
 
@@ -287,6 +292,7 @@ class Turned:
     low: float | None = None
     along: Along | None = None
     over: Turned | None = None
+    counts_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -82,6 +82,44 @@ def test_what_each_fish_does_its_own_way_is_told(base, hidden):
     assert alike[0].nats < 0.2 * told.gain.nats
 
 
+@pytest.mark.parametrize("differs", [True, False])
+def test_what_all_do_alike_counts_with_how_they_differ(base, hidden, differs):
+    """If they do: its chance is that of the difference. Where all are alike none of it counts."""
+    scene, fitted = base
+    mixture, _, _ = fitted.tables()
+    tracks = np.unique(scene.turns.track)
+    own = np.where(scene.turns.track == tracks[0], 0.12, 0.0) if differs else 0.05
+
+    def factor(angle):
+        drawn = bump(angle, np.full(len(mixture), 2.3), 4.0)
+        return 1 + np.reshape(own, (-1, 1)) * drawn / np.maximum(mixture, 1e-12)
+
+    def toward(seen):
+        return np.broadcast_to([math.cos(2.3), math.sin(2.3)], (len(seen.zone), 1, 2))
+
+    def by_who(seen):
+        return (seen.track[:, None] == tracks).astype(float)[:, None]
+
+    def drawn(label, weights, **more):
+        return Component(label=label, toward=toward, weights=weights, kappa=4.0, **more)
+
+    fits = Fits(law=hidden(factor))
+    alike = drawn("alike", lambda seen: np.ones((len(seen.zone), 1, 1)))
+    apart, whole = (
+        fits.gain("x", drawn("by who", by_who, over=alike, counts_whole=counts))
+        for counts in (False, True)
+    )
+    assert whole.p == pytest.approx(apart.p, rel=1e-6, abs=1e-300)
+    assert (whole.p < 1e-6) == differs
+    if differs:
+        np.testing.assert_allclose(whole.log_p - apart.log_p, fits.fit(alike).log_p)
+        assert whole.n_strengths == apart.n_strengths + 1 == len(tracks)
+        assert whole.nats > apart.nats + 5
+    else:
+        assert fits.gain("x", alike).nats > 20
+        assert whole.nats == pytest.approx(apart.nats)
+
+
 def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
     """Of headings 4 % are drawn about north-west, in a wide and lopsided bump: a direction."""
     _, fitted = base
@@ -426,6 +464,11 @@ def test_a_feature_may_have_to_gain_more_than_another(nothing):
     same = replace(alone, label="over itself", over=alone)
     assert nothing.gain("x", same).log_p == pytest.approx(0.0, abs=1e-9)
     assert (nothing.gain("x", alone).n_strengths, nothing.gain("x", same).n_strengths) == (1, 0)
+    # With no strength of its own it is no evidence, whatever it gains.
+    less = replace(alone, label="less", kappa=90.0, low=0.3, high=0.4)
+    idle = nothing.gain("x", replace(same, label="idle", over=less, counts_whole=True))
+    assert idle.log_p.sum() > 1
+    assert (idle.n_strengths, idle.common) == (0, (0.0, 0))
 
 
 def test_chance_tells_a_name_as_seldom_as_the_level_says():

@@ -35,6 +35,7 @@ from zfcal.diagnose.features.law import SHARPER, Law
 from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.score_kernels import sums_of, write_slopes
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
+from zfcal.diagnose.selection import LEVEL
 from zfcal.model.features import (
     Landing,
     Leaving,
@@ -82,6 +83,9 @@ class Gain:
         What noise of positions alone makes it gain.
     without_noise
         Whether it gains that by the law of exact positions.
+    common
+        Nats, and strengths, of a part of it that is no evidence for the effect: what all fish do
+        alike, of a feature of how they differ.
     """
 
     name: str
@@ -92,6 +96,7 @@ class Gain:
     kind: str = ""
     noise: ByNoise = NO_NOISE
     without_noise: bool = False
+    common: tuple[float, int] = (0.0, 0)
 
     @property
     def key(self) -> tuple[str, str]:
@@ -107,7 +112,8 @@ class Gain:
     @property
     def p(self) -> float:
         """Chance of such a gain where nothing is missing."""
-        chance = self.noise.chance(float(self.log_p.sum()), self.n_strengths)
+        nats, n = self.common
+        chance = self.noise.chance(float(self.log_p.sum()) - nats, self.n_strengths - n)
         return min(1.0, self.n_tried * chance)
 
 
@@ -178,16 +184,22 @@ class Fits:
         """Return what a feature of an effect adds."""
         fit = self.fit(feature)
         made, n = fit.log_p, len(fit.strengths)
+        common = (0.0, 0)
         over = getattr(feature, "over", None)
         if over is not None and n:
-            common, n_common = self._common(over)
-            made = made - common
+            alike, n_alike = self._common(over)
             # What a landing has to gain more than is no part of it: all its strengths are its own.
-            n -= 0 if isinstance(feature, Landing) else min(n, n_common)
+            n_alike = 0 if isinstance(feature, Landing) else min(n, n_alike)
+            nats = float(alike.sum())
+            whole = getattr(feature, "counts_whole", False) and n > n_alike
+            if whole and NO_NOISE.chance(float(made.sum()) - nats, n - n_alike) < LEVEL:
+                common = nats, n_alike
+            else:
+                made, n = made - alike, n - n_alike
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
-            name=name, label=feature.label, log_p=made, n_strengths=n,
+            name=name, label=feature.label, log_p=made, n_strengths=n, common=common,
             without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import shapely
 
@@ -78,8 +81,12 @@ def _all_by_time(seen: Seen) -> Floats:
 def _nearness(between: shapely.Geometry, seen: Seen) -> Floats:
     """Return one at the way out of a room, less farther off, shape (step,)."""
     away_m = shapely.distance(between, shapely.points(seen.xy_m))
-    in_a_room = (seen.way_out != 0).any(axis=1)
-    return np.asarray(np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * in_a_room)
+    return np.asarray(np.clip(1 - away_m / _NEAR_M, 0.0, 1.0) * _in_a_room(seen))
+
+
+def _in_a_room(seen: Seen) -> Floats:
+    """Return one where there is a way out, shape (step,)."""
+    return np.asarray((seen.way_out != 0).any(axis=1), dtype=np.float64)
 
 
 def _leaning(between: shapely.Geometry) -> Tilt:
@@ -95,41 +102,51 @@ def _leaning(between: shapely.Geometry) -> Tilt:
 
     return Tilt(
         label="leaning to the way out, by who", vectors=by_who,
-        over=Tilt(label="leaning to the way out", vectors=common),
+        over=Tilt(label="leaning to the way out", vectors=common), counts_whole=True,
     )  # fmt: skip
-
-
-def _near_way_out(between: shapely.Geometry) -> Weights:
-    """Return one for each fish near the way out, shape (step, fish)."""
-    return lambda seen: np.asarray(seen.once(each_fish) * _nearness(between, seen)[:, None])
 
 
 def _by_who(between: shapely.Geometry) -> tuple[Feature, ...]:
     """Return that each fish is drawn, or turns, to the way out in a measure of its own."""
-    near = _near_way_out(between)
+    places: dict[str, Callable[[Seen], Floats]] = {
+        "the way out": partial(_nearness, between),
+        "the way out from anywhere": _in_a_room,
+    }
+    return tuple(make(*place) for place in places.items() for make in (_drawn, _turning))
 
-    def all_near(seen: Seen) -> Floats:
-        return near(seen).sum(axis=1, keepdims=True)
 
-    def drawn(label: str, weights: Weights, over: Component | None = None) -> Component:
+def _drawn(name: str, where: Callable[[Seen], Floats]) -> Component:
+    """Return that each fish is drawn to the way out in a measure of its own.
+
+    By what all do alike no fish is bolder than another; where they differ both are boldness.
+    """
+
+    def component(label: str, weights: Weights, over: Component | None = None) -> Component:
         return Component(
             label=label, toward=lambda seen: only(seen.way_out),
-            weights=lambda seen: only(weights(seen)), kappa=_KAPPA, over=over,
+            weights=lambda seen: only(weights(seen)), kappa=_KAPPA, over=over, counts_whole=True,
         )  # fmt: skip
 
-    def turning(label: str, weights: Weights, over: Turned | None = None) -> Turned:
+    common = component(f"drawn to {name}", lambda seen: where(seen)[:, None])
+    return component(f"drawn to {name}, by who", _each(where), common)
+
+
+def _turning(name: str, where: Callable[[Seen], Floats]) -> Turned:
+    """Return that each fish turns to the way out in a measure of its own."""
+
+    def turned(label: str, weights: Weights, over: Turned | None = None) -> Turned:
         def by(seen: Seen) -> Floats:
             return weights(seen) * aside_of(seen, seen.way_out[:, None], along_walls=True)
 
-        return Turned(label=label, by=by, neighbours=True, over=over)
+        return Turned(label=label, by=by, neighbours=True, over=over, counts_whole=True)
 
-    # More than what all do alike, by which no fish is bolder than another.
-    return (
-        drawn("drawn to the way out, by who", near, drawn("drawn to the way out", all_near)),
-        turning(
-            "turning to the way out, by who", near, turning("turning to the way out", all_near)
-        ),
-    )
+    common = turned(f"turning to {name}", lambda seen: where(seen)[:, None])
+    return turned(f"turning to {name}, by who", _each(where), common)
+
+
+def _each(where: Callable[[Seen], Floats]) -> Weights:
+    """Return a weight for each fish of its own, shape (step, fish)."""
+    return lambda seen: np.asarray(seen.once(each_fish) * where(seen)[:, None])
 
 
 def _crossing(between: shapely.Geometry) -> Tilt:
@@ -145,6 +162,7 @@ def _crossing(between: shapely.Geometry) -> Tilt:
     return Tilt(
         label="going on between the rooms, by who", vectors=by_who,
         over=Tilt(label="going on between the rooms", vectors=lambda seen: ahead(seen)[:, None]),
+        counts_whole=True,
     )  # fmt: skip
 
 
