@@ -276,12 +276,14 @@ def test_what_all_do_alike_is_gained_over(arena, seen):
         ("boldness", "drawn to the way out, by who"),
         ("boldness", "turning to the way out, by who"),
         ("boldness", "drawn to the way out from anywhere, by who"),
+        ("boldness", "turning to the way out from anywhere, by who"),
+        ("boldness", "going on between the rooms, by who"),
         ("boldness", "leaning to the way out, by who"),
         ("leader-following", "leaning to the fast"),
     ):  # fmt: skip
         own = labelled(name, label, arena)
         assert type(own.over) is type(own)
-        assert getattr(own, "counts_whole", False) == (name == "boldness")
+        assert getattr(own, "counts_whole", False) == ("the way out" in label)
     (between,) = (zone.polygon for zone in arena.zones if zone.polygon is not None)
     near = dataclasses.replace(seen, xy_m=np.tile(between.centroid.coords[0], (N, 1)))
     leaning = labelled("boldness", "leaning to the way out, by who", arena)

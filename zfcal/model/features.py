@@ -220,8 +220,8 @@ class Component:
         What it has to gain more than, where that is no case of the effect: what all fish do alike,
         of a feature of how they differ.
     counts_whole
-        Whether both count together once it gains more than ``over`` beyond chance: that is then
-        nobody's effect but this one's.
+        Whether both count together once it gains more than ``over`` beyond chance: no other name
+        needs both.
     """
 
     label: str

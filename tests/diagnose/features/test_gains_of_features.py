@@ -84,7 +84,7 @@ def test_what_each_fish_does_its_own_way_is_told(base, hidden):
 
 @pytest.mark.parametrize("differs", [True, False])
 def test_what_all_do_alike_counts_with_how_they_differ(base, hidden, differs):
-    """If they do: its chance is that of the difference. Where all are alike none of it counts."""
+    """Its chance is that of the difference. Where all are alike nothing is told."""
     scene, fitted = base
     mixture, _, _ = fitted.tables()
     tracks = np.unique(scene.turns.track)
@@ -105,19 +105,80 @@ def test_what_all_do_alike_counts_with_how_they_differ(base, hidden, differs):
 
     fits = Fits(law=hidden(factor))
     alike = drawn("alike", lambda seen: np.ones((len(seen.zone), 1, 1)))
-    apart, whole = (
+    apart, counted = (
         fits.gain("x", drawn("by who", by_who, over=alike, counts_whole=counts))
         for counts in (False, True)
     )
-    assert whole.p == pytest.approx(apart.p, rel=1e-6, abs=1e-300)
-    assert (whole.p < 1e-6) == differs
+    assert apart.whole is apart
+    assert (counted.p, counted.nats) == (apart.p, apart.nats)
+    whole = counted.whole
+    assert (whole.p, whole.n_strengths) == (apart.p, len(tracks))
+    np.testing.assert_allclose(whole.log_p - apart.log_p, fits.fit(alike).log_p)
+    assert whole.nats > apart.nats + 5
+    assert (tell([counted]) is not None) == differs
     if differs:
-        np.testing.assert_allclose(whole.log_p - apart.log_p, fits.fit(alike).log_p)
-        assert whole.n_strengths == apart.n_strengths + 1 == len(tracks)
-        assert whole.nats > apart.nats + 5
-    else:
-        assert fits.gain("x", alike).nats > 20
-        assert whole.nats == pytest.approx(apart.nats)
+        assert tell([counted]).gain.nats == whole.nats
+
+
+def test_of_noisy_positions_what_all_do_alike_does_not_count(base):
+    """What noise makes of it is not known."""
+    scene, fitted = base
+
+    def each(seen):
+        return np.stack([seen.track == 0, seen.track != 0], axis=1)[:, None].astype(float)
+
+    def pulled(weights, **more):
+        return Component(label="x", toward="toward", weights=weights, low=-0.5, **more)
+
+    alike = pulled(lambda seen: seen.attention[..., None] * np.ones((1, 1, 1)))
+    apart = pulled(
+        lambda seen: seen.attention[..., None] * each(seen), over=alike, counts_whole=True
+    )
+    exact, noisy = (
+        Fits(law=Law(scene=scene, fitted=fitted, noise_m=noise_m, n_draws=2, every=20))
+        for noise_m in (0.0, 5e-4)
+    )
+    assert exact.gain("x", apart).common is not None
+    assert noisy.gain("x", apart).common is None
+
+
+def test_what_counts_with_a_gain_counts_beyond_chance_alone():
+    """Of twenty names: chance is that of the family, and not of the one feature."""
+    others = [gain(f"name {k}", np.zeros(300)) for k in range(20)]
+    place = gain("place", np.full(300, 0.1))
+    common = np.full(300, 0.2)
+
+    def bold(nats):
+        return replace(gain("bold", np.full(300, nats / 300)), common=common, n_common=1)
+
+    less, more = bold(4.0), bold(15.0)
+    assert less.p < 0.02 < less.p * 22
+    alone = tell([place, *others])
+    for each, name in ((less, "place"), (more, "bold")):
+        told = tell([each, place, *others])
+        assert told.gain.name == name
+        assert told.ties == ()
+    beside = tell([less, place, *others])
+    assert beside.lead == min(alone.lead, tell([place, replace(less, common=None)]).lead)
+    told = tell([more, place, *others])
+    assert told.gain.nats == pytest.approx(15 + 60 - 2)
+    assert told.p == pytest.approx(22 * more.p)
+
+
+def test_noise_hides_a_gain_with_what_counts_with_it():
+    """What all do alike makes it no tie, and says nothing of the noise at which it would show."""
+    place = gain("place", np.full(300, 0.15))
+    bold = gain("bold", np.full(300, 0.05))
+    more = replace(bold, common=np.full(300, 0.2), n_common=1)
+    noise = {"place": ByNoise(), "bold": ByNoise(mean_nats=12.0)}
+
+    def held(some):
+        return [noise[each.name] for each in some]
+
+    said, without = (answer([each, place], held) for each in (more, bold))
+    assert (said.told.gain.name, said.told.ties) == ("place", ())
+    assert said.told.lead == without.told.lead
+    assert said.hidden == without.hidden != ()
 
 
 def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
@@ -464,11 +525,6 @@ def test_a_feature_may_have_to_gain_more_than_another(nothing):
     same = replace(alone, label="over itself", over=alone)
     assert nothing.gain("x", same).log_p == pytest.approx(0.0, abs=1e-9)
     assert (nothing.gain("x", alone).n_strengths, nothing.gain("x", same).n_strengths) == (1, 0)
-    # With no strength of its own it is no evidence, whatever it gains.
-    less = replace(alone, label="less", kappa=90.0, low=0.3, high=0.4)
-    idle = nothing.gain("x", replace(same, label="idle", over=less, counts_whole=True))
-    assert idle.log_p.sum() > 1
-    assert (idle.n_strengths, idle.common) == (0, (0.0, 0))
 
 
 def test_chance_tells_a_name_as_seldom_as_the_level_says():

@@ -3,9 +3,9 @@
 Components and turns are fitted with the base's parameters and the lapses (Wilks 1938, Annals of
 Mathematical Statistics 9: 60-62); tilts and leaving with the lapse, against the base as it is. A
 tilt that may be named has the base's parameters fitted beside it, unless it is counted over what
-all have alike, for which they do the same. These are taken as linear: where
-30 % of all headings had a cause of their own, fits about where the parameters had gone gained no
-more (513.5 nats, for 514.7).
+all have alike, for which they do the same (counted whole it gains a little less than it might).
+These are taken as linear: where 30 % of all headings had a cause of their own, fits about where the
+parameters had gone gained no more (513.5 nats, for 514.7).
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ from zfcal.diagnose.features.law import SHARPER, Law
 from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.score_kernels import sums_of, write_slopes
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
-from zfcal.diagnose.selection import LEVEL
 from zfcal.model.features import (
     Landing,
     Leaving,
@@ -83,9 +82,13 @@ class Gain:
         What noise of positions alone makes it gain.
     without_noise
         Whether it gains that by the law of exact positions.
-    common
-        Nats, and strengths, of a part of it that is no evidence for the effect: what all fish do
-        alike, of a feature of how they differ.
+    common : ndarray, shape (step,), optional
+        Log density that what all fish do alike adds to each step, of a feature of how they differ
+        which may count with it: see `whole`.
+    n_common
+        Strengths of that.
+    apart
+        What it was without that, which has the chance.
     """
 
     name: str
@@ -96,7 +99,9 @@ class Gain:
     kind: str = ""
     noise: ByNoise = NO_NOISE
     without_noise: bool = False
-    common: tuple[float, int] = (0.0, 0)
+    common: Floats | None = None
+    n_common: int = 0
+    apart: Gain | None = None
 
     @property
     def key(self) -> tuple[str, str]:
@@ -112,9 +117,20 @@ class Gain:
     @property
     def p(self) -> float:
         """Chance of such a gain where nothing is missing."""
-        nats, n = self.common
-        chance = self.noise.chance(float(self.log_p.sum()) - nats, self.n_strengths - n)
+        if self.apart is not None:
+            return self.apart.p
+        chance = self.noise.chance(float(self.log_p.sum()), self.n_strengths)
         return min(1.0, self.n_tried * chance)
+
+    @property
+    def whole(self) -> Gain:
+        """It with what all fish do alike, where that counts; its chance stays what it is."""
+        if self.common is None:
+            return self
+        return replace(
+            self, log_p=self.log_p + self.common, n_strengths=self.n_strengths + self.n_common,
+            common=None, n_common=0, apart=self,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -184,23 +200,21 @@ class Fits:
         """Return what a feature of an effect adds."""
         fit = self.fit(feature)
         made, n = fit.log_p, len(fit.strengths)
-        common = (0.0, 0)
+        common, n_common = None, 0
         over = getattr(feature, "over", None)
         if over is not None and n:
             alike, n_alike = self._common(over)
+            made = made - alike
             # What a landing has to gain more than is no part of it: all its strengths are its own.
-            n_alike = 0 if isinstance(feature, Landing) else min(n, n_alike)
-            nats = float(alike.sum())
-            whole = getattr(feature, "counts_whole", False) and n > n_alike
-            if whole and NO_NOISE.chance(float(made.sum()) - nats, n - n_alike) < LEVEL:
-                common = nats, n_alike
-            else:
-                made, n = made - alike, n - n_alike
+            n -= 0 if isinstance(feature, Landing) else min(n, n_alike)
+            # What noise makes of what all do alike is not known: then it does not count.
+            if getattr(feature, "counts_whole", False) and not self.law.noise_m > 0:
+                common, n_common = alike, n_alike
         if self.beyond is not None:
             made = made + self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n, common=common,
-            without_noise=not self.law.noise_m > 0,
+            n_common=n_common, without_noise=not self.law.noise_m > 0,
         )  # fmt: skip
 
     def _common(self, over: Single) -> tuple[Floats, int]:

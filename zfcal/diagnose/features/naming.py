@@ -123,7 +123,10 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
         lost = best_by_name([gain for gain in held if gain.name not in stand])
         gains = [*held, *(gain for gain in gains if gain.name not in known)]
     hidden = tuple(_hidden(gain, level / n_tried[gain.name]) for gain in lost)
-    best = best_by_name(clear)
+    # What counts with a gain counts where that is more than chance, for the order of names alone.
+    standing = {id(gain) for gain in clear}
+    gains = [gain.whole if id(gain) in standing else gain for gain in gains]
+    best = best_by_name([gain.whole for gain in clear])
     if not best:
         return Answer(told=None, hidden=hidden)
     first, *others = best

@@ -162,7 +162,6 @@ def _crossing(between: shapely.Geometry) -> Tilt:
     return Tilt(
         label="going on between the rooms, by who", vectors=by_who,
         over=Tilt(label="going on between the rooms", vectors=lambda seen: ahead(seen)[:, None]),
-        counts_whole=True,
     )  # fmt: skip
 
 
