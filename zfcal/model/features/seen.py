@@ -1,0 +1,152 @@
+"""What fish have about them when they take a step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zfcal.arrays import Floats
+
+AWAY_M = 9.0
+"""In place of the distance to one who is not there."""
+
+LAGS = (1, 2, 3, 4, 5, 8)
+"""Steps by which a response may be late."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seen:
+    """What the fish of some steps have about them; directions are unit vectors.
+
+    Parameters
+    ----------
+    attention : ndarray, shape (step, other)
+        alpha times the solid angle at which each other agent is seen; 0 for who is not seen.
+    toward, soon_toward, half_toward : ndarray, shape (step, other, 2)
+        Where the base law draws to, away from who is too near: now, where the other was a tenth of
+        a step before, and half a step. Zeros for who is not there.
+    late_toward, older_toward : ndarray, shape (step, other, 2)
+        The same of whom the fish would have seen, had all others been where they were a step
+        before, and two.
+    soon_attention, half_attention, late_attention, older_attention : ndarray, shape (step, other)
+        Likewise, had all others been where they were a tenth of a step before, half a step, one and
+        two.
+    ago_toward, then_toward : ndarray, shape (lag, step, other, 2)
+        Where the other was `LAGS` steps before, seen or not: from where the fish is, and from where
+        it was itself.
+    bearing : ndarray, shape (step, other, 2)
+        To the other.
+    distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
+        Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its last
+        speed, and the mean over two seconds.
+    heading, course : ndarray, shape (step, other, 2)
+        Of the other: the direction of its last step, and its mean velocity over two seconds in m/s;
+        zeros where that is not known.
+    here, in_sight, is_robot : ndarray of bool, shape (step, other)
+    other : ndarray of int, shape (step, other)
+        Track of the other; -1 for who is not there.
+    own_heading, along_wall, way_out, xy_m : ndarray, shape (step, 2)
+        ``way_out``: to the nearest way out of a room; zeros elsewhere.
+    x_axis : ndarray, shape (step, 2)
+        That of the tank. Where positions are drawn anew all directions are turned, so that the
+        heading taken stays the measured one.
+    follows_walls : ndarray of bool, shape (step,)
+        Whether the zone does.
+    zone, track : ndarray of int, shape (step,)
+    own_speed_m_s : ndarray, shape (step,)
+        Of the step itself, which is given.
+    last_turn_rad : ndarray, shape (step,)
+        To the left; 0 where it is not known.
+    ago_heading : ndarray, shape (lag, step, 2)
+        Own headings `LAGS` steps before; zeros where it is not known.
+    recent_turn_rad : ndarray, shape (step,)
+        Mean of the last turns, the later the more it counts; wide ones count as 1.2.
+    time : ndarray, shape (step,)
+        Share of the recording that has passed.
+    left_s : ndarray, shape (step,)
+        Since another one that is still away left the room.
+    each_left_s : ndarray, shape (step, other)
+        Since each other one left it, though it may have come back; infinite for who did not.
+    in_open : ndarray, shape (step, other)
+        Share of the last five seconds that the other was off the walls.
+    stayed_s : ndarray, shape (step,)
+        Since the fish came into its room, or between the rooms, or into the recording.
+    """
+
+    attention: Floats
+    toward: Floats
+    soon_toward: Floats
+    half_toward: Floats
+    late_toward: Floats
+    older_toward: Floats
+    soon_attention: Floats
+    half_attention: Floats
+    late_attention: Floats
+    older_attention: Floats
+    ago_toward: Floats
+    then_toward: Floats
+    bearing: Floats
+    distance_m: Floats
+    off_axis_rad: Floats
+    speed_m_s: Floats
+    lately_m_s: Floats
+    heading: Floats
+    course: Floats
+    here: NDArray[np.bool_]
+    in_sight: NDArray[np.bool_]
+    is_robot: NDArray[np.bool_]
+    other: NDArray[np.int32]
+    own_heading: Floats
+    along_wall: Floats
+    way_out: Floats
+    xy_m: Floats
+    x_axis: Floats
+    follows_walls: NDArray[np.bool_]
+    zone: NDArray[np.int64]
+    track: NDArray[np.int32]
+    own_speed_m_s: Floats
+    last_turn_rad: Floats
+    ago_heading: Floats
+    recent_turn_rad: Floats
+    time: Floats
+    left_s: Floats
+    each_left_s: Floats
+    in_open: Floats
+    stayed_s: Floats
+    _made: dict[Callable[[Seen], Floats], Floats] = field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    def once(self, make: Callable[[Seen], Floats]) -> Floats:
+        """Return what a function makes of what is seen, worked out once: not to be written to."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]
+
+    @property
+    def nearest(self) -> Floats:
+        """One for the nearest other one, else 0, shape (step, other, 1)."""
+        return self.chosen(-self.distance_m, self.here)
+
+    @property
+    def foremost(self) -> Floats:
+        """One for the other one that is most straight ahead, of those before the fish."""
+        return self.chosen(-self.off_axis_rad, self.here & (self.off_axis_rad < math.pi / 2))
+
+    def chosen(self, values: Floats, among: NDArray[np.bool_]) -> Floats:
+        """Return one for the other one of the highest value, else 0, shape (step, other, 1).
+
+        Parameters
+        ----------
+        values, among : ndarray, shape (step, other)
+            Of those among whom it is chosen.
+        """
+        if not among.size:
+            return np.zeros((*among.shape, 1))
+        best = np.where(among, values, -np.inf).argmax(axis=1)
+        is_best = best[:, None] == np.arange(among.shape[1])
+        return np.asarray((is_best & among)[..., None], dtype=np.float64)
