@@ -41,7 +41,11 @@ def turned_by(ways: Floats, angle_rad: ArrayLike) -> Floats:
         For each of them, or for all.
     """
     c, s = np.cos(angle_rad)[..., None], np.sin(angle_rad)[..., None]
-    return np.asarray(c * ways + s * left_of(ways))
+    made = np.empty(np.broadcast_shapes(ways.shape, c.shape))
+    x, y, c, s = ways[..., 0], ways[..., 1], c[..., 0], s[..., 0]
+    np.subtract(c * x, s * y, out=made[..., 0])
+    np.add(c * y, s * x, out=made[..., 1])
+    return made
 
 
 def doubled(ways: Floats) -> Floats:

@@ -1,9 +1,11 @@
 """A first look says about what a fit gains, before there is one."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from zfcal.diagnose.features.first_look import basis_of, off
+from zfcal.diagnose.features.first_look import FirstLook, basis_of, off, thinned
 from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.model.effects import all_effects
@@ -75,6 +77,51 @@ def test_it_sees_what_is_there(base, fits):
     assert best == "leaning, by the speed"
     assert fits.most_promising(leaning, 1)[0].label == best
     assert looked[best] > 20
+
+
+def towards(angle_rad):
+    """Return a leaning to a direction of the tank, as strong everywhere."""
+    way = np.array([np.cos(angle_rad), np.sin(angle_rad)])
+    return Tilt(
+        label=f"{angle_rad:.2f}",
+        vectors=lambda seen: np.broadcast_to(way, (len(seen.zone), 1, 2)),
+        low=0.0,
+    )
+
+
+def test_of_many_features_a_few_are_looked_at_in_all_steps(fits, monkeypatch):
+    """Those of which a quarter of the steps says most; the others in these alone."""
+    ways = [towards(2 * np.pi * k / 40) for k in range(40)]
+    looks = []
+    nats = FirstLook.nats
+
+    def counted(look, feature):
+        looks.append(len(look.law.rows))
+        return nats(look, feature)
+
+    monkeypatch.setattr(FirstLook, "nats", counted)
+    (best,) = fits.most_promising(OneOf(kind="ways", features=ways), 1)
+    assert float(best.label) == pytest.approx(np.pi / 2, abs=0.4)
+    n_steps = len(fits.law.rows)
+    assert looks.count(n_steps) == 10
+    assert looks.count(-(-n_steps // 4)) == 40
+    looks.clear()
+    fits.most_promising(OneOf(kind="ways", features=ways[:20]), 1)
+    assert looks == [n_steps] * 20
+
+
+def test_the_law_of_a_few_steps_is_that_of_all_of_them(fits):
+    """With factors on headings and on leaving, which are of each step."""
+    law, steps = fits.law, np.arange(len(fits.law.rows))
+    bent = (0.001 * steps[:, None] * np.ones(law.weight.shape[1]), 0.002 * steps)
+    law = law.absorbing(bent=bent, leaving=(2, 0.0001 * steps))
+    few = thinned(law, 3)
+    np.testing.assert_array_equal(few.rows, law.rows[::3])
+    np.testing.assert_allclose(few.cells, law.cells[::3], rtol=1e-12)
+    np.testing.assert_allclose(few.log_here, law.log_here[::3], rtol=1e-12)
+    np.testing.assert_allclose(few.base[1], law.base[1][::3], rtol=1e-9)
+    noisy = thinned(dataclasses.replace(law, noise_m=1e-3), 5)
+    assert (len(noisy.rows), len(noisy.draws)) == (len(law.rows[::5]), 1)
 
 
 def test_features_that_promise_nothing_are_not_fitted(base, fits):

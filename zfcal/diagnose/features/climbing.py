@@ -14,6 +14,7 @@ from scipy.special import logit
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.lapses import Lapses
+from zfcal.diagnose.features.score_kernels import sums_of
 from zfcal.model.extended import LAPSE
 
 _CLIMBS = 100
@@ -189,8 +190,9 @@ def climb_within(objective: Objective, x0: Floats, bounds: Sequence[Bounds]) -> 
     value, scores_of = objective(x)
     for _ in range(_CLIMBS):
         scores = scores_of()
-        step = _step_of(scores, low - x, high - x)
-        promised = float(scores.sum(axis=0) @ step)
+        slope = sums_of(scores)
+        step = _step_of(scores, slope, low - x, high - x)
+        promised = float(slope @ step)
         share = 1.0
         while promised * share > _NOTHING:
             tried = np.clip(x + share * step, low, high)
@@ -212,7 +214,7 @@ def scaled(pair: Bounds, scale: float) -> Bounds:
     return low, high
 
 
-def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:
+def _step_of(scores: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
     """Return the change that sets the scores of single steps nearest to one, within bounds."""
     gram = scores.T @ scores
     squares = np.diag(gram)
@@ -220,6 +222,6 @@ def _step_of(scores: Floats, low: Floats, high: Floats) -> Floats:
     size = np.sqrt(np.where(squares > _IDLE, squares, 1.0))
     square = gram / size / size[:, None] + _RIDGE * np.eye(len(size))
     root = np.linalg.cholesky(square)
-    toward = solve_triangular(root, scores.sum(axis=0) / size, lower=True)
+    toward = solve_triangular(root, slope / size, lower=True)
     found = lsq_linear(root.T, toward, (low * size, high * size), method="bvls", tol=1e-8)
     return np.asarray(found.x / size)

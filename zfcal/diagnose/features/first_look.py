@@ -7,7 +7,7 @@ Philosophical Society 44: 50-57).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -153,6 +153,21 @@ class FirstLook:
         """Mean headings under the law, and those of twice their angle, shapes (step, 2)."""
         chances = self.law.cells / self.law.cells.sum(axis=1, keepdims=True)
         return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
+
+
+def thinned(law: Law, share: int) -> Law:
+    """Return the law of one of so many steps, by one draw of where all were.
+
+    Parameters
+    ----------
+    law
+        Of all steps.
+    share
+        So many.
+    """
+    bent = law.bent and (law.bent[0][::share], law.bent[1][::share])
+    leaving = tuple((zone, log_factor[::share]) for zone, log_factor in law.leaving)
+    return replace(law, every=share * law.every, n_draws=1, bent=bent, leaving=leaving)
 
 
 def basis_of(scores: Floats) -> Floats:

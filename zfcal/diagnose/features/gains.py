@@ -28,7 +28,7 @@ from zfcal.diagnose.features.climbing import (
 )
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
-from zfcal.diagnose.features.first_look import FirstLook
+from zfcal.diagnose.features.first_look import FirstLook, thinned
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
 from zfcal.diagnose.features.law import SHARPER, Law
@@ -36,6 +36,7 @@ from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.score_kernels import sums_of, write_slopes
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
+    Choosable,
     Landing,
     Leaving,
     Mixed,
@@ -60,6 +61,12 @@ _AS_IT_IS, _NONE = np.ones(1), np.zeros(0)
 
 _FITTED = 2
 """Of features of which the most promising are fitted, so many."""
+
+_LOOKED_AT = 10
+"""Of more than twice as many features these are looked at in all steps."""
+
+_SHARE = 4
+"""The others in one of so many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -185,6 +192,7 @@ class Fits:
         """Work out what all features need, before they are asked side by side."""
         _ = (self.law.own_parameters, self.law.cells)
         _ = (self._null, self._untilted, self.first_look.prepared, self.landings.prepared)
+        _ = self._few.prepared
 
     @property
     def n_beside(self) -> int:
@@ -268,11 +276,25 @@ class Fits:
 
     def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Single]:
         """Return the features that a first look says most of, more than their strengths cost."""
-        promise = [self.first_look.nats(feature) for feature in choice.features]
-        order = [int(k) for k in np.argsort(promise)[::-1][:n] if promise[k] > 0]
+        looked_at = self._narrowed(choice.features)
+        promise = {k: self.first_look.nats(choice.features[k]) for k in looked_at}
+        order = [k for k in sorted(promise, key=promise.__getitem__)[::-1][:n] if promise[k] > 0]
         if choice.near is None:
             return [choice.features[k] for k in order]
         return [max(choice.near(k), key=self.first_look.nats) for k in order]
+
+    def _narrowed(self, features: Sequence[Choosable]) -> list[int]:
+        """Return which of some features are looked at in all steps."""
+        every = list(range(len(features)))
+        if len(features) <= 2 * _LOOKED_AT:
+            return every
+        promise = [self._few.nats(feature) for feature in features]
+        return sorted(every, key=promise.__getitem__)[-_LOOKED_AT:]
+
+    @cached_property
+    def _few(self) -> FirstLook:
+        """A look at a few of the steps."""
+        return replace(self, law=thinned(self.law, _SHARE), beyond=None).first_look
 
     @cached_property
     def first_look(self) -> FirstLook:

@@ -44,34 +44,47 @@ def wall_distances(xy_m: Floats, segments_m: Floats, away_m: Floats) -> None:
 
 
 @kernel
-def hats_within(away_m: Floats, knots_m: Floats, made: Floats) -> None:
-    """Write the hat functions of distances at all knots but the last.
+def places_among(away_m: Floats, knots_m: Floats, places: Floats) -> None:
+    """Write where distances lie among knots: the one before, and the share of the way to the next.
+
+    What is beyond the last knot, or NaN, is there.
 
     Parameters
     ----------
-    away_m : ndarray, shape (row, cell)
+    away_m, places : ndarray, shape (row, cell)
     knots_m : ndarray, shape (knot,)
         Two or more, ascending.
-    made : ndarray, shape (row, cell, knot - 1)
     """
     last = knots_m.size - 1
     for s in range(away_m.shape[0]):
         for c in range(away_m.shape[1]):
-            x = max(away_m[s, c], knots_m[0])
-            for k in range(last):
-                made[s, c, k] = 0.0
-            if x >= knots_m[last]:
-                continue
-            below, share = hat_at(x, knots_m)
-            made[s, c, below] = 1.0 - share
-            if below + 1 < last:
-                made[s, c, below + 1] = share
+            x = away_m[s, c]
+            places[s, c] = last
+            if x < knots_m[last]:
+                below, share = hat_at(max(x, knots_m[0]), knots_m)
+                places[s, c] = below + share
 
 
 @kernel
-def expected_hats(
-    chances: Floats, rows: NDArray[np.intp], away_m: Floats, knots_m: Floats, made: Floats
-) -> None:
+def hat_sums(places: Floats, values: Floats, made: Floats) -> None:
+    """Write values at the knots, which are linear between them.
+
+    Parameters
+    ----------
+    places, made : ndarray, shape (row, cell)
+        The first of `places_among`.
+    values : ndarray, shape (knot + 1,)
+        The last one twice.
+    """
+    for s in range(places.shape[0]):
+        for c in range(places.shape[1]):
+            below = int(places[s, c])
+            share = places[s, c] - below
+            made[s, c] = (1.0 - share) * values[below] + share * values[below + 1]
+
+
+@kernel
+def expected_hats(chances: Floats, rows: NDArray[np.intp], places: Floats, made: Floats) -> None:
     """Write the mean of the hat functions over cells, at all knots but the last.
 
     Parameters
@@ -79,22 +92,19 @@ def expected_hats(
     chances : ndarray, shape (step, cell)
         Of each cell.
     rows : ndarray of int, shape (row,)
-        Steps of the distances.
-    away_m : ndarray, shape (row, cell)
-    knots_m : ndarray, shape (knot,)
-        Two or more, ascending.
+        Steps of the places.
+    places : ndarray, shape (row, cell)
+        Of `places_among`.
     made : ndarray, shape (row, knot - 1)
     """
-    last = knots_m.size - 1
+    last = made.shape[1]
+    sums = np.empty(last + 2)
     for s in range(rows.size):
+        sums[:] = 0.0
+        for c in range(places.shape[1]):
+            below = int(places[s, c])
+            share, chance = places[s, c] - below, chances[rows[s], c]
+            sums[below] += chance * (1.0 - share)
+            sums[below + 1] += chance * share
         for k in range(last):
-            made[s, k] = 0.0
-        for c in range(away_m.shape[1]):
-            x = max(away_m[s, c], knots_m[0])
-            if x >= knots_m[last]:
-                continue
-            below, share = hat_at(x, knots_m)
-            chance = chances[rows[s], c]
-            made[s, below] += chance * (1.0 - share)
-            if below + 1 < last:
-                made[s, below + 1] += chance * share
+            made[s, k] = sums[k]

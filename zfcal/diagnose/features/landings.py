@@ -22,7 +22,12 @@ from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import Fit, climb, lapses_alone
 from zfcal.diagnose.features.columns import Columns
-from zfcal.diagnose.features.landing_kernels import expected_hats, hats_within, wall_distances
+from zfcal.diagnose.features.landing_kernels import (
+    expected_hats,
+    hat_sums,
+    places_among,
+    wall_distances,
+)
 from zfcal.diagnose.features.lapses import UNIFORM
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
@@ -44,28 +49,32 @@ class _Near:
     ----------
     rows : ndarray of int, shape (row,)
         Of these steps, among those of the law.
-    away_m : ndarray, shape (row, cell)
-        How far from the thing each cell's end is.
-    knots_m : ndarray, shape (weight + 1,)
+    places : ndarray, shape (row, cell)
+        Where the distance of each cell's end from the thing lies among the knots.
     taken : ndarray, shape (row, weight)
     """
 
     rows: NDArray[np.intp]
-    away_m: Floats
-    knots_m: Floats
+    places: Floats
     taken: Floats
 
-    @property
-    def cells(self) -> Floats:
-        """Weights of each cell, shape (row, cell, weight)."""
-        made = np.empty((*self.away_m.shape, len(self.knots_m) - 1))
-        hats_within(self.away_m, self.knots_m, made)
+    def log_factors(self, strengths: Floats) -> Floats:
+        """Return the log of the factor on each cell, shape (row, cell)."""
+        made = np.empty(self.places.shape)
+        hat_sums(self.places, np.append(strengths, [0.0, 0.0]), made)
         return made
 
     def expected(self, chances: Floats) -> Floats:
         """Return the mean weights, by chances of shape (step, cell), shape (row, weight)."""
-        made = np.empty((len(self.rows), len(self.knots_m) - 1))
-        expected_hats(chances, self.rows, self.away_m, self.knots_m, made)
+        return self._expected(chances, self.rows)
+
+    def expected_of_rows(self, chances: Floats) -> Floats:
+        """Return the mean weights, by chances of these rows alone."""
+        return self._expected(chances, np.arange(len(self.rows)))
+
+    def _expected(self, chances: Floats, rows: NDArray[np.intp]) -> Floats:
+        made = np.empty(self.taken.shape)
+        expected_hats(chances, rows, self.places, made)
         return made
 
 
@@ -138,12 +147,9 @@ class Landings:
         rows = np.flatnonzero(away - reach < feature.knots_m[-1])
         ended = xy[rows, None] + reach[rows, None, None] * self.law.turns.taken[rows, None]
         away, away_taken = (feature.away_m(seen, rows, at) for at in (self._ends[rows], ended))
-        return _Near(
-            rows=rows,
-            away_m=np.ascontiguousarray(away),
-            knots_m=np.array(feature.knots_m),
-            taken=hats(away_taken, feature.knots_m)[:, 0, :-1],
-        )
+        places = np.empty(away.shape)
+        places_among(np.ascontiguousarray(away), np.array(feature.knots_m), places)
+        return _Near(rows=rows, places=places, taken=hats(away_taken, feature.knots_m)[:, 0, :-1])
 
     def scores(self, feature: Landing) -> Floats:
         """Return the scores of a feature's weights where none has a strength, shape (row, weight).
@@ -158,15 +164,16 @@ class Landings:
     def fit(self, feature: Landing) -> Fit:
         """Return a feature at the maximum, and what it adds to each step."""
         near = self._near(feature)
-        chances, cells, taken = self.chances[near.rows], near.cells, near.taken
+        chances, taken = self.chances[near.rows], near.taken
         n, lapses = taken.shape[1], self.law.lapses
 
         def density(x: Floats) -> tuple[Floats, Floats]:
-            bent = chances * np.exp(cells @ x[:n])
+            bent = near.log_factors(x[:n])
+            np.multiply(chances, np.exp(bent, out=bent), out=bent)
             whole = bent.sum(axis=1)
             found = self._at.copy()
             found[near.rows] *= np.exp(taken @ x[:n]) / whole
-            return found, bent / whole[:, None]
+            return found, np.divide(bent, whole[:, None], out=bent)
 
         def objective(x: Floats) -> tuple[float, Callable[[], Floats]]:
             found, bent = density(x)
@@ -174,8 +181,8 @@ class Landings:
 
             def scores() -> Floats:
                 made = np.zeros((len(found), len(x)))
-                expected = np.einsum("sc,scb->sb", bent, cells)
-                made[near.rows, :n] = share[near.rows, None] * (taken - expected)
+                apart = taken - near.expected_of_rows(bent)
+                made[near.rows, :n] = share[near.rows, None] * apart
                 made[:, n:] = slopes
                 return made
 
@@ -205,7 +212,8 @@ class Landings:
         """
         near = self._near(feature)
         cells, taken = np.zeros(self.chances.shape), np.zeros(len(self.chances))
-        cells[near.rows], taken[near.rows] = near.cells @ fit.factor, near.taken @ fit.factor
+        cells[near.rows] = near.log_factors(fit.factor)
+        taken[near.rows] = near.taken @ fit.factor
         return cells, taken
 
 

@@ -213,10 +213,10 @@ class Law:
         """Return the average of columns over the draws."""
         if len(parts) == 1:
             return parts[0]
-        at, over = (
-            np.sum([w[:, None] * each for w, each in zip(self._weights, some, strict=True)], axis=0)
-            for some in zip(*parts, strict=True)
-        )
+        at, over = (np.zeros(each.shape) for each in parts[0])
+        for weight, own in zip(self._weights, parts, strict=True):
+            at += weight[:, None] * own[0]
+            over += weight[:, None] * own[1]
         return at, over
 
     def bells(self, toward: Floats, kappa: Floats | float) -> Columns:

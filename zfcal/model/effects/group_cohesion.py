@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
@@ -151,9 +152,9 @@ def _middle_of(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         Who is among them.
     """
     distance = np.where(seen.here & counts, seen.distance_m, 0.0)
-    total = (seen.bearing * distance[..., None]).sum(axis=1)
+    total = np.einsum("sjd,sj->sd", seen.bearing, distance)
     mean = total / np.maximum((seen.here & counts).sum(axis=1), 1)[:, None]
-    far = np.linalg.norm(mean, axis=1)
+    far = lengths(mean)
     return mean / np.maximum(far, 1e-9)[:, None], far
 
 

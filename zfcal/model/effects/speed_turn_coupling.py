@@ -83,9 +83,9 @@ def _by_last_turn(swum: Swum) -> Floats:
 
 def _turn_rad(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
     """Return by how much a fish turns that goes to some positions."""
-    away, own = xy_m - seen.xy_m[rows, None], seen.own_heading[rows, None]
-    cross = own[..., 0] * away[..., 1] - own[..., 1] * away[..., 0]
-    return np.asarray(np.abs(np.arctan2(cross, (own * away).sum(axis=-1))))
+    x, y = np.moveaxis(xy_m - seen.xy_m[rows, None], -1, 0)
+    own_x, own_y = seen.own_heading[rows].T[..., None]
+    return np.asarray(np.arctan2(np.abs(own_x * y - own_y * x), own_x * x + own_y * y))
 
 
 def _aside_m(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from zfcal.arrays import Floats
+from zfcal.model.directions import lengths
 from zfcal.model.effects.circumstances import each_fish, each_under
 from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Turned, Weights
 
@@ -90,9 +91,9 @@ def halfway(seen: Seen, toward: Floats) -> Floats:
 
 def mean_heading(seen: Seen, reach_m: float) -> Floats:
     """Return the unit vector of the mean heading of those within reach, shape (step, 1, 2)."""
-    total = (seen.heading * (seen.distance_m < reach_m)[..., None]).sum(axis=1)
-    length = np.linalg.norm(total, axis=1)
-    return np.asarray((total / np.maximum(length, 1e-9)[:, None])[:, None])
+    is_near = (seen.distance_m < reach_m).astype(np.float64)
+    total = np.einsum("sjd,sj->sd", seen.heading, is_near)
+    return np.asarray((total / np.maximum(lengths(total), 1e-9)[:, None])[:, None])
 
 
 def seen_and_nearest(seen: Seen) -> Floats:
