@@ -106,6 +106,7 @@ def seen():
         heading=ways(n, others),
         course=0.05 * ways(n, others),
         here=np.ones((n, others), dtype=bool),
+        too_near=np.zeros((n, others), dtype=bool),
         in_sight=rng.random((n, others)) < 0.7,
         is_robot=robot,
         other=np.tile(np.array([3, 4, 5], dtype=np.int32)[:others], (n, 1)),

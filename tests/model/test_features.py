@@ -353,12 +353,66 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
         # Three tenths of a step are three times one.
         tenths = each.label.startswith("a tenth of a step") and "sight" not in each.label
         assert each.high == (3.0 if tenths else 1.0)
+    by_label = {each.label: each for each in late}
     for k, lag in enumerate(LAGS):
-        here, there = late[5 + k], late[5 + len(LAGS) + k]
-        assert (here.label, there.label) == (f"{lag} steps", f"{lag} steps, from there")
+        here, there = by_label[f"{lag} steps"], by_label[f"{lag} steps, from there"]
         np.testing.assert_array_equal(here.toward(seen), seen.ago_toward[k])
         np.testing.assert_array_equal(there.toward(seen), seen.then_toward[k])
         np.testing.assert_array_equal(there.weights(seen)[..., 0], seen.attention)
+
+
+def test_near_ones_are_felt_at_once_or_late_as_well(arena, seen):
+    """The base law draws away from them: from where they are, or from where they were."""
+    near = np.zeros((N, OTHERS), dtype=bool)
+    near[:, 1] = True
+    seen = dataclasses.replace(seen, too_near=near)
+    felt, late = (
+        labelled("reaction-delay", label, arena).toward(seen)
+        for label in ("2 steps", "2 steps, near ones too")
+    )
+    np.testing.assert_array_equal(felt[:, 1], seen.toward[:, 1])
+    np.testing.assert_array_equal(felt[:, ::2], late[:, ::2])
+    np.testing.assert_array_equal(late, seen.ago_toward[1])
+    assert (felt[:, 1] != late[:, 1]).any()
+
+
+def test_who_heeds_nobody_has_as_much_of_its_own_way_as_of_all(arena, seen):
+    """A share of all headings goes the own way: half each way along walls, else ahead."""
+    nobody = labelled("habituation", "heeding nobody, by the time", arena)
+    assert nobody.kappa == "own"
+    toward, weights = nobody.toward(seen), nobody.weights(seen)
+    whole = 1 + seen.attention.sum(axis=1)
+    np.testing.assert_allclose(weights.sum(axis=(1, 2)), whole)
+    np.testing.assert_allclose(weights.sum(axis=2), nobody.over.weights(seen)[..., 0])
+    along = seen.follows_walls
+    assert along.any()
+    assert not along.all()
+    np.testing.assert_array_equal(toward[along, 0], seen.along_wall[along])
+    np.testing.assert_array_equal(toward[along, 1], -seen.along_wall[along])
+    np.testing.assert_array_equal(toward[~along, 0], seen.own_heading[~along])
+    np.testing.assert_allclose(weights[along, 0], weights[along, 1])
+    assert not weights[~along, 1].any()
+
+
+def test_robots_are_heeded_by_their_speed(arena, seen):
+    """Fish are not, and all robots count at one speed or another."""
+    weights = labelled("robot-avoidance", "attention to robots, by their speed", arena).weights(
+        seen
+    )
+    assert not weights[~seen.is_robot].any()
+    np.testing.assert_allclose(weights.sum(axis=2), seen.attention * seen.is_robot)
+
+
+def test_who_is_in_front_is_the_nearest_ahead(arena, seen):
+    """Within 60 degrees of the heading; nobody there is far away."""
+    ahead = np.array([[0.2, 1.0, 3.0]] * N)
+    far = np.array([[0.3, 0.1, 0.05]] * N)
+    here = np.ones((N, OTHERS), dtype=bool)
+    here[0, :2] = False
+    seen = dataclasses.replace(seen, off_axis_rad=ahead, distance_m=far, here=here)
+    np.testing.assert_array_equal(seen.in_front_m, [AWAY_M] + [0.1] * (N - 1))
+    own = labelled("rear-blind-zone", "attention to those behind, by who is in front", arena)
+    assert own.weights(seen).shape[2] == 4  # Those behind, and beside them all, in either case.
 
 
 def test_each_that_left_counts_though_it_is_back(arena, seen):

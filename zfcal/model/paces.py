@@ -20,6 +20,9 @@ from zfcal.arrays import Floats
 LATELY_S = 2.0
 """Means of last speeds are over so long."""
 
+LONGER_S = 4.0
+"""Those of the own ones over so long as well."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Swum:
@@ -31,12 +34,16 @@ class Swum:
         Normal scores of the own speed one, two and three steps ago; 0 where it is not known.
     lately : ndarray, shape (step,)
         Mean of the own ones over two seconds.
+    longer : ndarray, shape (step,)
+        Likewise over `LONGER_S`.
     earlier, before_earlier : ndarray, shape (step,)
         Scores of two steps in a row, the later one about a second before the last step.
     last_m_s, last_ago_m_s : ndarray, shape (step,)
         The own speed one step ago, and about a second before that; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
+    bent_rad : ndarray, shape (step,)
+        The widest of the last three turns.
     turn_rad : ndarray, shape (step,)
         Of the step itself, to either side: no cause of its speed where the law draws that first.
     others : ndarray, shape (step, other)
@@ -47,8 +54,10 @@ class Swum:
         Their last speeds, and those of about a second before; NaN where they are not known.
     distance_m : ndarray, shape (step, other)
         To them; `zfcal.model.features.AWAY_M` for who is not there.
+    ahead : ndarray of bool, shape (step, other)
+        Whether the other is before the fish.
     ahead_m : ndarray, shape (step,)
-        To the nearest other one before the fish; `zfcal.model.features.AWAY_M` without one.
+        To the nearest one that is; `zfcal.model.features.AWAY_M` without one.
     since_fast : ndarray, shape (step,)
         Steps since the last one whose speed one in eight exceeds; many if it is not known.
     here : ndarray of bool, shape (step, other)
@@ -61,17 +70,20 @@ class Swum:
     before_last: Floats
     third: Floats
     lately: Floats
+    longer: Floats
     earlier: Floats
     before_earlier: Floats
     last_m_s: Floats
     last_ago_m_s: Floats
     last_turn_rad: Floats
+    bent_rad: Floats
     turn_rad: Floats
     others: Floats
     others_lately: Floats
     others_m_s: Floats
     others_ago_m_s: Floats
     distance_m: Floats
+    ahead: NDArray[np.bool_]
     ahead_m: Floats
     since_fast: Floats
     here: NDArray[np.bool_]

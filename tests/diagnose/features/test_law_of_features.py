@@ -248,6 +248,25 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     np.testing.assert_allclose(found.seen.off_axis_rad, plain.seen.off_axis_rad, atol=1e-7)
 
 
+def test_who_is_too_near_is_left_from_where_it_was(law):
+    """And from where it is where that is not known; all others draw to where they were."""
+    seen, turns, states = law.draws[0].seen, law.turns, law.scene.states
+    n = states.shape[2]
+    others = np.array([[j for j in range(n) if j != i] for i in range(n)])[turns.who]
+    before = np.maximum(turns.at - 1, 0)[:, None]
+    xy = np.stack([states[before, row, others] for row in (X, Y)], axis=-1)
+    way = xy - seen.xy_m[:, None]
+    way /= np.maximum(np.linalg.norm(way, axis=-1), 1e-12)[..., None]
+    known = (states[before, ZONE, others] > 0) & seen.here & (turns.at > 0)[:, None]
+    assert 10 < (known & seen.too_near).sum() < 0.2 * known.sum()
+    for is_near, sign in ((seen.too_near, -1), (~seen.too_near, 1)):
+        some = known & is_near
+        np.testing.assert_allclose(seen.ago_toward[0][some], sign * way[some], atol=1e-9)
+    unknown = seen.too_near & ~known & (seen.attention > 0)
+    np.testing.assert_allclose(seen.ago_toward[0][unknown], seen.toward[unknown], atol=1e-9)
+    assert not (seen.too_near & ~seen.here).any()
+
+
 def test_others_come_into_view_late(law):
     """Who is seen now and was not a tenth of a step ago is rarer than half a step ago, or a step.
 

@@ -183,6 +183,75 @@ def test_speeds_of_a_few_steps_are_told(nothing, rule, label):
     assert course.in_all_phases
 
 
+def the_feature(name, label):
+    """Return a feature of speeds by its label."""
+    return next(each for each in find_effect(name).paces if each.label == label)
+
+
+def spending(speed, _rng):
+    """Slower, the faster it was in the mean of the last six seconds."""
+    made = speed.copy()
+    for k in range(18, len(made)):
+        made[k] = speed[k] * np.exp(-1.5 * (made[k - 18 : k].mean() / speed.mean() - 1))
+    return made
+
+
+def test_a_budget_of_some_seconds_is_told_by_longer_means(nothing):
+    """That over two seconds sees a part of it."""
+    paces = scores_by_last(nothing, spending)
+    short, long = (
+        paces.gain("burst-and-coast", the_feature("burst-and-coast", f"by the {label}")).nats
+        for label in ("mean over two seconds", "means over two and four seconds")
+    )
+    assert long > short + 10 > 10
+
+
+def test_longer_means_are_of_the_scores_of_so_many_steps(nothing):
+    """Ten steps at 5 Hz are two seconds, 20 are four; the last one is among them."""
+    swum, turns = nothing.swum, nothing.turns
+    assert nothing.scene.dt_s == pytest.approx(0.2)
+    mine = np.flatnonzero(turns.track == turns.track[0])
+    # The first of its moves before which 20 others have no gap.
+    k = np.flatnonzero(turns.at[mine[20:]] - turns.at[mine[:-20]] == 20)[0] + 20
+    for n, mean in ((10, swum.lately), (20, swum.longer)):
+        by_hand = swum.last[mine[k - n + 1 : k + 1]].mean()
+        assert mean[mine[k]] == pytest.approx(by_hand, abs=1e-12)
+
+
+def test_bursts_after_straight_runs_are_told_by_the_last_three_turns(nothing, changed):
+    """Slow and middling speeds stay in their proportions."""
+    moves, rng = nothing.scene.moves, np.random.default_rng(5)
+    times = np.ones(len(moves.at))
+    straight = nothing.swum.bent_rad < 0.35
+    assert 0.02 < straight.mean() < 0.7
+    times[nothing.rows] = np.where(straight & (rng.uniform(size=len(straight)) < 0.12), 2.0, 1.0)
+    told = tell(pace_gains(changed(times), ALL))
+    assert told.gain.name == "speed-turn-coupling"
+    assert told.gain.label == "slow and fast ones, by the last three turns"
+
+
+@pytest.mark.parametrize(
+    "label", ["of who is ahead, over two seconds", "the speed of who is ahead"]
+)
+def test_who_is_ahead_is_matched_by_some(nothing, changed, label):
+    """In mean speed, or in steps that have its speed; others behind do not count."""
+    swum, moves, rng = nothing.swum, nothing.scene.moves, np.random.default_rng(6)
+    first = np.where(swum.ahead, swum.distance_m, np.inf).argmin(axis=1)
+    rows = np.arange(len(first))
+    is_near = swum.ahead_m < 0.2
+    times = np.ones(len(moves.at))
+    if "over" in label:
+        times[nothing.rows] = np.exp(0.4 * is_near * swum.others_lately[rows, first])
+    else:
+        own = np.nan_to_num(swum.others_m_s[rows, first], nan=0.0)
+        asked = is_near & (own > 0) & (rng.uniform(size=len(own)) < 0.2)
+        speed = moves.speed_m_s[nothing.rows]
+        times[nothing.rows] = np.where(asked, own / speed, 1.0)
+    feature = the_feature("speed-matching", label)
+    assert changed(np.ones(len(times))).gain("speed-matching", feature).nats < 5
+    assert changed(times).gain("speed-matching", feature).nats > 10
+
+
 def test_speeds_that_change_slowly_are_not_copied(nothing):
     """They are as near to the speed of a second ago."""
 

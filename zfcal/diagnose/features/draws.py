@@ -234,10 +234,15 @@ def _seen(
     _, half_angle = perceive(states, at, turns.who, 0.5, cos_fov, False)
     late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov, False)
     older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov, False)
+    # Away from who is too near: where that one was, if the response to it is late as well.
+    too_near = here & (distance < REPULSION_M)
+    side = np.where(too_near, -1.0, 1.0)[..., None]
+    ahead = toward.copy()
+    ahead[rows, others] *= side
     ago, then = np.empty((2, len(LAGS), *toward.shape))
     for k, lag in enumerate(LAGS):
-        for is_then, made in ((False, ago), (True, then)):
-            head_late(states, at, turns.who, lag, REPULSION_M, is_then, toward, made[k])
+        head_late(states, at, turns.who, lag, 0.0, False, ahead, ago[k])
+        head_late(states, at, turns.who, lag, REPULSION_M, True, toward, then[k])
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
     dot = (heading[:, None] * bearing).sum(axis=-1)
     past = own[:, [PAST_HX, PAST_HY]]
@@ -257,7 +262,7 @@ def _seen(
         half_attention=steps.alpha[:, None] * half_angle[rows, others],
         late_attention=steps.alpha[:, None] * late_angle[rows, others],
         older_attention=steps.alpha[:, None] * older_angle[rows, others],
-        ago_toward=ago[:, rows, others],
+        ago_toward=side * ago[:, rows, others],
         then_toward=then[:, rows, others],
         bearing=bearing * present,
         distance_m=np.where(here, distance, AWAY_M),
@@ -267,6 +272,7 @@ def _seen(
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         course=courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,
+        too_near=too_near,
         in_sight=angle[rows, others] > 0,
         is_robot=(theirs(KIND, at) > 0) & here,
         other=np.where(here, steps.scene.tracks[at[:, None], others], -1),

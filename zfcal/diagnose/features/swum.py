@@ -10,7 +10,7 @@ from scipy.stats import rankdata
 from zfcal.arrays import Floats
 from zfcal.model.features import AWAY_M
 from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
-from zfcal.model.paces import LATELY_S, Swum
+from zfcal.model.paces import LATELY_S, LONGER_S, Swum
 from zfcal.model.scene import Moves, Scene
 
 _AGO_S, _AGO_STEPS = 1.0, 2
@@ -52,7 +52,7 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     is_ahead = own[:, None, HX] * x + own[:, None, HY] * y > _AHEAD * away
     all_paces = _paces_of_all(states)
     paces = all_paces[at[:, None], others]
-    few = range(max(1, round(LATELY_S / scene.dt_s)))
+    few = range(_steps(scene, LATELY_S))
     theirs_lately = [np.nan_to_num(_ago(all_paces, scene, at[:, None], others, 1 + k)) for k in few]
     speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
     ago = 1 + max(_AGO_STEPS, round(_AGO_S / scene.dt_s))
@@ -61,24 +61,41 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         last=np.nan_to_num(_ago(table, scene, at, who, 1)),
         before_last=np.nan_to_num(_ago(table, scene, at, who, 2)),
         third=np.nan_to_num(_ago(table, scene, at, who, 3)),
-        lately=np.mean([np.nan_to_num(_ago(table, scene, at, who, 1 + k)) for k in few], axis=0),
+        lately=_mean_over(table, scene, (at, who), LATELY_S),
+        longer=_mean_over(table, scene, (at, who), LONGER_S),
         earlier=np.nan_to_num(_ago(table, scene, at, who, ago)),
         before_earlier=np.nan_to_num(_ago(table, scene, at, who, ago + 1)),
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
         last_turn_rad=_last_turn(states, at, who),
+        bent_rad=np.max([_last_turn(states, at - k, who) for k in range(3)], axis=0),
         turn_rad=_last_turn(states, at + 1, who),
         others=np.where(here, np.nan_to_num(paces), 0.0),
         others_lately=np.where(here, np.mean(theirs_lately, axis=0), 0.0),
         others_m_s=_ago(speed, scene, *all_others, 1),
         others_ago_m_s=_ago(speed, scene, *all_others, ago),
         distance_m=np.where(here, np.nan_to_num(away, nan=AWAY_M), AWAY_M),
+        ahead=here & is_ahead,
         ahead_m=np.where(here & is_ahead, away, AWAY_M).min(axis=1, initial=AWAY_M),
         since_fast=_since_fast(table, scene, at, who),
         here=here,
         time=at / max(1, len(scene.k) - 1),
         track=moves.track,
     )
+
+
+def _steps(scene: Scene, long_s: float) -> int:
+    return max(1, round(long_s / scene.dt_s))
+
+
+def _mean_over(
+    table: Floats, scene: Scene, whose: tuple[NDArray[np.int64], NDArray[np.int64]], long_s: float
+) -> Floats:
+    """Return the mean of what the steps of some time before ended with; 0 for unknown ones."""
+    total = np.zeros(len(whose[0]))
+    for k in range(_steps(scene, long_s)):
+        total += np.nan_to_num(_ago(table, scene, *whose, 1 + k))
+    return total / _steps(scene, long_s)
 
 
 def scores_of_speeds(speeds: Floats, of: Floats, zone: NDArray[np.int64]) -> Floats:

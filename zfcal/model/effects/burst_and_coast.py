@@ -12,7 +12,7 @@ from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
 from zfcal.model.kernels.state import SPEED
-from zfcal.model.paces import LATELY_S, Copied, Pace, Spread, Swum
+from zfcal.model.paces import LATELY_S, LONGER_S, Copied, Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
@@ -108,6 +108,11 @@ EFFECT = Effect(
             label="by the mean over two seconds",
             weights=lambda swum: swum.lately[:, None],
             past_s=LATELY_S,
+        ),
+        Pace(
+            label="by the means over two and four seconds",
+            weights=lambda swum: np.stack([swum.lately, swum.longer], axis=1),
+            past_s=LONGER_S,
         ),
         Pace(label="by the time since a fast step", weights=_since_fast),
         Spread(

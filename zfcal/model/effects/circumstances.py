@@ -56,6 +56,7 @@ _TIMES = (0.0, 0.5, 1.0)
 _SPEEDS_M_S = (0.03, 0.07, 0.14)
 _STAYS_S = (0.0, 5.0, 20.0)
 _NEAR_M = (0.03, 0.1, 0.25)
+_FRONT_M = (0.15, 0.3)
 _NUMBERS = (0.0, 1.0, 3.0)
 _TURNS_RAD = (0.0, 0.5, 1.5)
 _BEARINGS_RAD = (0.0, 1.2, 2.3)
@@ -101,6 +102,7 @@ CIRCUMSTANCES: dict[str, Weights] = {
     "the stay": lambda seen: hats(seen.stayed_s, _STAYS_S),
     "the nearest": lambda seen: hats(_nearest_m(seen), _NEAR_M),
     "how many are seen": lambda seen: hats(seen.in_sight.sum(axis=1), _NUMBERS),
+    "who is in front": lambda seen: hats(seen.in_front_m, _FRONT_M),
 }
 """Of steps, by name: shape (step, circumstance)."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +11,15 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_fish
 from zfcal.model.effects.forms import cut, needs_neighbour
-from zfcal.model.effects.weights import ATTENTION, factor_on_attention, precision_of_attention
-from zfcal.model.features import Along, Feature, Seen
+from zfcal.model.effects.weights import (
+    ATTENTION,
+    every_step,
+    factor_on_attention,
+    own_shares,
+    own_ways,
+    precision_of_attention,
+)
+from zfcal.model.features import Along, Component, Feature, Seen
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SIGHT
@@ -75,6 +83,28 @@ def _attention_to_robots(seen: Seen) -> Floats:
     return np.asarray(_change(seen, _KNOTS, paid)[:, None] * seen.is_robot[..., None])
 
 
+def _heeding_nobody(seen: Seen, by: Floats) -> Floats:
+    """Return the weight of the own ways in steps in which a fish heeds nobody.
+
+    A share of all headings has as much weight as all that draws the fish, by which the mixture is
+    divided.
+
+    Parameters
+    ----------
+    by : ndarray, shape (step, weight)
+        The share.
+    """
+    whole = 1 + seen.attention.sum(axis=1)
+    return np.asarray(own_shares(seen) * (whole[:, None] * by)[:, None])
+
+
+_NOBODY = Component(
+    label="heeding nobody",
+    toward=own_ways,
+    weights=lambda seen: _heeding_nobody(seen, every_step(seen)),
+    kappa="own",
+)
+
 _BY_TIME = Along(cue="share of the recording that has passed", knots=_KNOTS[1:], none_at=_KNOTS[0])
 
 _FEATURES: tuple[Feature, ...] = (
@@ -82,6 +112,13 @@ _FEATURES: tuple[Feature, ...] = (
     factor_on_attention(_attention_of_each, label="attention, each fish"),
     factor_on_attention(_attention_to_robots, label="attention to robots", along=_BY_TIME),
     precision_of_attention(_by_time, "precision"),
+    # More than what they heed nobody in all minutes, which is another mixture.
+    replace(
+        _NOBODY,
+        label="heeding nobody, by the time",
+        weights=lambda seen: _heeding_nobody(seen, hats(seen.time, _FEW)),
+        over=_NOBODY,
+    ),
     by_circumstances(
         factor_on_attention(_steadily, label="attention, steadily"),
         alone=ATTENTION,

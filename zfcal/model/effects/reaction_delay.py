@@ -33,8 +33,21 @@ def _late(
 
 
 def _ago(k: int) -> Component:
-    """Return where others were some steps ago, from where the fish is."""
-    return _late(f"{LAGS[k]} steps", lambda seen: seen.ago_toward[k], lambda seen: seen.attention)
+    """Return where others were some steps ago, from where the fish is; near ones are felt."""
+    return _late(f"{LAGS[k]} steps", lambda seen: _if_far(seen, k), lambda seen: seen.attention)
+
+
+def _of_all_ago(k: int) -> Component:
+    """Return the same of near ones too: away from where they were."""
+    return _late(
+        f"{LAGS[k]} steps, near ones too",
+        lambda seen: seen.ago_toward[k],
+        lambda seen: seen.attention,
+    )
+
+
+def _if_far(seen: Seen, k: int) -> Floats:
+    return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward[k])
 
 
 def _then(k: int) -> Component:
@@ -48,6 +61,9 @@ def _then(k: int) -> Component:
 
 _NEAR_M = (0.05, 0.15, 0.3)
 
+_FEW_LAGS = 3
+"""Of `LAGS` the first ones: responses to who is next to the fish are quick."""
+
 
 def _by_distance(k: int) -> Component:
     """Return a response that is late by a share of its own for each distance."""
@@ -57,7 +73,7 @@ def _by_distance(k: int) -> Component:
 
     return Component(
         label=f"{LAGS[k]} steps, by distance",
-        toward=lambda seen: seen.ago_toward[k],
+        toward=lambda seen: _if_far(seen, k),
         weights=weights,
         instead=weights,
         high=1.0,
@@ -135,6 +151,7 @@ _FEATURES: tuple[Feature, ...] = (
     _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
     _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
     *(_ago(k) for k in range(len(LAGS))),
+    *(_of_all_ago(k) for k in range(_FEW_LAGS)),
     *(_then(k) for k in range(len(LAGS))),
     *(_by_distance(k) for k in range(len(LAGS))),
     _soon("by distance", _soon_by_distance),

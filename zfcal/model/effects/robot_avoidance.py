@@ -120,10 +120,15 @@ def _lacks(company: Company) -> str | None:
 
 _ATTENTION_M = (0.0, 0.1, 0.3)
 _KNOTS_M = (0.0, 0.1, 0.2, 0.4)
+_ITS_SPEED_M_S = (0.03, 0.07, 0.12)
 
 
 def _attention(seen: Seen) -> Floats:
     return hats(seen.distance_m, _ATTENTION_M) * seen.is_robot[..., None]
+
+
+def _by_its_speed(seen: Seen) -> Floats:
+    return hats(seen.speed_m_s, _ITS_SPEED_M_S) * seen.is_robot[..., None]
 
 
 def _robots(seen: Seen) -> Floats:
@@ -189,6 +194,7 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
     *turning_as_a_whole(partial(_turning, along_walls=True), along=_TO_ROBOT),
+    factor_on_attention(_by_its_speed, label="attention to robots, by their speed"),
     precision_of_attention(_to_robots, "precision of robots"),
     by_circumstances(
         factor_on_attention(_to_robots, label="attention to robots"),

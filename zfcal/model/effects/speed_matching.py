@@ -87,6 +87,32 @@ def _by_fastest_near(swum: Swum) -> Floats:
     return hats(np.where(near[:, 0], fastest, 0.0), _SLOW_TO_FAST)[:, 1:] * near
 
 
+def _who_is_ahead(swum: Swum, values: Floats) -> tuple[Floats, Floats]:
+    """Return what belongs to the nearest one ahead, and how far it is, shapes (step,).
+
+    NaN, and `zfcal.model.features.AWAY_M`, without one.
+    """
+    if not swum.ahead.size:
+        return np.full(len(swum.ahead), np.nan), swum.ahead_m
+    rows = np.arange(len(swum.ahead))
+    first = np.where(swum.ahead, swum.distance_m, np.inf).argmin(axis=1)
+    return np.where(swum.ahead[rows, first], values[rows, first], np.nan), swum.ahead_m
+
+
+def _of_who_is_ahead(swum: Swum) -> Floats:
+    """Return the mean speed over two seconds of the nearest one ahead, by its distance."""
+    pace, far_m = _who_is_ahead(swum, swum.others_lately)
+    return np.nan_to_num(pace)[:, None] * hats(far_m, _KNOTS_M)[:, :-1]
+
+
+def _speed_ahead(swum: Swum, values: Floats) -> Floats:
+    return _who_is_ahead(swum, values)[0][:, None]
+
+
+def _near_ahead(swum: Swum) -> Floats:
+    return hats(swum.ahead_m, _KNOTS_M)[:, None, :-1]
+
+
 def _nearest(swum: Swum) -> Floats:
     """Return the last speed of the nearest, by its distance."""
     if not swum.here.size:
@@ -160,12 +186,19 @@ EFFECT = Effect(
         ),
         Pace(label="of the nearest", weights=_nearest),
         Pace(label="of those near, over two seconds", weights=_near_lately),
+        Pace(label="of who is ahead, over two seconds", weights=_of_who_is_ahead),
         Spread(label="slow and fast ones, by the fastest near", weights=_by_fastest_near),
         Copied(
             label="the speed of the nearest",
             of=lambda swum: _of_nearest(swum, swum.others_m_s),
             ago=lambda swum: _of_nearest(swum, swum.others_ago_m_s),
             weights=_near_or_far,
+        ),
+        Copied(
+            label="the speed of who is ahead",
+            of=lambda swum: _speed_ahead(swum, swum.others_m_s),
+            ago=lambda swum: _speed_ahead(swum, swum.others_ago_m_s),
+            weights=_near_ahead,
         ),
     ),
 )

@@ -73,6 +73,10 @@ def _spread_by_last_turn(swum: Swum) -> Floats:
     return hats(swum.last_turn_rad, (0.0, 0.5, 1.5))[:, 1:]
 
 
+def _spread_by_bends(swum: Swum) -> Floats:
+    return hats(swum.bent_rad, (0.2, 0.6))[:, 1:]
+
+
 def _by_turn(swum: Swum) -> Floats:
     return hats(swum.turn_rad, _KNOTS_RAD)[:, 1:]
 
@@ -233,6 +237,7 @@ EFFECT = Effect(
             "the time",
         ),
         Spread(label="slow and fast ones, by the last turn", weights=_spread_by_last_turn),
+        Spread(label="slow and fast ones, by the last three turns", weights=_spread_by_bends),
     ),
     paces_given=(Pace(label="by the turn", weights=_by_turn),),
 )

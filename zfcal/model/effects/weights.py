@@ -75,6 +75,22 @@ def to_one_sense(seen: Seen, share: Floats | float = 1.0) -> Floats:
     return np.stack([half, -half], axis=1)[..., None]
 
 
+def own_ways(seen: Seen) -> Floats:
+    """Return where the base law draws without others: ahead, or both ways along a wall.
+
+    Shape (step, way, 2); see `own_shares`.
+    """
+    along = seen.follows_walls[:, None, None]
+    ahead = np.stack([seen.own_heading, np.zeros_like(seen.own_heading)], axis=1)
+    return np.where(along, both_senses(seen), ahead)
+
+
+def own_shares(seen: Seen) -> Floats:
+    """Return the share of each of these ways, shape (step, way, 1)."""
+    half = np.where(seen.follows_walls, 0.5, 0.0)
+    return np.stack([1.0 - half, half], axis=1)[..., None]
+
+
 def halfway(seen: Seen, toward: Floats) -> Floats:
     """Return unit vectors half-way between the own heading and others, shape (step, vector, 2).
 

@@ -36,8 +36,8 @@ class Seen:
         Likewise, had all others been where they were a tenth of a step before, half a step, one and
         two.
     ago_toward, then_toward : ndarray, shape (lag, step, other, 2)
-        Where the other was `LAGS` steps before, seen or not: from where the fish is, and from where
-        it was itself.
+        Where the other was `LAGS` steps before, seen or not: from where the fish is, and away from
+        there for who is too near now; and from where it was itself, near ones as they are now.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
@@ -46,7 +46,8 @@ class Seen:
     heading, course : ndarray, shape (step, other, 2)
         Of the other: the direction of its last step, and its mean velocity over two seconds in m/s;
         zeros where that is not known.
-    here, in_sight, is_robot : ndarray of bool, shape (step, other)
+    here, too_near, in_sight, is_robot : ndarray of bool, shape (step, other)
+        ``too_near``: the base law draws away from it.
     other : ndarray of int, shape (step, other)
         Track of the other; -1 for who is not there.
     own_heading, along_wall, way_out, xy_m : ndarray, shape (step, 2)
@@ -97,6 +98,7 @@ class Seen:
     heading: Floats
     course: Floats
     here: NDArray[np.bool_]
+    too_near: NDArray[np.bool_]
     in_sight: NDArray[np.bool_]
     is_robot: NDArray[np.bool_]
     other: NDArray[np.int32]
@@ -131,6 +133,12 @@ class Seen:
     def nearest(self) -> Floats:
         """One for the nearest other one, else 0, shape (step, other, 1)."""
         return self.chosen(-self.distance_m, self.here)
+
+    @property
+    def in_front_m(self) -> Floats:
+        """Distance to the nearest one before the fish; `AWAY_M` without one, shape (step,)."""
+        ahead = self.here & (self.off_axis_rad < math.pi / 3)
+        return np.where(ahead, self.distance_m, AWAY_M).min(axis=1, initial=AWAY_M)
 
     @property
     def foremost(self) -> Floats:
