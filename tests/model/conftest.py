@@ -85,13 +85,14 @@ def seen():
 
     robot = np.zeros((n, others), dtype=bool)
     robot[:, -1] = True
+    ago, then = ways(2, len(LAGS), n, others)
     return Seen(
         attention=rng.uniform(0.1, 2.0, (n, others)),
         toward=ways(n, others),
         soon_toward=ways(n, others),
         half_toward=ways(n, others),
-        ago_toward=ways(len(LAGS), n, others),
-        then_toward=ways(len(LAGS), n, others),
+        ago_toward=ago.__getitem__,
+        then_toward=then.__getitem__,
         late_toward=ways(n, others),
         older_toward=ways(n, others),
         soon_attention=rng.uniform(0.1, 2.0, (n, others)),

@@ -331,7 +331,7 @@ def test_steps_are_sharper_by_their_speed(arena, seen):
 def test_responses_are_late_by_a_share_of_their_own_at_each_distance(arena, seen):
     """As much is taken from the present response as is put to where the other was."""
     late = labelled("reaction-delay", "3 steps, by distance", arena)
-    np.testing.assert_array_equal(late.toward(seen), seen.ago_toward[LAGS.index(3)])
+    np.testing.assert_array_equal(late.toward(seen), seen.ago_toward(LAGS.index(3)))
     weights = late.weights(seen)
     np.testing.assert_allclose(weights.sum(axis=-1), seen.attention)
     np.testing.assert_array_equal(late.instead(seen), weights)
@@ -356,8 +356,8 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     by_label = {each.label: each for each in late}
     for k, lag in enumerate(LAGS):
         here, there = by_label[f"{lag} steps"], by_label[f"{lag} steps, from there"]
-        np.testing.assert_array_equal(here.toward(seen), seen.ago_toward[k])
-        np.testing.assert_array_equal(there.toward(seen), seen.then_toward[k])
+        np.testing.assert_array_equal(here.toward(seen), seen.ago_toward(k))
+        np.testing.assert_array_equal(there.toward(seen), seen.then_toward(k))
         np.testing.assert_array_equal(there.weights(seen)[..., 0], seen.attention)
 
 
@@ -372,7 +372,7 @@ def test_near_ones_are_felt_at_once_or_late_as_well(arena, seen):
     )
     np.testing.assert_array_equal(felt[:, 1], seen.toward[:, 1])
     np.testing.assert_array_equal(felt[:, ::2], late[:, ::2])
-    np.testing.assert_array_equal(late, seen.ago_toward[1])
+    np.testing.assert_array_equal(late, seen.ago_toward(1))
     assert (felt[:, 1] != late[:, 1]).any()
 
 
@@ -384,6 +384,9 @@ def test_who_heeds_nobody_has_as_much_of_its_own_way_as_of_all(arena, seen):
     whole = 1 + seen.attention.sum(axis=1)
     np.testing.assert_allclose(weights.sum(axis=(1, 2)), whole)
     np.testing.assert_allclose(weights.sum(axis=2), nobody.over.weights(seen)[..., 0])
+    for column, time in enumerate((0.0, 0.5, 1.0)):
+        then = nobody.weights(dataclasses.replace(seen, time=np.full(N, time)))
+        np.testing.assert_allclose(then[..., column].sum(axis=1), whole)
     along = seen.follows_walls
     assert along.any()
     assert not along.all()
@@ -401,6 +404,11 @@ def test_robots_are_heeded_by_their_speed(arena, seen):
     )
     assert not weights[~seen.is_robot].any()
     np.testing.assert_allclose(weights.sum(axis=2), seen.attention * seen.is_robot)
+    robots = labelled("robot-avoidance", "attention to robots, by their speed", arena)
+    for column, speed_m_s in enumerate((0.03, 0.07, 0.12)):
+        own = np.full((N, OTHERS), speed_m_s)
+        weights = robots.weights(dataclasses.replace(seen, speed_m_s=own))
+        np.testing.assert_allclose(weights[..., column], seen.attention * seen.is_robot)
 
 
 def test_who_is_in_front_is_the_nearest_ahead(arena, seen):
@@ -412,7 +420,14 @@ def test_who_is_in_front_is_the_nearest_ahead(arena, seen):
     seen = dataclasses.replace(seen, off_axis_rad=ahead, distance_m=far, here=here)
     np.testing.assert_array_equal(seen.in_front_m, [AWAY_M] + [0.1] * (N - 1))
     own = labelled("rear-blind-zone", "attention to those behind, by who is in front", arena)
-    assert own.weights(seen).shape[2] == 4  # Those behind, and beside them all, in either case.
+    weights = own.weights(seen)
+    # Those behind, and all, each while somebody is near in front and while nobody is.
+    assert weights.shape == (N, OTHERS, 4)
+    np.testing.assert_allclose(weights[0, :, 0], 0.0)
+    np.testing.assert_allclose(weights[0, 2, 1], seen.attention[0, 2])
+    np.testing.assert_allclose(weights[1:, 2, 0], seen.attention[1:, 2])
+    np.testing.assert_allclose(weights[1:, :, 2], seen.attention[1:])
+    assert not weights[1:, :, [1, 3]].any()
 
 
 def test_each_that_left_counts_though_it_is_back(arena, seen):

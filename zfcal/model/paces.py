@@ -21,7 +21,7 @@ LATELY_S = 2.0
 """Means of last speeds are over so long."""
 
 LONGER_S = 4.0
-"""Those of the own ones over so long as well."""
+"""Means of the own last speeds are over so long as well."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +35,7 @@ class Swum:
     lately : ndarray, shape (step,)
         Mean of the own ones over two seconds.
     longer : ndarray, shape (step,)
-        Likewise over `LONGER_S`.
+        Mean of the own ones over four seconds.
     earlier, before_earlier : ndarray, shape (step,)
         Scores of two steps in a row, the later one about a second before the last step.
     last_m_s, last_ago_m_s : ndarray, shape (step,)
@@ -43,7 +43,7 @@ class Swum:
     last_turn_rad : ndarray, shape (step,)
         Between the last two steps, to either side; 0 where it is not known.
     bent_rad : ndarray, shape (step,)
-        The widest of the last three turns.
+        The widest of the last three turns; NaN where one of them is not known.
     turn_rad : ndarray, shape (step,)
         Of the step itself, to either side: no cause of its speed where the law draws that first.
     others : ndarray, shape (step, other)

@@ -8,7 +8,7 @@ import pytest
 from zfcal.diagnose.features.first_look import FirstLook, basis_of, off, thinned
 from zfcal.diagnose.features.gains import Fits
 from zfcal.diagnose.features.law import Law
-from zfcal.model.effects import all_effects
+from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.weights import evenly, factor_on_attention
 from zfcal.model.extended import maximise
@@ -104,7 +104,9 @@ def test_of_many_features_a_few_are_looked_at_in_all_steps(fits, monkeypatch):
     assert float(best.label) == pytest.approx(np.pi / 2, abs=0.4)
     n_steps = len(fits.law.rows)
     assert looks.count(n_steps) == 10
-    assert looks.count(-(-n_steps // 4)) == 40
+    (few,) = {n for n in looks if n != n_steps}
+    assert looks.count(few) == 40
+    assert few == pytest.approx(n_steps / 4, rel=0.05)
     looks.clear()
     fits.most_promising(OneOf(kind="ways", features=ways[:20]), 1)
     assert looks == [n_steps] * 20
@@ -115,13 +117,33 @@ def test_the_law_of_a_few_steps_is_that_of_all_of_them(fits):
     law, steps = fits.law, np.arange(len(fits.law.rows))
     bent = (0.001 * steps[:, None] * np.ones(law.weight.shape[1]), 0.002 * steps)
     law = law.absorbing(bent=bent, leaving=(2, 0.0001 * steps))
-    few = thinned(law, 3)
-    np.testing.assert_array_equal(few.rows, law.rows[::3])
-    np.testing.assert_allclose(few.cells, law.cells[::3], rtol=1e-12)
-    np.testing.assert_allclose(few.log_here, law.log_here[::3], rtol=1e-12)
-    np.testing.assert_allclose(few.base[1], law.base[1][::3], rtol=1e-9)
-    noisy = thinned(dataclasses.replace(law, noise_m=1e-3), 5)
-    assert (len(noisy.rows), len(noisy.draws)) == (len(law.rows[::5]), 1)
+    few, kept = thinned(law, 3)
+    np.testing.assert_array_equal(few.rows, law.rows[kept])
+    np.testing.assert_allclose(few.cells, law.cells[kept], rtol=1e-12)
+    np.testing.assert_allclose(few.log_here, law.log_here[kept], rtol=1e-12)
+    np.testing.assert_allclose(few.base[1], law.base[1][kept], rtol=1e-9)
+    np.testing.assert_array_equal(few.absorbing(leaving=(2, 0.0 * kept)).rows, few.rows)
+    noisy, _ = thinned(dataclasses.replace(law, noise_m=1e-3), 5)
+    assert len(noisy.draws) == 1
+
+
+def test_each_fish_has_as_many_of_a_few_steps(fits):
+    """Steps of as many fish follow each other in turn: none may be left out for that."""
+    few, kept = thinned(fits.law, 4)
+    whole, some = (np.bincount(each) for each in (fits.law.turns.who, few.turns.who))
+    np.testing.assert_allclose(some, whole / 4, rtol=0.15)
+    for n in (2, 3, 4, 5):
+        assert np.bincount(kept % n).min() > 0.8 * len(kept) / n
+
+
+def test_a_few_steps_promise_what_all_do(fits):
+    """About as much, of features of one strength and of several; idle ones cost as much."""
+    drift = find_effect("directional-drift").features(fits.law.scene.arena)
+    kind = next(each for each in drift if getattr(each, "kind", "") == "leaning, by circumstances")
+    whole = np.array([fits.first_look.nats(each) for each in kind.features])
+    some = np.array([fits._few.nats(each) for each in kind.features])
+    assert np.ptp(whole) > 10
+    assert np.abs(some - whole).max() < 0.6 * whole.max()
 
 
 def test_features_that_promise_nothing_are_not_fitted(base, fits):

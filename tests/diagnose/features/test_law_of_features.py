@@ -235,14 +235,16 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     for name in (
         "toward",
         "late_toward",
-        "ago_toward",
-        "then_toward",
         "soon_toward",
         "bearing",
         "heading",
         "own_heading",
     ):
         np.testing.assert_allclose(getattr(found.seen, name), getattr(plain.seen, name), atol=1e-9)
+    for k in range(len(LAGS)):
+        for name in ("ago_toward", "then_toward"):
+            ways, as_before = (getattr(seen, name)(k) for seen in (found.seen, plain.seen))
+            np.testing.assert_allclose(ways, as_before, atol=1e-9)
     for name in ("base", "toward", "angle_sr"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-9)
     np.testing.assert_allclose(found.seen.off_axis_rad, plain.seen.off_axis_rad, atol=1e-7)
@@ -261,9 +263,9 @@ def test_who_is_too_near_is_left_from_where_it_was(law):
     assert 10 < (known & seen.too_near).sum() < 0.2 * known.sum()
     for is_near, sign in ((seen.too_near, -1), (~seen.too_near, 1)):
         some = known & is_near
-        np.testing.assert_allclose(seen.ago_toward[0][some], sign * way[some], atol=1e-9)
+        np.testing.assert_allclose(seen.ago_toward(0)[some], sign * way[some], atol=1e-9)
     unknown = seen.too_near & ~known & (seen.attention > 0)
-    np.testing.assert_allclose(seen.ago_toward[0][unknown], seen.toward[unknown], atol=1e-9)
+    np.testing.assert_allclose(seen.ago_toward(0)[unknown], seen.toward[unknown], atol=1e-9)
     assert not (seen.too_near & ~seen.here).any()
 
 

@@ -8,9 +8,10 @@ from scipy.signal import lfilter
 
 from zfcal.diagnose.features.naming import best_by_name, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
+from zfcal.diagnose.features.swum import swum_of
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.kernels.state import HX, HY, SPEED
+from zfcal.model.kernels.state import HX, HY, SPEED, ZONE
 from zfcal.model.paces import Spread
 
 ALL = tuple(all_effects())
@@ -216,6 +217,24 @@ def test_longer_means_are_of_the_scores_of_so_many_steps(nothing):
     for n, mean in ((10, swum.lately), (20, swum.longer)):
         by_hand = swum.last[mine[k - n + 1 : k + 1]].mean()
         assert mean[mine[k]] == pytest.approx(by_hand, abs=1e-12)
+
+
+def test_turns_that_are_not_known_are_no_straight_runs(nothing):
+    """After a gap there are three steps without a run; they have no weight."""
+    scene, turns = nothing.scene, nothing.turns
+    states = scene.states.copy()
+    gap = 400
+    states[gap, ZONE] = 0
+    swum = swum_of(dataclasses.replace(scene, states=states), turns, nothing.scores)
+    after = (turns.at > gap) & (turns.at <= gap + 3)
+    assert after.sum() > 5
+    assert np.isnan(swum.bent_rad[after]).all()
+    later = turns.at > gap + 3
+    np.testing.assert_array_equal(swum.bent_rad[later], nothing.swum.bent_rad[later])
+    weights = the_feature("speed-turn-coupling", "slow and fast ones, by the last three turns")
+    assert not weights.weights(swum)[after].any()
+    widest = np.max([swum.last_turn_rad[later], swum.bent_rad[later]], axis=0)
+    np.testing.assert_allclose(widest, swum.bent_rad[later])
 
 
 def test_bursts_after_straight_runs_are_told_by_the_last_three_turns(nothing, changed):

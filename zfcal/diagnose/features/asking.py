@@ -64,13 +64,13 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     if beyond is not None:
         fits = replace(fits, beyond=beyond)
     law = fits.law
-    fits.prepare()
     asked = [
         (effect.name, feature)
         for effect in effects
         for feature in _askable(law, effect)
         if kinds is None or (effect.name, kind_of(feature)) in kinds
     ]
+    fits.prepare([feature for _, feature in asked])
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
         # One fish has nobody to follow: then a feature of who is who has no strength at all.
@@ -126,8 +126,8 @@ def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -
 
 def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
     """Return the feature of an effect that gains most; None where none can be fitted."""
-    fits.prepare()
     asked = _askable(fits.law, effect)
+    fits.prepare(asked)
     found = [pair for feature in asked for pair in _gains(fits, effect.name, feature)]
     some = [pair for pair in found if pair[1].n_strengths]
     best = max(some, key=lambda pair: pair[1].nats, default=None)

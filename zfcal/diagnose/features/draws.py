@@ -239,10 +239,17 @@ def _seen(
     side = np.where(too_near, -1.0, 1.0)[..., None]
     ahead = toward.copy()
     ahead[rows, others] *= side
-    ago, then = np.empty((2, len(LAGS), *toward.shape))
-    for k, lag in enumerate(LAGS):
-        head_late(states, at, turns.who, lag, 0.0, False, ahead, ago[k])
-        head_late(states, at, turns.who, lag, REPULSION_M, True, toward, then[k])
+
+    def ago(k: int) -> Floats:
+        made = np.empty_like(toward)
+        head_late(states, at, turns.who, LAGS[k], 0.0, False, ahead, made)
+        return np.asarray(side * made[rows, others])
+
+    def then(k: int) -> Floats:
+        made = np.empty_like(toward)
+        head_late(states, at, turns.who, LAGS[k], REPULSION_M, True, toward, made)
+        return np.asarray(made[rows, others])
+
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
     dot = (heading[:, None] * bearing).sum(axis=-1)
     past = own[:, [PAST_HX, PAST_HY]]
@@ -262,8 +269,8 @@ def _seen(
         half_attention=steps.alpha[:, None] * half_angle[rows, others],
         late_attention=steps.alpha[:, None] * late_angle[rows, others],
         older_attention=steps.alpha[:, None] * older_angle[rows, others],
-        ago_toward=side * ago[:, rows, others],
-        then_toward=then[:, rows, others],
+        ago_toward=ago,
+        then_toward=then,
         bearing=bearing * present,
         distance_m=np.where(here, distance, AWAY_M),
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
@@ -306,8 +313,8 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
         half_toward=turned_by(seen.half_toward, b),
         late_toward=turned_by(seen.late_toward, b),
         older_toward=turned_by(seen.older_toward, b),
-        ago_toward=turned_by(seen.ago_toward, b),
-        then_toward=turned_by(seen.then_toward, b),
+        ago_toward=lambda k: turned_by(seen.ago_toward(k), b),
+        then_toward=lambda k: turned_by(seen.then_toward(k), b),
         bearing=turned_by(seen.bearing, b),
         heading=turned_by(seen.heading, b),
         course=turned_by(seen.course, b),

@@ -6,11 +6,13 @@ Philosophical Society 44: 50-57).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import orth
 from scipy.optimize import nnls
 
@@ -25,10 +27,16 @@ from zfcal.diagnose.features.score_kernels import (
     write_tried,
 )
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
-from zfcal.model.features import Choosable, Landing, Leaving, Tilt, Turned
+from zfcal.model.features import Choosable, Landing, Leaving, OneOf, Tilt, Turned
 
 _TRIED = (0.005, 0.02, 0.06)
 """Strengths of a component at which it is first asked for."""
+
+LOOKED_AT = 10
+"""Of more than twice as many features these are looked at in all steps."""
+
+ONE_IN = 4
+"""The others in one of so many steps."""
 
 _NEXT_TO_NOTHING = 1e-6
 """Share of a score's length that is rounding: columns may be sums of what is fitted with them."""
@@ -49,12 +57,15 @@ class FirstLook:
     leaving_scores
         Of features of leaving, given the probability of each step that it was none; and of what is
         fitted beside them.
+    one_in
+        Of so many steps each of the law's is one.
     """
 
     law: Law
     own: Sequence[Columns]
     landing_scores: Callable[[Landing], Floats]
     leaving_scores: Callable[[Leaving, Floats], tuple[Floats, Floats]]
+    one_in: int = 1
 
     @property
     def prepared(self) -> tuple[object, ...]:
@@ -79,24 +90,33 @@ class FirstLook:
         return {}
 
     def _nats(self, feature: Choosable) -> float:
+        """Return what is gained less the strengths, of all steps if these are a few of them.
+
+        Idle strengths gain half a nat each, of however many steps (Wilks 1938).
+        """
+        gained, n = self._gained(feature)
+        return self.one_in * (gained - n / 2) - n / 2
+
+    def _gained(self, feature: Choosable) -> tuple[float, int]:
+        """Return about how many nats a feature gains of these steps, and its strengths."""
         if isinstance(feature, Landing):
-            return _nats_of(self.landing_scores(feature))
+            return _gained_by(self.landing_scores(feature))
         if isinstance(feature, Leaving):
             scores, beside = self.leaving_scores(feature, self._no_lapse)
-            return _nats_of(off(scores, basis_of(beside)))
+            return _gained_by(off(scores, basis_of(beside)))
         if isinstance(feature, Tilt):
             taken = ways_of(self.law.turns.taken, axial=feature.axial)
             apart = self._no_lapse[:, None] * (taken - self._mean_heading[int(feature.axial)])
             vectors = feature.vectors(self.law.draws[0].seen)
-            return _nats_of(np.einsum("sbd,sd->sb", vectors, apart), low=feature.low)
+            return _gained_by(np.einsum("sbd,sd->sb", vectors, apart), low=feature.low)
         if isinstance(feature, Turned):
             scores = self._scores_of(self.law.turned(feature))
-            return _nats_of(off(scores, self._own_basis), low=feature.low)
+            return _gained_by(off(scores, self._own_basis), low=feature.low)
         columns = self.law.component(feature, first=True)
         if feature.low >= 0 and not feature.instead:
-            return self._tried_nats(columns)
+            return self._gained_tried(columns)
         scores = off(self._scores_of(columns), self._own_basis)
-        return _nats_of(scores, low=feature.low, high=feature.high)
+        return _gained_by(scores, low=feature.low, high=feature.high)
 
     def _scores_of(self, columns: Columns) -> Floats:
         """Return the scores of what adds to the mixture, shape (step, weight)."""
@@ -109,7 +129,7 @@ class FirstLook:
         """Orthonormal columns with the span of the scores of what is fitted with every feature."""
         return basis_of(np.concatenate([self._scores_of(columns) for columns in self.own], axis=1))
 
-    def _tried_nats(self, columns: Columns) -> float:
+    def _gained_tried(self, columns: Columns) -> tuple[float, int]:
         """Return what a few strengths of a component gain: of all weights alike, or of each.
 
         Their scores have no variance where the density is next to nothing.
@@ -117,7 +137,7 @@ class FirstLook:
         at, over = columns
         alike = self._best_tried(at.sum(axis=1), over.sum(axis=1))
         each = (self._best_tried(*pair) for pair in zip(at.T.copy(), over.T.copy(), strict=True))
-        return max(alike, sum(max(nats, 0.0) for nats in each)) - at.shape[1]
+        return max(alike, sum(max(nats, 0.0) for nats in each)), at.shape[1]
 
     def _best_tried(self, at: Floats, over: Floats) -> float:
         lapse, (base_at, base_over) = self.law.lapses.likely, self.law.base
@@ -155,19 +175,53 @@ class FirstLook:
         return chances @ ways_of_cells(), chances @ ways_of_cells(axial=True)
 
 
-def thinned(law: Law, share: int) -> Law:
-    """Return the law of one of so many steps, by one draw of where all were.
+def has_many(choice: OneOf) -> bool:
+    """Return whether some of these are looked at in a few steps alone."""
+    return len(choice.features) > 2 * LOOKED_AT
+
+
+def best_of(
+    look: FirstLook, choice: OneOf, among: Sequence[int], *, least: float = -math.inf
+) -> list[int]:
+    """Return the places of features that promise more than something, those that do most first.
+
+    Parameters
+    ----------
+    look
+        At the steps.
+    choice
+        The features.
+    among
+        Places of those that are looked at.
+    least
+        In nats.
+    """
+    promise = {k: look.nats(choice.features[k]) for k in among}
+    some = [k for k in among if promise[k] > least]
+    return sorted(some, key=lambda k: (promise[k], k), reverse=True)
+
+
+def thinned(law: Law, one_in: int) -> tuple[Law, NDArray[np.intp]]:
+    """Return the law of some steps, by one draw of where all were, and which steps these are.
+
+    They are chosen by chance, always the same ones: every fourth one would be of one fish in four.
 
     Parameters
     ----------
     law
         Of all steps.
-    share
-        So many.
+    one_in
+        One of so many is chosen.
     """
-    bent = law.bent and (law.bent[0][::share], law.bent[1][::share])
-    leaving = tuple((zone, log_factor[::share]) for zone, log_factor in law.leaving)
-    return replace(law, every=share * law.every, n_draws=1, bent=bent, leaving=leaving)
+    kept = np.flatnonzero(np.random.default_rng(one_in).random(len(law.rows)) < 1 / one_in)
+    made = replace(
+        law,
+        n_draws=1,
+        bent=law.bent and (law.bent[0][kept], law.bent[1][kept]),
+        leaving=tuple((zone, log_factor[kept]) for zone, log_factor in law.leaving),
+    )
+    made.__dict__.update(rows=law.rows[kept])
+    return made, kept
 
 
 def basis_of(scores: Floats) -> Floats:
@@ -192,8 +246,10 @@ def off(scores: Floats, basis: Floats) -> Floats:
     return left
 
 
-def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = None) -> float:
-    """Return about how many nats weights gain, less their number, by their scores.
+def _gained_by(
+    scores: Floats, *, low: float | None = None, high: float | None = None
+) -> tuple[float, int]:
+    """Return about how many nats weights gain by their scores, and their number.
 
     The log likelihood is taken as quadratic where no weight has a strength. It has its maximum at
     strengths that may have one sign alone, if they are bounded by zero.
@@ -208,7 +264,7 @@ def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = N
     n, size = scores.shape[1], lengths_of(scores)
     some = np.isfinite(size) & (size > 0)
     if not some.any():
-        return -float(n)
+        return 0.0, n
     units = (scores if some.all() else scores[:, some]) / size[some]
     values, ways = np.linalg.eigh(units.T @ units)
     kept = values > _NEXT_TO_NOTHING * values[-1]
@@ -219,4 +275,4 @@ def _nats_of(scores: Floats, *, low: float | None = None, high: float | None = N
         missed = float(nnls(square, aim)[1])
     elif high is not None and high <= 0:
         missed = float(nnls(-square, aim)[1])
-    return float(aim @ aim - missed**2) / 2 - n
+    return float(aim @ aim - missed**2) / 2, n

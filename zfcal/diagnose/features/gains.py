@@ -28,7 +28,14 @@ from zfcal.diagnose.features.climbing import (
 )
 from zfcal.diagnose.features.columns import Columns
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
-from zfcal.diagnose.features.first_look import FirstLook, thinned
+from zfcal.diagnose.features.first_look import (
+    LOOKED_AT,
+    ONE_IN,
+    FirstLook,
+    best_of,
+    has_many,
+    thinned,
+)
 from zfcal.diagnose.features.kernels import tilted
 from zfcal.diagnose.features.landings import Landings, leaned
 from zfcal.diagnose.features.law import SHARPER, Law
@@ -36,7 +43,7 @@ from zfcal.diagnose.features.leavings import Leavings
 from zfcal.diagnose.features.score_kernels import sums_of, write_slopes
 from zfcal.diagnose.features.ways import ways_of, ways_of_cells
 from zfcal.model.features import (
-    Choosable,
+    Feature,
     Landing,
     Leaving,
     Mixed,
@@ -61,12 +68,6 @@ _AS_IT_IS, _NONE = np.ones(1), np.zeros(0)
 
 _FITTED = 2
 """Of features of which the most promising are fitted, so many."""
-
-_LOOKED_AT = 10
-"""Of more than twice as many features these are looked at in all steps."""
-
-_SHARE = 4
-"""The others in one of so many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -188,11 +189,18 @@ class Fits:
         """Log densities with the base's own columns alone, and where that fit ended."""
         return self._linear([], [], None)
 
-    def prepare(self) -> None:
-        """Work out what all features need, before they are asked side by side."""
+    def prepare(self, features: Sequence[Feature] = ()) -> None:
+        """Work out what all features need, before they are asked side by side.
+
+        Parameters
+        ----------
+        features
+            These.
+        """
         _ = (self.law.own_parameters, self.law.cells)
         _ = (self._null, self._untilted, self.first_look.prepared, self.landings.prepared)
-        _ = self._few.prepared
+        if any(isinstance(each, OneOf) and has_many(each) for each in features):
+            _ = self._few.prepared
 
     @property
     def n_beside(self) -> int:
@@ -276,25 +284,25 @@ class Fits:
 
     def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Single]:
         """Return the features that a first look says most of, more than their strengths cost."""
-        looked_at = self._narrowed(choice.features)
-        promise = {k: self.first_look.nats(choice.features[k]) for k in looked_at}
-        order = [k for k in sorted(promise, key=promise.__getitem__)[::-1][:n] if promise[k] > 0]
+        every = range(len(choice.features))
+        looked_at: Sequence[int] = every
+        if has_many(choice):
+            looked_at = best_of(self._few, choice, every)[:LOOKED_AT]
+        order = best_of(self.first_look, choice, looked_at, least=0.0)[:n]
         if choice.near is None:
             return [choice.features[k] for k in order]
         return [max(choice.near(k), key=self.first_look.nats) for k in order]
 
-    def _narrowed(self, features: Sequence[Choosable]) -> list[int]:
-        """Return which of some features are looked at in all steps."""
-        every = list(range(len(features)))
-        if len(features) <= 2 * _LOOKED_AT:
-            return every
-        promise = [self._few.nats(feature) for feature in features]
-        return sorted(every, key=promise.__getitem__)[-_LOOKED_AT:]
-
     @cached_property
     def _few(self) -> FirstLook:
-        """A look at a few of the steps."""
-        return replace(self, law=thinned(self.law, _SHARE), beyond=None).first_look
+        """A look at a few of the steps, beside the same as all of them."""
+        law, kept = thinned(self.law, ONE_IN)
+        few = replace(self, law=law, beyond=None)
+        walls = self.landings.walls
+        few.__dict__["landings"] = Landings(
+            law=law, walls=walls and (walls[0][kept], walls[1][kept])
+        )
+        return replace(few.first_look, one_in=ONE_IN)
 
     @cached_property
     def first_look(self) -> FirstLook:

@@ -93,7 +93,8 @@ class Law:
             bent=both(self.bent, bent),
             leaving=self.leaving if leaving is None else (*self.leaving, leaving),
         )
-        made.__dict__.update(turns=self.turns, draws=self.draws, _weights=self._weights)
+        kept = ("rows", "turns", "draws", "_weights")
+        made.__dict__.update({key: getattr(self, key) for key in kept})
         return made
 
     @cached_property

@@ -56,7 +56,7 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
     theirs_lately = [np.nan_to_num(_ago(all_paces, scene, at[:, None], others, 1 + k)) for k in few]
     speed = np.where(states[:, SPEED] >= 0, states[:, SPEED], np.nan)
     ago = 1 + max(_AGO_STEPS, round(_AGO_S / scene.dt_s))
-    all_others = at[:, None], others
+    all_others, turns = (at[:, None], others), _turns_of_all(states)
     return Swum(
         last=np.nan_to_num(_ago(table, scene, at, who, 1)),
         before_last=np.nan_to_num(_ago(table, scene, at, who, 2)),
@@ -68,7 +68,7 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
         last_turn_rad=_last_turn(states, at, who),
-        bent_rad=np.max([_last_turn(states, at - k, who) for k in range(3)], axis=0),
+        bent_rad=np.max([_ago(turns, scene, at, who, 1 + k) for k in range(3)], axis=0),
         turn_rad=_last_turn(states, at + 1, who),
         others=np.where(here, np.nan_to_num(paces), 0.0),
         others_lately=np.where(here, np.mean(theirs_lately, axis=0), 0.0),
@@ -176,6 +176,19 @@ def _paces_of_all(states: Floats) -> Floats:
     known = np.isfinite(speed) & (speed >= 0) & (zone > 0)
     known[0] = False
     made[known] = normal_scores(speed[known], zone[known].astype(np.int64))
+    return made
+
+
+def _turns_of_all(states: Floats) -> Floats:
+    """Return the angle between everybody's last two steps, shape (sample, column).
+
+    NaN where one of them is not known.
+    """
+    hx, hy = states[:, HX], states[:, HY]
+    known = (states[:, ZONE] > 0) & (np.hypot(hx, hy) > 0)
+    made = np.full(hx.shape, np.nan)
+    cross, dot = hx[:-1] * hy[1:] - hy[:-1] * hx[1:], hx[:-1] * hx[1:] + hy[:-1] * hy[1:]
+    made[1:] = np.where(known[1:] & known[:-1], np.abs(np.arctan2(cross, dot)), np.nan)
     return made
 
 

@@ -102,7 +102,6 @@ CIRCUMSTANCES: dict[str, Weights] = {
     "the stay": lambda seen: hats(seen.stayed_s, _STAYS_S),
     "the nearest": lambda seen: hats(_nearest_m(seen), _NEAR_M),
     "how many are seen": lambda seen: hats(seen.in_sight.sum(axis=1), _NUMBERS),
-    "who is in front": lambda seen: hats(seen.in_front_m, _FRONT_M),
 }
 """Of steps, by name: shape (step, circumstance)."""
 
@@ -111,6 +110,7 @@ OF_EACH: dict[str, Weights] = {
     "bearing": lambda seen: hats(seen.off_axis_rad, _BEARINGS_RAD),
     "whether it is the nearest": lambda seen: _either(seen.nearest[..., 0]),
     "whether it is a robot": lambda seen: _either(seen.is_robot),
+    "who is in front": lambda seen: hats(seen.in_front_m, _FRONT_M)[:, None],
 }
 """Of others, by name: shape (step, other, circumstance)."""
 

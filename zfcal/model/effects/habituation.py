@@ -87,7 +87,9 @@ def _heeding_nobody(seen: Seen, by: Floats) -> Floats:
     """Return the weight of the own ways in steps in which a fish heeds nobody.
 
     A share of all headings has as much weight as all that draws the fish, by which the mixture is
-    divided.
+    divided: by the base law's attention. Components of other effects do not count.
+
+    Shape (step, way, weight).
 
     Parameters
     ----------

@@ -41,20 +41,21 @@ def _of_all_ago(k: int) -> Component:
     """Return the same of near ones too: away from where they were."""
     return _late(
         f"{LAGS[k]} steps, near ones too",
-        lambda seen: seen.ago_toward[k],
+        lambda seen: seen.ago_toward(k),
         lambda seen: seen.attention,
     )
 
 
 def _if_far(seen: Seen, k: int) -> Floats:
-    return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward[k])
+    """Return where others were, and of near ones where they are, shape (step, other, 2)."""
+    return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward(k))
 
 
 def _then(k: int) -> Component:
     """Return where others were some steps ago, from where the fish was."""
     return _late(
         f"{LAGS[k]} steps, from there",
-        lambda seen: seen.then_toward[k],
+        lambda seen: seen.then_toward(k),
         lambda seen: seen.attention,
     )
 

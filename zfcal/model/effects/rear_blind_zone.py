@@ -51,7 +51,8 @@ _FEATURES: tuple[Feature, ...] = (
     by_circumstances(
         factor_on_attention(_behind, label="attention to those behind", high=0.0),
         alone=LESS_ATTENTION,
-        without=("the time",),
+        without=("the time", "bearing"),
+        of_each=True,
     ),
 )
 

@@ -74,7 +74,8 @@ def _spread_by_last_turn(swum: Swum) -> Floats:
 
 
 def _spread_by_bends(swum: Swum) -> Floats:
-    return hats(swum.bent_rad, (0.2, 0.6))[:, 1:]
+    """Return whether one of the last three turns was wide; no weight where one is not known."""
+    return np.nan_to_num(hats(swum.bent_rad, (0.2, 0.6))[:, 1:])
 
 
 def _by_turn(swum: Swum) -> Floats:

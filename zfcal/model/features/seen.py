@@ -35,9 +35,11 @@ class Seen:
     soon_attention, half_attention, late_attention, older_attention : ndarray, shape (step, other)
         Likewise, had all others been where they were a tenth of a step before, half a step, one and
         two.
-    ago_toward, then_toward : ndarray, shape (lag, step, other, 2)
-        Where the other was `LAGS` steps before, seen or not: from where the fish is, and away from
-        there for who is too near now; and from where it was itself, near ones as they are now.
+    ago_toward, then_toward
+        Of a place among `LAGS`: where the others were so many steps before, seen or not, shape
+        (step, other, 2). From where the fish is, and away from there for who is too near now; and
+        from where it was itself, near ones as they are now. Worked out whenever they are asked for:
+        kept they would be a third of all.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
@@ -88,8 +90,8 @@ class Seen:
     half_attention: Floats
     late_attention: Floats
     older_attention: Floats
-    ago_toward: Floats
-    then_toward: Floats
+    ago_toward: Callable[[int], Floats]
+    then_toward: Callable[[int], Floats]
     bearing: Floats
     distance_m: Floats
     off_axis_rad: Floats
