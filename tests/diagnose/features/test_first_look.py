@@ -133,7 +133,7 @@ def test_each_fish_has_as_many_of_a_few_steps(fits):
     whole, some = (np.bincount(each) for each in (fits.law.turns.who, few.turns.who))
     np.testing.assert_allclose(some, whole / 4, rtol=0.15)
     for n in (2, 3, 4, 5):
-        assert np.bincount(kept % n).min() > 0.8 * len(kept) / n
+        assert np.bincount(kept % n, minlength=n).min() > 0.8 * len(kept) / n
 
 
 def test_a_few_steps_promise_what_all_do(fits):

@@ -11,7 +11,8 @@ from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.features.swum import swum_of
 from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.kernels.state import HX, HY, SPEED, ZONE
+from zfcal.model.features import AWAY_M
+from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
 from zfcal.model.paces import Spread
 
 ALL = tuple(all_effects())
@@ -247,6 +248,21 @@ def test_bursts_after_straight_runs_are_told_by_the_last_three_turns(nothing, ch
     told = tell(pace_gains(changed(times), ALL))
     assert told.gain.name == "speed-turn-coupling"
     assert told.gain.label == "slow and fast ones, by the last three turns"
+
+
+def test_who_is_ahead_is_before_the_fish(nothing):
+    """Within 60 degrees of its heading, whoever else is near."""
+    swum, turns, states = nothing.swum, nothing.turns, nothing.scene.states
+    rows = np.flatnonzero(swum.here.all(axis=1))[::50]
+    assert len(rows) > 100
+    for row in rows:
+        at, who = turns.at[row], turns.who[row]
+        others = [j for j in range(states.shape[2]) if j != who]
+        way = states[at][[X, Y]][:, others] - states[at][[X, Y], who][:, None]
+        cosine = states[at, HX, who] * way[0] + states[at, HY, who] * way[1]
+        np.testing.assert_array_equal(swum.ahead[row], cosine > 0.5 * np.hypot(*way))
+        ahead = swum.distance_m[row][swum.ahead[row]]
+        assert swum.ahead_m[row] == ahead.min(initial=AWAY_M)
 
 
 @pytest.mark.parametrize(
