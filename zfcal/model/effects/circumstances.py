@@ -89,6 +89,11 @@ def _either(is_so: ArrayLike) -> Floats:
     return np.stack([so, 1.0 - so], axis=-1)
 
 
+def _alike(seen: Seen, of_step: Floats) -> Floats:
+    """Return circumstances of a step for each other one, shape (step, other, circumstance)."""
+    return np.repeat(of_step[:, None], seen.here.shape[1], axis=1)
+
+
 def _nearest_m(seen: Seen) -> Floats:
     return np.where(seen.here, seen.distance_m, AWAY_M).min(axis=1, initial=AWAY_M)
 
@@ -110,7 +115,7 @@ OF_EACH: dict[str, Weights] = {
     "bearing": lambda seen: hats(seen.off_axis_rad, _BEARINGS_RAD),
     "whether it is the nearest": lambda seen: _either(seen.nearest[..., 0]),
     "whether it is a robot": lambda seen: _either(seen.is_robot),
-    "who is in front": lambda seen: hats(seen.in_front_m, _FRONT_M)[:, None],
+    "who is in front": lambda seen: _alike(seen, hats(seen.in_front_m, _FRONT_M)),
 }
 """Of others, by name: shape (step, other, circumstance)."""
 
