@@ -399,12 +399,10 @@ def test_who_heeds_nobody_has_as_much_of_its_own_way_as_of_all(arena, seen):
 
 def test_robots_are_heeded_by_their_speed(arena, seen):
     """Fish are not, and all robots count at one speed or another."""
-    weights = labelled("robot-avoidance", "attention to robots, by their speed", arena).weights(
-        seen
-    )
+    robots = labelled("robot-avoidance", "attention to robots, by their speed", arena)
+    weights = robots.weights(seen)
     assert not weights[~seen.is_robot].any()
     np.testing.assert_allclose(weights.sum(axis=2), seen.attention * seen.is_robot)
-    robots = labelled("robot-avoidance", "attention to robots, by their speed", arena)
     for column, speed_m_s in enumerate((0.03, 0.07, 0.12)):
         own = np.full((N, OTHERS), speed_m_s)
         weights = robots.weights(dataclasses.replace(seen, speed_m_s=own))

@@ -30,7 +30,7 @@ def test_hats_of_landings_are_all_but_the_last(random):
     expected_hats(chances, rows, places, mean)
     cells = np.nan_to_num(hats(away, knots)[..., :-1])
     np.testing.assert_allclose(sums, cells @ strengths, rtol=1e-13, atol=1e-15)
-    np.testing.assert_allclose(mean, np.einsum("sc,scb->sb", chances[rows], cells), rtol=1e-13)
+    np.testing.assert_allclose(mean, np.einsum("sc,scb->sb", chances[rows], cells), rtol=1e-14)
 
 
 def test_distances_from_the_wall_are_those_of_the_arena(random, tank):

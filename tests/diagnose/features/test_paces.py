@@ -191,7 +191,7 @@ def the_feature(name, label):
 
 
 def spending(speed, _rng):
-    """Slower, the faster it was in the mean of the last six seconds."""
+    """Slower, the faster it was in the mean of the last 18 steps (3.6 s)."""
     made = speed.copy()
     for k in range(18, len(made)):
         made[k] = speed[k] * np.exp(-1.5 * (made[k - 18 : k].mean() / speed.mean() - 1))

@@ -72,9 +72,9 @@ def hat_sums(places: Floats, values: Floats, made: Floats) -> None:
     Parameters
     ----------
     places, made : ndarray, shape (row, cell)
-        The first of `places_among`.
+        Places of `places_among`, and the values there.
     values : ndarray, shape (knot + 1,)
-        The last one twice.
+        At each knot; the last one twice.
     """
     for s in range(places.shape[0]):
         for c in range(places.shape[1]):

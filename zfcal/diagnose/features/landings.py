@@ -64,15 +64,16 @@ class _Near:
         hat_sums(self.places, np.append(strengths, [0.0, 0.0]), made)
         return made
 
-    def expected(self, chances: Floats) -> Floats:
-        """Return the mean weights, by chances of shape (step, cell), shape (row, weight)."""
-        return self._expected(chances, self.rows)
+    def expected(self, chances: Floats, rows: NDArray[np.intp]) -> Floats:
+        """Return the mean weights, shape (row, weight).
 
-    def expected_of_rows(self, chances: Floats) -> Floats:
-        """Return the mean weights, by chances of these rows alone."""
-        return self._expected(chances, np.arange(len(self.rows)))
-
-    def _expected(self, chances: Floats, rows: NDArray[np.intp]) -> Floats:
+        Parameters
+        ----------
+        chances : ndarray, shape (step, cell)
+            Of each cell.
+        rows : ndarray of int, shape (row,)
+            Where these steps are among those of the chances.
+        """
         made = np.empty(self.taken.shape)
         expected_hats(chances, rows, self.places, made)
         return made
@@ -159,12 +160,13 @@ class Landings:
         near = self._near(feature)
         own, lapse = self._at[near.rows], self.law.lapses.likely[near.rows]
         share = (1 - lapse) * own / ((1 - lapse) * own + lapse * UNIFORM)
-        return np.asarray(share[:, None] * (near.taken - near.expected(self.chances)))
+        return np.asarray(share[:, None] * (near.taken - near.expected(self.chances, near.rows)))
 
     def fit(self, feature: Landing) -> Fit:
         """Return a feature at the maximum, and what it adds to each step."""
         near = self._near(feature)
         chances, taken = self.chances[near.rows], near.taken
+        every = np.arange(len(near.rows))
         n, lapses = taken.shape[1], self.law.lapses
 
         def density(x: Floats) -> tuple[Floats, Floats]:
@@ -181,7 +183,7 @@ class Landings:
 
             def scores() -> Floats:
                 made = np.zeros((len(found), len(x)))
-                apart = taken - near.expected_of_rows(bent)
+                apart = taken - near.expected(bent, every)
                 made[near.rows, :n] = share[near.rows, None] * apart
                 made[:, n:] = slopes
                 return made

@@ -67,9 +67,9 @@ def swum_of(scene: Scene, moves: Moves, scores: Floats) -> Swum:
         before_earlier=np.nan_to_num(_ago(table, scene, at, who, ago + 1)),
         last_m_s=_ago(speed, scene, at, who, 1),
         last_ago_m_s=_ago(speed, scene, at, who, ago),
-        last_turn_rad=_last_turn(states, at, who),
+        last_turn_rad=np.nan_to_num(turns[at, who]),
         bent_rad=np.max([_ago(turns, scene, at, who, 1 + k) for k in range(3)], axis=0),
-        turn_rad=_last_turn(states, at + 1, who),
+        turn_rad=np.nan_to_num(turns[at + 1, who]),
         others=np.where(here, np.nan_to_num(paces), 0.0),
         others_lately=np.where(here, np.mean(theirs_lately, axis=0), 0.0),
         others_m_s=_ago(speed, scene, *all_others, 1),
@@ -190,11 +190,3 @@ def _turns_of_all(states: Floats) -> Floats:
     cross, dot = hx[:-1] * hy[1:] - hy[:-1] * hx[1:], hx[:-1] * hx[1:] + hy[:-1] * hy[1:]
     made[1:] = np.where(known[1:] & known[:-1], np.abs(np.arctan2(cross, dot)), np.nan)
     return made
-
-
-def _last_turn(states: Floats, at: NDArray[np.int64], who: NDArray[np.int64]) -> Floats:
-    """Return by how much the heading at a sample differs from that before it; 0 if unknown."""
-    hx, hy = states[at, HX, who], states[at, HY, who]
-    px, py = states[at - 1, HX, who], states[at - 1, HY, who]
-    angle = np.arctan2(px * hy - py * hx, px * hx + py * hy)
-    return np.where((at > 0) & np.isfinite(angle), np.abs(np.nan_to_num(angle)), 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
@@ -65,12 +66,18 @@ def _near_lately(swum: Swum) -> Floats:
     return np.asarray(np.einsum("sj,sjb->sb", swum.others_lately, weights))
 
 
-def _of_nearest(swum: Swum, values: Floats) -> Floats:
-    """Return what belongs to the nearest other one, shape (step, 1); NaN without one."""
-    if not swum.here.size:
-        return np.full((len(swum.here), 1), np.nan)
-    rows, nearest = np.arange(len(swum.here)), swum.distance_m.argmin(axis=1)
-    return np.where(swum.here[rows, nearest], values[rows, nearest], np.nan)[:, None]
+def _of_nearest(swum: Swum, values: Floats, among: NDArray[np.bool_]) -> Floats:
+    """Return what belongs to the nearest of some others, shape (step, 1); NaN without one.
+
+    Parameters
+    ----------
+    values, among : ndarray, shape (step, other)
+    """
+    if not among.size:
+        return np.full((len(among), 1), np.nan)
+    rows = np.arange(len(among))
+    nearest = np.where(among, swum.distance_m, np.inf).argmin(axis=1)
+    return np.where(among[rows, nearest], values[rows, nearest], np.nan)[:, None]
 
 
 def _near_or_far(swum: Swum) -> Floats:
@@ -87,26 +94,10 @@ def _by_fastest_near(swum: Swum) -> Floats:
     return hats(np.where(near[:, 0], fastest, 0.0), _SLOW_TO_FAST)[:, 1:] * near
 
 
-def _who_is_ahead(swum: Swum, values: Floats) -> tuple[Floats, Floats]:
-    """Return what belongs to the nearest one ahead, and how far it is, shapes (step,).
-
-    NaN, and `zfcal.model.features.AWAY_M`, without one.
-    """
-    if not swum.ahead.size:
-        return np.full(len(swum.ahead), np.nan), swum.ahead_m
-    rows = np.arange(len(swum.ahead))
-    first = np.where(swum.ahead, swum.distance_m, np.inf).argmin(axis=1)
-    return np.where(swum.ahead[rows, first], values[rows, first], np.nan), swum.ahead_m
-
-
 def _of_who_is_ahead(swum: Swum) -> Floats:
     """Return the mean speed over two seconds of the nearest one ahead, by its distance."""
-    pace, far_m = _who_is_ahead(swum, swum.others_lately)
-    return np.nan_to_num(pace)[:, None] * hats(far_m, _KNOTS_M)[:, :-1]
-
-
-def _speed_ahead(swum: Swum, values: Floats) -> Floats:
-    return _who_is_ahead(swum, values)[0][:, None]
+    pace = _of_nearest(swum, swum.others_lately, swum.ahead)
+    return np.nan_to_num(pace) * hats(swum.ahead_m, _KNOTS_M)[:, :-1]
 
 
 def _near_ahead(swum: Swum) -> Floats:
@@ -190,14 +181,14 @@ EFFECT = Effect(
         Spread(label="slow and fast ones, by the fastest near", weights=_by_fastest_near),
         Copied(
             label="the speed of the nearest",
-            of=lambda swum: _of_nearest(swum, swum.others_m_s),
-            ago=lambda swum: _of_nearest(swum, swum.others_ago_m_s),
+            of=lambda swum: _of_nearest(swum, swum.others_m_s, swum.here),
+            ago=lambda swum: _of_nearest(swum, swum.others_ago_m_s, swum.here),
             weights=_near_or_far,
         ),
         Copied(
             label="the speed of who is ahead",
-            of=lambda swum: _speed_ahead(swum, swum.others_m_s),
-            ago=lambda swum: _speed_ahead(swum, swum.others_ago_m_s),
+            of=lambda swum: _of_nearest(swum, swum.others_m_s, swum.ahead),
+            ago=lambda swum: _of_nearest(swum, swum.others_ago_m_s, swum.ahead),
             weights=_near_ahead,
         ),
     ),
