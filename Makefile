@@ -41,7 +41,7 @@ check: lint test-plain test-slow test  ## Run everything that must pass before a
 test: install  ## Run the tests that take a moment each
 	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
 
-test-slow: install  ## Run those that take three seconds or more: whole loops, kills, faults, recoveries
+test-slow: install  ## Run those that take two seconds or more: whole loops, kills, faults, recoveries
 	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n $(WORKERS) --dist worksteal -m slow
 
 # The kernels once more as plain Python: what the compiler hides, such as an index out of bounds.

@@ -114,6 +114,7 @@ def effects_in(text, names):
     return {text, whole, *words} & set(names)
 
 
+@pytest.mark.slow
 def test_no_module_names_an_effect(repository):
     """Whoever needs to know something about an effect asks the effect: see "Add an effect"."""
     names = [PREFIX, *(effect.name for effect in (*all_effects(), *generic_effects()))]

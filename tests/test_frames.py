@@ -17,6 +17,8 @@ from zfcal.artifacts.models import read_model
 from zfcal.artifacts.tables import RULES, read_table, read_tracks
 from zfcal_cli.main import run
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "data-samples" / "two-rooms"
 QUICK = ("--generations", "1", "--population", "4", "--steps", "20", "--seed", "1", "-q")

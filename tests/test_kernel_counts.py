@@ -124,6 +124,7 @@ def test_a_hundred_agents_are_counted_alike():
     assert counts["distance"].sum() > 20 * 500
 
 
+@pytest.mark.slow
 def test_one_sample_has_no_step():
     """T and V are empty, O and W hold each agent once."""
     arena = arena_of("ring")

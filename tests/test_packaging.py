@@ -189,6 +189,7 @@ def test_who_cites_or_reads_what_changed_finds_this_version(repository, project)
     assert newest.groups() == (cited["version"], str(cited["date-released"]))
 
 
+@pytest.mark.slow
 def test_every_import_is_a_dependency(project, tree):
     """What the installed code imports is declared, if only by an extra that users can name."""
     distributions = packages_distributions()
@@ -261,6 +262,7 @@ def test_what_is_installed_here_is_what_the_lock_says(pins):
             assert version(name) == pinned, f"{name}: run make install"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CROSSED)
 def test_import_contracts_notice(case, repository, tree, tmp_path):
     """Each way to cross the layers is found, by the contract that is meant to find it."""

@@ -101,6 +101,7 @@ LONG = {"calibrate as published", "diagnose", "extend", "report"}
 QUICK = [name for name in CASES if name not in LONG]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case", [*QUICK, *(pytest.param(name, marks=SLOW) for name in CASES if name not in QUICK)]
 )

@@ -308,6 +308,7 @@ def test_no_trials_make_no_report(here):
         zfcal.compare([], against="alone")
 
 
+@pytest.mark.slow
 def test_numbers_of_numpy_are_numbers(here):
     """They stand in lineage as plain ones, and make the same bytes."""
     zfcal.calibrate("trial", generations=np.int64(0), population=np.int32(4), steps=np.int64(20))

@@ -117,6 +117,7 @@ KILLED = """
 """
 
 
+@pytest.mark.slow
 def test_a_killed_writer_leaves_the_old_or_the_new_content_whole(tmp_path):
     """Twelve times SIGKILL at a random instant: never a half file, never two letters in one."""
     path = tmp_path / "file"

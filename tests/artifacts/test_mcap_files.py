@@ -75,6 +75,7 @@ def test_a_damaged_record_ends_the_reading_there(whole):
     assert 0 < found.counts.total() < 20
 
 
+@pytest.mark.slow
 def test_no_flipped_byte_makes_a_traceback(whole):
     """Each byte in turn, every fifth of them."""
     content = whole.read_bytes()

@@ -14,6 +14,7 @@ def test_the_benchmark_of_the_driver_runs(tiny):
     assert "| pose written to state | " in text
 
 
+@pytest.mark.slow
 def test_the_cost_of_effects_is_measured(repository):
     """A step without any, and with each of three kinds."""
     script = repository / "benchmarks" / "drive" / "bench_drive.py"

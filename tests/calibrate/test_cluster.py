@@ -174,6 +174,7 @@ def test_a_population_counts_the_same_as_here(two, group, genes):
     assert same(here, there)
 
 
+@pytest.mark.slow
 def test_a_group_begins_where_it_was_seen_there_as_well(two, group, genes):
     """Poses travel with the group."""
     xy_m, heading = simulate_tracks(group.template, group.arena, n_agents=5, n_steps=1, seed=4)

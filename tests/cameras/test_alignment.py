@@ -112,6 +112,7 @@ def test_lost_positions_are_left_out():
     assert align_spots(overhead, lost).angle_rad == align_spots(overhead, below).angle_rad
 
 
+@pytest.mark.slow
 def test_a_mirrored_camera_is_told_as_such():
     """No turn brings a mirror image onto the picture."""
     overhead, below = seen(3)

@@ -33,6 +33,7 @@ def live(url, **changes):
     return LiveCamera(url, clock=changes.pop("clock", ArrivalClock()), fps=FPS, **changes)
 
 
+@pytest.mark.slow
 def test_images_come_in_order_with_the_time_of_their_arrival(streaming):
     """All of them, a thirtieth of a second apart; when the camera is gone for good it is told."""
     with streaming.Camera(jpegs(40), fps=FPS) as camera:

@@ -19,6 +19,7 @@ def arena(repository, tmp_path):
     return json.loads(document)
 
 
+@pytest.mark.slow
 def test_an_arena_of_the_page_works_with_every_stage(zfcal, arena):
     """Its own zone and what it leaves are simulated in, counted and calibrated."""
     made = zfcal("init", "own", "--arena", "l-shape.geojson", "--fish", 3, "--fps", 5, "--seed", 1)

@@ -58,6 +58,7 @@ def test_silent_work_says_what_works_and_for_how_long():
     assert screen_of(SILENT, shown=False).split() == ["END"]
 
 
+@pytest.mark.slow
 def test_a_bar_says_how_far_and_comes_back_after_a_line():
     """With the time that is left as soon as it is known; the whole time counts on."""
     screen = screen_of(FAR)

@@ -112,6 +112,7 @@ def test_watch_says_the_same_line_and_logs_it(zfcal, analysed):
     assert [value["rule"] for value in results if "rule" in value] == ["likelihood"] * 2
 
 
+@pytest.mark.slow
 def test_a_damaged_record_is_exit_code_3(zfcal, analysed):
     """With the file's name and what to do."""
     assert zfcal("calibrate", "trial", *QUICK).code == 0

@@ -26,6 +26,7 @@ def commands_of(text, heading):
     return [line.strip() for line in block.splitlines()]
 
 
+@pytest.mark.slow
 def test_the_five_commands_run_on_the_samples(zfcal, readme, repository, tmp_path):
     """As they stand, but for the budget, which is shortened, and each in turn ends with 0."""
     lines = commands_of(readme, "Five commands on the sample")

@@ -27,6 +27,7 @@ def said(folder):
     return document
 
 
+@pytest.mark.slow
 def test_an_archive_is_calibrated_and_judged(zfcal, archive, tmp_path):
     """One trial decides nothing: exit code 4, and the reason is said."""
     before = sorted(path.relative_to(archive) for path in archive.rglob("*"))
@@ -40,6 +41,7 @@ def test_an_archive_is_calibrated_and_judged(zfcal, archive, tmp_path):
     assert sorted(path.relative_to(archive) for path in archive.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_twice_gives_the_same_bytes(zfcal, archive, tmp_path):
     """The second run has nothing to do."""
     zfcal("reproduce", "trial", "-o", "again", *QUICK)
@@ -50,6 +52,7 @@ def test_twice_gives_the_same_bytes(zfcal, archive, tmp_path):
     assert [(tmp_path / "again" / name).read_bytes() for name in names] == first
 
 
+@pytest.mark.slow
 def test_a_reference_of_ones_own_decides(zfcal, archive, tmp_path):
     """Its contrasts and no others; the window to 120 s is one of them."""
     text = """schema = "zfcal.reference/1"
@@ -82,6 +85,7 @@ def test_the_authors_scoring_is_another_number(zfcal, archive, tmp_path):
     assert values["paper"]["S", 120] != values["legacy"]["S", 120]
 
 
+@pytest.mark.slow
 def test_tracks_of_another_program_become_a_trial(zfcal, tracks_csv, tmp_path, monkeypatch):
     """With the tank that is said."""
     monkeypatch.chdir(tmp_path)
@@ -103,6 +107,7 @@ def test_a_table_that_was_changed_is_made_again(zfcal, archive, tmp_path):
     assert place.read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_until_180_s_a_robot_has_what_it_began_with(zfcal, tracks_csv, tmp_path, monkeypatch):
     """Then the model of the window that ended two minutes before, whatever it began with."""
     monkeypatch.chdir(tmp_path)

@@ -84,6 +84,7 @@ def test_numbers_go_out_as_json(zfcal, tank, film):
     assert [a["state"] for a in document["artifacts"]] == ["made", "made"]
 
 
+@pytest.mark.slow
 def test_paths_go_through_a_pipe(zfcal, film, tracked, process, tmp_path):
     """`zfcal track trial ... | zfcal analyse -`."""
     shutil.copytree(tracked / "trial", tmp_path / "trial")
@@ -151,6 +152,7 @@ def test_a_word_against_the_film_is_told(zfcal, tank, film):
     assert "--light was given, but the film shows animals that are darker" in warned
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wrong", "right"), [("--light", "--dark"), ("--dark", "--light")])
 def test_a_film_in_which_no_fish_is_found_is_told(zfcal, tank, film, tmp_path, wrong, right):
     """In one warning, of how many frames, with what to try; the files are there, without a fish."""

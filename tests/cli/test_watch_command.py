@@ -195,6 +195,7 @@ def test_a_dry_run_says_where_the_page_would_be(zfcal, trial):
     assert "on a page" not in zfcal("watch", "trial", "--dry-run").err
 
 
+@pytest.mark.slow
 def test_a_dry_run_takes_no_round_with_a_budget_for_stale(zfcal, trial):
     """Such a round is made once, whatever its inputs; one with generations is made again."""
     assert zfcal("analyse", "trial").code == 0

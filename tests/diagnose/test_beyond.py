@@ -43,6 +43,7 @@ def at_walls(unfeatured):
     return unfeatured(WALLS)
 
 
+@pytest.mark.slow
 def test_what_is_beyond_the_list_is_found_and_holds(at_walls):
     """Of headings, and of them alone; in the model that lacked it."""
     step = at_walls.beyond(at_walls.case.screen, on_speed=False)
@@ -54,6 +55,7 @@ def test_what_is_beyond_the_list_is_found_and_holds(at_walls):
     assert again is None or again.choice.best.name != "generic:heading:wall"
 
 
+@pytest.mark.slow
 def test_it_gains_what_is_asked_and_holds_on_held_out_steps(at_walls, monkeypatch):
     """More than so many nats; an effect that does not hold is none."""
     screen = at_walls.case.screen
@@ -62,6 +64,7 @@ def test_it_gains_what_is_asked_and_holds_on_held_out_steps(at_walls, monkeypatc
     assert at_walls.beyond(screen, on_speed=False) is None
 
 
+@pytest.mark.slow
 def test_where_nothing_stands_out_nothing_beyond_the_list_is_asked(at_walls, monkeypatch):
     """It costs time; a suspicion is enough to ask."""
     quiet = dataclasses.replace(

@@ -52,6 +52,7 @@ def named(ask, record):
     return ask(record(23, BIAS, minutes=6.0))
 
 
+@pytest.mark.slow
 def test_an_effect_is_named_and_measured(named):
     """First of all, 0.4 within its interval, and in the extended model."""
     assert named.verdict is Verdict.NAMED
@@ -68,6 +69,7 @@ def test_an_effect_is_named_and_measured(named):
     assert effect.trace is not None
 
 
+@pytest.mark.slow
 def test_all_effects_are_accounted_for(named):
     """Screened, or lacking something; the clearest first."""
     names = [each.name for each in named.screened]
@@ -81,6 +83,7 @@ def test_all_effects_are_accounted_for(named):
     assert {note.name for note in named.notes} == {"noise", "halves", "controls", "omnibus", "null"}
 
 
+@pytest.mark.slow
 def test_what_disagrees_is_located(named):
     """Turning is found among the places, by false-discovery control."""
     assert named.where

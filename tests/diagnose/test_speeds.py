@@ -216,6 +216,7 @@ def freezing(short, candidate):
     return [fit_speed(short(seed, FREEZING), candidate("freezing"), 0.02) for seed in range(60, 72)]
 
 
+@pytest.mark.slow
 def test_freezing_has_its_rate_and_duration(freezing):
     """Some 41 rests in each of twelve recordings: 490 say both to a twentieth.
 

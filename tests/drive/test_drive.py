@@ -355,6 +355,7 @@ def test_what_cannot_be_driven_is_told(root, tmp_path):
         drive(root, options, say_nothing)
 
 
+@pytest.mark.slow
 def test_damaged_poses_are_left_out_and_told(root, recorded):
     """The driver goes on; what it had before the damage was driven by."""
     path = root / "poses" / "000000.mcap"
@@ -457,6 +458,7 @@ def test_a_robot_whose_place_is_no_number_is_not_seen(root, recorded, bad):
     assert replay(root, say_nothing).is_same
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bad", NO_NUMBERS)
 def test_a_fish_whose_place_is_no_number_is_absent(root, recorded, bad):
     """The same targets and commands as if it were not there, and the file is named once."""

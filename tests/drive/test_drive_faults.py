@@ -468,6 +468,7 @@ def test_a_second_driver_is_refused_and_a_port_that_is_not_there(
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_events_are_told_as_lines_of_json(rig):
     """From its beginning to its end: by whom and by what it drives, how quick it was."""
     rig.start("--duration", "2s", "--pattern", "pid", "-q")
@@ -486,6 +487,7 @@ def test_events_are_told_as_lines_of_json(rig):
     assert Path(rig.told("made")[0]["path"]).exists()
 
 
+@pytest.mark.slow
 def test_the_end_is_told_as_json(rig, tmp_path):
     """One document: what was made, how quick it was; the driver ends after --duration."""
     words = ("--json", "-q", "--port", rig.robot.port, "--duration", "2s", "--pattern", "pid")

@@ -179,6 +179,7 @@ def test_tracks_that_cannot_be_read_end_no_drive(imported, spoil):
     assert spoil == "half an import" or not is_recorded(imported)
 
 
+@pytest.mark.slow
 def test_a_live_drive_goes_on_while_the_tracker_pauses(imported, monkeypatch):
     """Poses come, pause, and come again: whatever the tracks say, the duration alone ends it."""
     monkeypatch.setattr("zfcal.drive.loop._OVER_S", 0.2)
@@ -190,6 +191,7 @@ def test_a_live_drive_goes_on_while_the_tracker_pauses(imported, monkeypatch):
     assert because == "the duration is over"
 
 
+@pytest.mark.slow
 def test_a_live_drive_waits_for_a_tracker_that_starts_late(imported, monkeypatch):
     """It holds its lock while it compiles; tracks are looked at once, and never again."""
     monkeypatch.setattr("zfcal.drive.loop._OVER_S", 0.2)

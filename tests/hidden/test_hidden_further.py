@@ -63,6 +63,7 @@ def test_the_first_forms_are_as_they_were(name):
     np.testing.assert_allclose(made.states_m[-1].ravel(), ends, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_form_without_strength_is_the_base():
     """To the last bit, in ten seconds after a minute."""
     base = make_trial(Scenario(minutes=1 / 6, seed=SEED), oracle=False)

@@ -49,6 +49,7 @@ def states(tank, seed, n):
         yield np.array(xy), rng.uniform(-math.pi, math.pi, 5), rng.uniform(0.01, 0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make_tank", [two_rooms, rectangle])
 @pytest.mark.parametrize("which", ["natural", "shifted"])
 def test_the_base_law_is_the_model_in_every_state(make_tank, which, tmp_path):

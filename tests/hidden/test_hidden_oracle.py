@@ -38,6 +38,7 @@ def test_base_fish_are_worth_no_nats(base, arena):
     )
 
 
+@pytest.mark.slow
 def test_the_fit_finds_the_parameters_back():
     """Half an hour of five fish gives each kappa and alpha to within 20 %."""
     base, world = natural(), world_of(two_rooms())

@@ -467,6 +467,7 @@ def test_effects_come_and_go(model):
     assert bounds_of("alignment", "kappa") == (0.0, 30.0)
 
 
+@pytest.mark.slow
 def test_a_place_is_looked_for_within_the_tank(two_rooms, model):
     """Fish that drift everywhere are drawn to its edge, not to a place metres away."""
     x0, y0, x1, y1 = two_rooms.outline.bounds
@@ -490,6 +491,7 @@ def test_units_of_a_fit():
     assert SCALES.tolist() == [30.0, 30.0, 50.0]
 
 
+@pytest.mark.slow
 def test_a_place_is_found_to_the_millimetre(two_rooms, model):
     """From 30 cm beside it; a place can be 100 m away, and is told to less than its error."""
     place = {"strength": 1.5, "x_m": 0.3, "y_m": 0.2, "reach_m": 0.4}

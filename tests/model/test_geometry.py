@@ -71,6 +71,7 @@ def test_the_grid_changes_nothing(name):
     assert set(np.unique(zones)) == set(range(len(arena.zones) + 1))
 
 
+@pytest.mark.slow
 def test_the_wall_direction_is_perpendicular_to_the_nearest_point(two_rooms):
     """Along a flat wall it is the wall; at the reflex corner it turns with the bearing."""
     corner = np.array([0.330, 0.599])

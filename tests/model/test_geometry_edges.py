@@ -85,6 +85,7 @@ def _cracked():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", _cracked())
 def test_a_crack_belongs_to_the_zone_that_the_arena_gives_it(name):
     """Where the rest of the tank is too small for a zone, arena and kernel agree on the nearest."""

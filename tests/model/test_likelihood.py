@@ -78,6 +78,7 @@ def test_the_score_of_the_truth_is_a_martingale(scene, model):
         assert (np.abs(slopes.sum(axis=0)) <= 4.5 * error + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_the_estimate_is_the_base_that_a_diagnosis_starts_from(two_rooms, model):
     """The same parameters within a tenth of an interval, from other starts, and the same lapse."""
     zones = tuple(dataclasses.replace(zone, alpha=20.0) for zone in model.zones)
@@ -98,6 +99,7 @@ def test_the_estimate_is_the_base_that_a_diagnosis_starts_from(two_rooms, model)
         assert estimate.lapse[zone.name] == pytest.approx(x[-1], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_an_estimate_stays_within_a_genome_and_a_base_does_not(two_rooms, model):
     """Fish that turn less than a gene can say: kappa 60 along walls, of at most 30."""
     zones = tuple(dataclasses.replace(zone, kappa_0=60.0, alpha=0.0) for zone in model.zones)
@@ -112,6 +114,7 @@ def test_an_estimate_stays_within_a_genome_and_a_base_does_not(two_rooms, model)
     assert base.nats > estimate.nats_per_step * estimate.n_steps + 10
 
 
+@pytest.mark.slow
 def test_a_concentration_along_walls_of_its_own_is_estimated_as_well(scene, model):
     """The estimate has one kappa for the base of a zone, whatever the template has."""
     zones = tuple(dataclasses.replace(zone, kappa_w=3.0) for zone in model.zones)
@@ -179,6 +182,7 @@ def test_tracking_errors_go_into_the_lapse(run, two_rooms, model):
     assert found.lapse["centre"] > 0.02
 
 
+@pytest.mark.slow
 def test_the_estimate_beats_every_neighbour(scene, model):
     """No parameter moved by a tenth makes the recording more likely."""
     found = fit(scene, model)

@@ -40,6 +40,7 @@ def test_the_strength_of_an_effect_on_headings_is_recovered(watch, model, kind):
     assert shape.items() <= found.parameters.effects[name].items()
 
 
+@pytest.mark.slow
 def test_the_base_beside_an_effect_is_recovered_too(watch, model):
     """Without the effect the base would take some of it over: kappa of the centre is 8."""
     scene = watch({"turning-bias": {"strength": 2.0}}, seed=4)
@@ -54,6 +55,7 @@ def test_the_base_beside_an_effect_is_recovered_too(watch, model):
     assert beside.nats_per_step > alone.nats_per_step + 0.01
 
 
+@pytest.mark.slow
 def test_the_fit_does_not_depend_on_where_it_starts(watch, model):
     """From a turn to the other side as well, to a tenth of the interval."""
     scene = watch({"turning-bias": {"strength": 1.0}}, seed=4)
@@ -68,6 +70,7 @@ def test_the_fit_does_not_depend_on_where_it_starts(watch, model):
     assert here.nats_per_step == pytest.approx(there.nats_per_step, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_two_effects_are_fitted_together(watch, model):
     """Each within its own interval."""
     truth = {"alignment": {"weight": 15.0, "kappa": 8.0}, "turning-bias": {"strength": 1.0}}
@@ -83,6 +86,7 @@ def test_two_effects_are_fitted_together(watch, model):
     assert list(found.parameters.effects) == ["alignment", "turning-bias"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_there_has_no_strength(watch, model):
     """An interval about zero, or one that begins there where a strength cannot be negative."""
     scene = watch({}, seed=4)

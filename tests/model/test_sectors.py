@@ -115,6 +115,7 @@ def test_no_heading_of_a_sector_is_likelier_than_its_bound(
     assert (work.sectors[2] >= found).all()
 
 
+@pytest.mark.slow
 def test_draws_in_sectors_follow_the_law(border, twin, two_rooms, restless):
     """Chi-square over 60 angles with 80,000 draws, at p > 1e-4.
 

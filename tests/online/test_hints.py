@@ -60,6 +60,7 @@ def test_a_new_file_is_a_hint_at_once_and_a_dot_file_none(listening):
     assert has_hint(hints, 0.5 * RESCAN_S)
 
 
+@pytest.mark.slow
 @needs_watchfiles
 def test_folders_that_appear_or_are_replaced_are_watched(listening):
     """The first statistics make their folder."""

@@ -57,6 +57,7 @@ def run(folder, *words):
     )
 
 
+@pytest.mark.slow
 def test_modules_need_nothing_that_one_system_has(tmp_path):
     """All but those that drive a robot can be imported; the commands are among them."""
     result = run(tmp_path, "-c", IMPORTING)

@@ -638,6 +638,7 @@ def test_a_driver_that_is_stopped_while_it_takes_a_pose_knows_that_it_is_old():
     assert world.bot._until_s <= before_s + PATIENCE_S
 
 
+@pytest.mark.slow
 def test_the_robot_stops_whatever_happens():
     """Some hundred steps; `make test-slow` does more than ten thousand."""
     COUNTED.clear()

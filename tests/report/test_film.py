@@ -108,6 +108,7 @@ def test_a_film_is_the_same_every_time(sides, kind):
     assert film_of(sides(), kind) == film_of(sides(), kind)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_model", "quick_pictures")
 def test_a_film_is_a_part_of_the_report(small_trial, monkeypatch, two_rooms, wander):
     """It is up to date with it, and goes where it is no longer asked for."""

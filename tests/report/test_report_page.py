@@ -14,7 +14,7 @@ from zfcal.report import page
 from zfcal.report.options import Printing, ReportOptions
 from zfcal.report.page import report_files, report_left_out, report_reason, write_report
 
-pytestmark = pytest.mark.usefixtures("quick_model")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_model")]
 
 quickly = pytest.mark.usefixtures("quick_pictures")
 
@@ -107,7 +107,6 @@ def test_the_page_stands_by_itself(drawn_trial):
     assert "prefers-color-scheme: dark" in text
 
 
-@pytest.mark.slow
 def test_the_same_trial_has_the_same_bytes_wherever_it_lies(drawn_trial, tmp_path, monkeypatch):
     """Made again from another folder, under a relative path: not a byte differs."""
     copy = tmp_path / "elsewhere" / "trial"

@@ -36,6 +36,7 @@ def stamps(root):
     return {path.name: path.stat().st_mtime_ns for path in (root / "report").iterdir()}
 
 
+@pytest.mark.slow
 def test_a_set_of_another_format_leaves_a_page_that_is_up_to_date(pair, tmp_path):
     """Not one file of it is written; the page that was missing has the format of the set."""
     before = stamps(pair[0])

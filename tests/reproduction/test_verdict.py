@@ -116,6 +116,7 @@ def test_the_family_keeps_its_level():
     assert wrong / 2000 < 0.05 + 3 * math.sqrt(0.05 * 0.95 / 2000)
 
 
+@pytest.mark.slow
 def test_agreement_is_rarely_said_of_what_lies_beyond_the_margin():
     """Of 2,000 sets whose true difference is the margin, 5 % agree at most."""
     rng = np.random.default_rng(4)

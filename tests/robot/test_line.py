@@ -302,6 +302,7 @@ with Watchdog(bot) as watchdog:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGTSTP])
 def test_a_driver_that_is_stopped_does_not_leave_the_wheels_turning(start_virtual, until, number):
     """By Ctrl-Z or by SIGSTOP: STOP comes when the last pose expires; on SIGCONT it drives on."""

@@ -92,6 +92,7 @@ def test_the_same_seed_leads_to_the_same_place():
     assert ends[0] != ends[2]
 
 
+@pytest.mark.slow
 def test_slip_is_as_large_as_it_was_asked_to_be():
     """The way of 3 s by 200 robots spreads as slip that lasts half a second makes it.
 

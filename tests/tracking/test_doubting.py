@@ -48,6 +48,7 @@ def test_old_looks_are_forgotten():
     assert doubts.trust(100.0) == 1.0
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(1, 1e4), max_size=20),
     st.lists(st.floats(1, 1e4), max_size=20),

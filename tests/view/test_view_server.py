@@ -76,6 +76,7 @@ def hear_until(page, holds):
     return state
 
 
+@pytest.mark.slow
 def test_only_who_knows_the_secret_may_look(page):
     """Neither without it, nor with a part of it, nor with another."""
     token = urlsplit(page.url).path.strip("/")
@@ -106,6 +107,7 @@ def test_a_name_that_is_not_of_this_computer_is_refused(page, host):
     assert ask(page, host=host).status in {400, 403}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("host", ["localhost:1", "LOCALHOST", "127.0.0.1", "[::1]:8642", "[::1]"])
 def test_a_tunnel_may_have_another_port(page, host):
     """The name counts."""

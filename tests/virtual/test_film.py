@@ -85,6 +85,7 @@ def test_there_is_an_image_for_each_frame_of_the_tracks(filmed):
     assert late[0] == 60.0
 
 
+@pytest.mark.slow
 def test_the_tracks_are_the_truth_of_the_images(filmed):
     """Everybody's pixels together have the centroid of the rows, through the camera's file."""
     camera = read_camera(filmed / "cameras" / "overhead.toml")
@@ -169,6 +170,7 @@ def test_no_robot_no_camera_below(home, tmp_path):
     assert list(read_trial(root).cameras) == ["overhead"]
 
 
+@pytest.mark.slow
 def test_the_same_again_does_nothing(home, tmp_path, heard, read_all):
     """Everything is up to date; a missing file comes back with the same bytes."""
     root = tmp_path / "t"
@@ -365,6 +367,7 @@ def test_a_plain_video_holds_the_same_pixels(home, tmp_path, heard, ending):
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_an_mp4_can_be_looked_at(filmed, tmp_path):
     """Small, and not the same pixels."""
     video = tmp_path / "v.mp4"

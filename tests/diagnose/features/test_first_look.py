@@ -44,6 +44,7 @@ def asked_of(base, sort):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sort", [Component, Tilt, Turned, Leaving])
 def test_it_says_about_what_a_fit_gains(base, fits, sort):
     """Of strengths that may go either way, and of those that may not; what they have to beat off.

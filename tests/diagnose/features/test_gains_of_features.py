@@ -181,6 +181,7 @@ def test_noise_hides_a_gain_with_what_counts_with_it():
     assert said.hidden == without.hidden != ()
 
 
+@pytest.mark.slow
 def test_a_component_in_a_form_that_nobody_knows_is_told(base, hidden):
     """Of headings 4 % are drawn about north-west, in a wide and lopsided bump: a direction."""
     _, fitted = base
@@ -361,6 +362,7 @@ def test_features_are_asked_by_kind(nothing):
     ]
 
 
+@pytest.mark.slow
 def test_numbers_do_not_depend_on_threads(base):
     """To the digit."""
     scene, fitted = base

@@ -138,6 +138,7 @@ def bodies(base, worlds):
     return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
 
 
+@pytest.mark.slow
 def test_what_all_walls_have_in_common_is_no_place(bodies):
     """Each wall is shunned by itself, and no more than the others."""
     walls = at_wall(bodies.scene.arena)

@@ -346,6 +346,7 @@ def test_a_few_slow_steps_among_others_are_crowding(nothing, changed):
     assert told.gain.label.startswith("slow and fast ones")
 
 
+@pytest.mark.slow
 def test_what_one_room_does_to_speeds_is_no_effect(nothing, changed):
     """A lamp over one room makes fish fast there: fields have means of their own."""
     scene = nothing.scene
@@ -406,6 +407,7 @@ def test_one_fish_has_nobody_to_match(screen):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_beside_an_effect_its_own_features_gain_nothing(nothing, changed):
     """What another name gains by them is gone as well."""
     times = np.ones(len(nothing.scene.moves))
@@ -425,6 +427,7 @@ def test_what_is_there_at_first_alone_is_told_by_the_time(nothing, changed):
     assert paces.course(told.gain).in_all_minutes
 
 
+@pytest.mark.slow
 def test_what_comes_and_goes_is_not_there_in_all_minutes(nothing, changed):
     """Two of ten minutes have it, far apart: gains are told, and differ between minutes."""
     times = np.ones(len(nothing.scene.moves))

@@ -366,6 +366,7 @@ def test_why_a_page_is_drawn_again(make_sheet, tmp_path, undrawn):
     assert "does not say what it shows" in diagnosis_page.reason(tmp_path, "f" * 64)
 
 
+@pytest.mark.slow
 def test_pictures_in_other_formats_and_at_a_width(make_sheet, tmp_path):
     """PDF alone, 85 mm wide on paper; the PNGs of before go, and the page names the new files."""
     sheet = make_sheet(names=())
@@ -404,6 +405,7 @@ def test_pictures_of_older_findings_go(make_sheet, tmp_path, undrawn):
     assert (tmp_path / "mine.png").exists()
 
 
+@pytest.mark.slow
 def test_a_pool_draws_what_is_drawn_without(make_sheet, tmp_path):
     """Processes of its own give the same bytes, and are gone afterwards."""
     sheet = make_sheet(names=())

@@ -173,6 +173,7 @@ def test_a_single_window_has_a_band_that_is_seen(make_view):
     assert band.height == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_trials", [1, 3])
 @pytest.mark.parametrize("n_windows", [1, 2, 29])
 def test_no_text_covers_another(make_view, covered_texts, n_trials, n_windows):

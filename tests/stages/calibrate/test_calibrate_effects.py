@@ -21,6 +21,8 @@ from zfcal.stages.calibrate.likelihood import estimate, memory_span, remembered
 from zfcal.stages.events import Made, Planned, UpToDate, say_nothing
 from zfcal.stages.trial_context import Task, open_trial
 
+pytestmark = pytest.mark.slow
+
 TRUTH = {"turning-bias": {"strength": 1.0}, "burst-and-coast": {"exponent": 0.4}}
 START = {"turning-bias": {"strength": 0.3}, "burst-and-coast": {"exponent": 0.2}}
 
@@ -126,7 +128,6 @@ def test_the_estimate_over_all_minutes_has_the_strengths_too(trial):
     assert exponent == pytest.approx(0.4, abs=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("champion", ["score", "likely", "forward"])
 def test_numbered_models_carry_the_effects(trial, in_full, champion):
     """Each of them, with strengths of its own; populations name their genes."""
@@ -145,7 +146,6 @@ def test_numbered_models_carry_the_effects(trial, in_full, champion):
     assert START["turning-bias"]["strength"] not in strengths
 
 
-@pytest.mark.slow
 def test_the_likely_model_has_the_likely_strengths(trial, in_full):
     """Where the estimate is handed on, its strengths drive."""
     calibrate(trial, of(in_full, trial, champion="likely", n_windows=40), say_nothing)
@@ -159,7 +159,6 @@ def test_the_likely_model_has_the_likely_strengths(trial, in_full):
         assert effects[name][key] == pytest.approx(told[f"{name}.{key}"]["value"])
 
 
-@pytest.mark.slow
 def test_the_models_that_calibrate_makes_can_be_calibrated_and_driven(trial, quick):
     """A numbered model with effects is a model like any other."""
     calibrate(trial, of(quick, trial), say_nothing)
@@ -171,7 +170,6 @@ def test_the_models_that_calibrate_makes_can_be_calibrated_and_driven(trial, qui
     assert "models/000240.toml" in read_lineage(trial / "models" / "000120.toml").inputs
 
 
-@pytest.mark.slow
 def test_the_named_model_is_an_input_and_a_changed_one_makes_rounds_stale(trial, quick, heard):
     """In place of the trial's own; run again there is nothing to do."""
     options = of(quick, trial)
@@ -196,7 +194,6 @@ def test_the_named_model_is_an_input_and_a_changed_one_makes_rounds_stale(trial,
     assert made_of(heard)[2::3] == ["000120.toml", "000180.toml", "000240.toml"]
 
 
-@pytest.mark.slow
 def test_the_trials_own_model_is_calibrated_without_it(trial, quick, heard):
     """The extended one in the same folder says nothing; naming it makes the rounds anew."""
     calibrate(trial, quick, say_nothing)
@@ -235,7 +232,6 @@ def test_what_rounds_of_other_effects_left_is_not_taken_over(trial, in_full, cha
         assert result["published"]["because"] == "no window has followed a model yet"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("strength", "n_rounds"), [(None, 2), (0.31, 1)])
 def test_the_record_goes_on_where_the_model_is_the_same(trial, in_full, strength, n_rounds):
     """One whose file has changed swims otherwise than those that were judged."""
@@ -249,7 +245,6 @@ def test_the_record_goes_on_where_the_model_is_the_same(trial, in_full, strength
     assert "models/000120.parquet" in population.inputs
 
 
-@pytest.mark.slow
 def test_a_pooled_stretch_is_calibrated_with_the_named_model(trial, quick, tmp_path):
     """The model before is the named one."""
     out = tmp_path / "half.toml"

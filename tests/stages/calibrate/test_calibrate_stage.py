@@ -198,6 +198,7 @@ def test_more_generations_make_it_stale_and_a_budget_does_not(trial, quick, hear
     assert len(reasons) == 9
 
 
+@pytest.mark.slow
 def test_a_round_with_a_budget_repeats_with_its_generations(
     trial, copy_trial, quick, heard, read_all
 ):

@@ -103,6 +103,7 @@ def test_a_published_gamma_has_the_interval_of_the_estimate_in_its_own_scale():
     assert list(without["parameters"]["a.kappa_0"].values()) == [9.0, 0.0, 1.0, False]
 
 
+@pytest.mark.slow
 def test_the_estimate_is_the_base_of_a_diagnosis_of_the_same_minutes(make_trial):
     """Where the base lies within a genome, the same numbers to a tenth of an interval."""
     opened, model = swim(make_trial())
@@ -170,6 +171,7 @@ def test_the_robot_is_a_neighbour_but_not_a_sample(make_trial):
     assert found.found.n_steps <= 2 * 600
 
 
+@pytest.mark.slow
 def test_calibrate_writes_the_estimate_and_reads_the_tracks(make_trial, in_full):
     """[result.likelihood] is there, and the window's segments are inputs."""
     root = make_trial()

@@ -25,6 +25,8 @@ from zfcal.stages.events import LeftOut, Made, Note, Progress, Result, UpToDate,
 from zfcal.stages.trial_context import Task, open_trial
 from zfcal.tracks import concatenate
 
+pytestmark = pytest.mark.slow
+
 ENDS = (120, 180, 240, 300)
 
 
@@ -74,7 +76,6 @@ def made_of(events):
     return {event.path.name: event.reason for event in events if isinstance(event, Made)}
 
 
-@pytest.mark.slow
 def test_each_round_leaves_the_record_of_all_windows_so_far(done):
     """Models of 120 s are judged at 240 s, those of 180 s at 300 s."""
     n_rows = [len(read_table(rules_of(done, end), RULES)) for end in ENDS]
@@ -170,7 +171,6 @@ def test_a_record_that_was_removed_is_made_again(done, published, forward, heard
     assert read_all(done) == read_all(published)
 
 
-@pytest.mark.slow
 def test_one_window_at_a_time_ends_in_the_same_bytes(trial, published, done, forward, read_all):
     """As a watch does it."""
     for end in ENDS:
@@ -178,7 +178,6 @@ def test_one_window_at_a_time_ends_in_the_same_bytes(trial, published, done, for
     assert read_all(trial) == read_all(done) == read_all(published)
 
 
-@pytest.mark.slow
 def test_a_killed_round_ends_in_the_same_bytes(trial, done, forward, read_all):
     """Killed in the last round, after its second generation."""
 
@@ -241,7 +240,6 @@ def test_one_fish_is_enough(make_trial, forward):
     assert all(0 <= score <= 1 for score in table["S"] if score is not None)
 
 
-@pytest.mark.slow
 def test_a_damaged_record_ends_the_rounds(done, forward):
     """It is named, with what to do; what stands before it stays."""
     path = rules_of(done, 180)
@@ -296,7 +294,6 @@ def test_a_fresh_trial_publishes_by_the_rule_that_leads(trial, done, forward, re
     assert read_all(trial) == read_all(done)
 
 
-@pytest.mark.slow
 def test_each_round_says_one_line(trial, forward, heard):
     """What was published, by which rule, what it is worth, and the rules so far, best first."""
     calibrate(trial, forward, heard.append)

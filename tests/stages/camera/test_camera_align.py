@@ -86,6 +86,7 @@ def test_a_dry_run_looks_at_no_image(trial):
     assert not (trial / "cameras" / "below-aligned.toml").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "found"), [("overhead", "below"), ("below", "above")])
 def test_a_camera_that_looks_from_the_wrong_side_is_refused(trial, name, found):
     """A mirrored calibration cannot be turned into place."""

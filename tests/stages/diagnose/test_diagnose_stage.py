@@ -222,6 +222,7 @@ def test_a_run_killed_before_its_page_goes_on_there(make_trial, asked, heard, re
     assert read_all(root) == killed
 
 
+@pytest.mark.slow
 def test_a_page_gets_ready_while_the_answer_is_worked_out(make_trial, asked, heard):
     """With a thread to spare, and only where there is an answer to wait for."""
     root, page = make_trial(seconds=130), Page()

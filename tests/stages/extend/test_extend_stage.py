@@ -98,6 +98,7 @@ def test_the_model_gets_the_effect_and_the_findings_the_gap(trial, found, option
     assert [event.value for event in of_type(heard, Result)] == [document]
 
 
+@pytest.mark.slow
 def test_the_findings_stay_up_to_date_with_their_gap(trial, found, options, heard):
     """Diagnose has nothing to do afterwards, and a second extend neither."""
     extend(trial, options, say_nothing)
@@ -113,6 +114,7 @@ def test_the_findings_stay_up_to_date_with_their_gap(trial, found, options, hear
     assert len(found.asked) == 1
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_gone_is_put_back_without_calibrating(trial, found, options, heard):
     """Diagnose --force drops it; the model file still has it."""
     extend(trial, options, say_nothing)
@@ -172,6 +174,7 @@ def test_a_dry_run_says_what_it_would_make(trial, found, options, heard, read_al
     assert read_all(trial) == before
 
 
+@pytest.mark.slow
 def test_stale_findings_are_asked_for_again_as_they_were(trial, found, options):
     """Quick ones stay quick."""
     diagnose(trial, DiagnoseOptions(quick=True, noise_m=0.0005), say_nothing)
@@ -238,6 +241,7 @@ def test_an_unknown_name_is_told_before_anything_is_diagnosed(trial, found, quic
     assert not (trial / "diagnosis").exists()
 
 
+@pytest.mark.slow
 def test_an_effect_in_the_model_is_told_before_anything_is_diagnosed(trial, found, options, quick):
     """Though its findings are stale, and would be made anew first."""
     path = extend(trial, options, say_nothing)

@@ -15,6 +15,8 @@ from zfcal.stages.track.plan import TrackOptions
 from zfcal.stages.track.track import track
 from zfcal.tracks import tracks_of
 
+pytestmark = pytest.mark.slow
+
 FPS = 15.0
 CORNERS = ((-0.5, 199.5), (199.5, 199.5), (199.5, -0.5), (-0.5, -0.5))
 MIDDLE_M = 0.2
@@ -60,7 +62,6 @@ def ids_by_side(tracks):
     return np.unique(tracks.agent[left]).tolist(), np.unique(tracks.agent[right]).tolist()
 
 
-@pytest.mark.slow
 def test_poses_are_told_by_what_is_believed(tracked):
     """Whoever drives by them hears the other's id for a while, and then nothing for a step."""
     poses = tracks_of(read_poses(tracked / "poses" / "000000.mcap"))

@@ -87,6 +87,7 @@ def test_light_animals_need_no_word(new, film):
     assert any("100.0% of them with exactly 3 animals seen" in note.text for note in notes)
 
 
+@pytest.mark.slow
 def test_a_word_against_the_film_wins_with_a_warning_and_is_not_believed(new, film):
     """No frame counts, no position is more than a guess."""
     root = new()
@@ -100,6 +101,7 @@ def test_a_word_against_the_film_wins_with_a_warning_and_is_not_believed(new, fi
     assert np.all(confidence < 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_fish", [2, 4])
 def test_frames_count_only_if_as_many_are_there(new, film, n_fish):
     """One more or one fewer in the tank than was said."""

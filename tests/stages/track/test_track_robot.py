@@ -221,6 +221,7 @@ def test_leds_of_another_colour_are_not_seen(root, filmed, heard):
     assert numbers["leds"] == {"no LED": N}
 
 
+@pytest.mark.slow
 def test_the_calibration_of_the_other_camera_is_refused(root, filmed):
     """The camera below has 640 x 480 px; that file is of one with 500 x 500."""
     options = options_of(filmed, file=filmed / "overhead.toml")

@@ -103,6 +103,7 @@ def tracked(tmp_path_factory, film):
     return root
 
 
+@pytest.mark.slow
 def test_the_tracks_are_where_the_bodies_were(tracked, paths):
     """A millimetre beside them or less, three of them in every frame, each under one id."""
     tracks = all_tracks(tracked)
@@ -266,6 +267,7 @@ def test_a_stretch_keeps_its_times(new, film, heard):
     assert read_extra(root / "tracks" / "000060.parquet")["end_s"] == pytest.approx(61.0)
 
 
+@pytest.mark.slow
 def test_images_and_mcap_give_the_tracks_of_the_video(new, film, images, tmp_path):
     """The same frames, whatever they come from: bit by bit, times apart by rounding alone."""
     folder = tmp_path / "images"
@@ -603,6 +605,7 @@ def test_the_source_of_trial_toml_is_used(new, film, heard):
     assert math.isclose(all_tracks(root).time_s[-1], 119 / 5, rel_tol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_file_of_poses_that_is_still_empty_is_made_anew(new, images, tmp_path):
     """A command was killed after it had made the file, and before its first byte."""
     film = write_video(tmp_path / "v.avi", images[:60], fps=30.0)
