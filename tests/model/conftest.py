@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from zfcal.artifacts.arenas import load_arena
-from zfcal.model.features import LAGS, Seen
+from zfcal.model.features import LAGS, SOON, Seen
 from zfcal.model.scene import make_scene
 from zfcal.model.simulate import simulate_tracks
 from zfcal.parameters import natural
@@ -85,7 +85,8 @@ def seen():
 
     robot = np.zeros((n, others), dtype=bool)
     robot[:, -1] = True
-    ago, then = ways(2, len(LAGS), n, others)
+    ago, then = (dict(zip(LAGS, each, strict=True)) for each in ways(2, len(LAGS), n, others))
+    ago |= {SOON: -ago[1], 0.5: -ago[2]}
     return Seen(
         attention=rng.uniform(0.1, 2.0, (n, others)),
         toward=ways(n, others),
@@ -128,6 +129,8 @@ def seen():
         each_left_s=rng.uniform(0, 9, (n, others)),
         in_open=rng.uniform(0, 1, (n, others)),
         stayed_s=rng.uniform(0, 30, n),
+        straight_s=rng.uniform(0, 8, n),
+        last_speed_m_s=rng.uniform(0.02, 0.2, n),
     )
 
 

@@ -56,6 +56,9 @@ HOOKS = {
     "lag between steps": {"reaction-delay": {"delay_s": 0.3}},
     "some of it late": {"reaction-delay": {"delay_s": 0.4, "share": 0.3}},
     "late directions": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "whole": 0.0}},
+    "late directions of near ones": {
+        "reaction-delay": {"delay_s": 0.3, "share": 0.3, "whole": 0.0, "near": 1.0}
+    },
     "sight of then": {"reaction-delay": {"delay_s": 0.4, "share": 0.3, "then": 1.0}},
     "directions of then": {
         "reaction-delay": {"delay_s": 0.3, "share": 0.3, "whole": 0.0, "then": 1.0}
@@ -581,6 +584,20 @@ def test_a_delay_between_steps_is_likeliest_where_it_is(two_rooms, model):
     }
     assert nats[0.3] > nats[0.2] + 20
     assert nats[0.3] > nats[0.4] + 20
+
+
+def test_near_ones_that_are_left_late_are_likeliest_so(two_rooms, model):
+    """Of fish that swim away from where those next to them were, and of others."""
+    given = {"delay_s": 0.3, "whole": 0.0}
+    late = {t: having(model, {"reaction-delay": {**given, "near": t}}) for t in (0.0, 1.0)}
+    for true, other in ((0.0, 1.0), (1.0, 0.0)):
+        xy_m, _ = simulate_tracks(late[true], two_rooms, n_agents=5, n_steps=1000, seed=9)
+        scene = make_scene(samples_of(xy_m), two_rooms)
+        nats = {
+            w: sum(nats_of(x, t, view_of(scene, m)).sum() for x, t in pairs(scene, m))
+            for w, m in late.items()
+        }
+        assert nats[true] > nats[other] + 20
 
 
 @pytest.mark.parametrize("whole", [1.0, 0.0])

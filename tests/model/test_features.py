@@ -1,6 +1,7 @@
 """Features of effects: hat functions, and what each name asks of a step."""
 
 import dataclasses
+import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -331,7 +332,7 @@ def test_steps_are_sharper_by_their_speed(arena, seen):
 def test_responses_are_late_by_a_share_of_their_own_at_each_distance(arena, seen):
     """As much is taken from the present response as is put to where the other was."""
     late = labelled("reaction-delay", "3 steps, by distance", arena)
-    np.testing.assert_array_equal(late.toward(seen), seen.ago_toward(LAGS.index(3)))
+    np.testing.assert_array_equal(late.toward(seen), seen.ago_toward(3))
     weights = late.weights(seen)
     np.testing.assert_allclose(weights.sum(axis=-1), seen.attention)
     np.testing.assert_array_equal(late.instead(seen), weights)
@@ -342,7 +343,7 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
     late = features_of("reaction-delay", arena)
     for each in late:
         if each.instead is not True:
-            is_far = any(word in each.label for word in ("by the", "by who", "far ones"))
+            is_far = "far ones" in each.label
             beyond_m = re.search(r"beyond ([\d.]+) m", each.label)
             least_m = float(beyond_m[1]) if beyond_m else 0.06 if is_far else 0.0
             counts = seen.distance_m > least_m
@@ -354,10 +355,10 @@ def test_a_late_response_takes_from_the_present_one(arena, seen):
         tenths = each.label.startswith("a tenth of a step") and "sight" not in each.label
         assert each.high == (3.0 if tenths else 1.0)
     by_label = {each.label: each for each in late}
-    for k, lag in enumerate(LAGS):
+    for lag in LAGS:
         here, there = by_label[f"{lag} steps"], by_label[f"{lag} steps, from there"]
-        np.testing.assert_array_equal(here.toward(seen), seen.ago_toward(k))
-        np.testing.assert_array_equal(there.toward(seen), seen.then_toward(k))
+        np.testing.assert_array_equal(here.toward(seen), seen.ago_toward(lag))
+        np.testing.assert_array_equal(there.toward(seen), seen.then_toward(lag))
         np.testing.assert_array_equal(there.weights(seen)[..., 0], seen.attention)
 
 
@@ -372,8 +373,62 @@ def test_near_ones_are_felt_at_once_or_late_as_well(arena, seen):
     )
     np.testing.assert_array_equal(felt[:, 1], seen.toward[:, 1])
     np.testing.assert_array_equal(felt[:, ::2], late[:, ::2])
-    np.testing.assert_array_equal(late, seen.ago_toward(1))
+    np.testing.assert_array_equal(late, seen.ago_toward(2))
     assert (felt[:, 1] != late[:, 1]).any()
+    soon = labelled("reaction-delay", "a tenth of a step, near ones too", arena)
+    np.testing.assert_array_equal(getattr(seen, soon.toward), seen.ago_toward(0.1))
+    by_bearing = labelled("reaction-delay", "a tenth of a step, near ones too, by bearing", arena)
+    np.testing.assert_allclose(by_bearing.weights(seen).sum(axis=-1), seen.attention)
+    np.testing.assert_allclose(by_bearing.instead(seen), by_bearing.weights(seen))
+
+
+def test_wide_turns_go_by_the_last_one_and_by_how_long_there_was_none(arena, seen):
+    """Weights have a mean of 0 where they lean; each side gets what the time says."""
+    for label, cue in (
+        ("going straight, by the last turn", np.abs(seen.last_turn_rad)),
+        ("going straight, by how long it did", seen.straight_s),
+    ):
+        vectors = labelled("turning-memory", label, arena).vectors(seen)
+        weights = (vectors * seen.own_heading[:, None]).sum(axis=-1)
+        np.testing.assert_allclose(vectors, weights[..., None] * seen.own_heading[:, None])
+        np.testing.assert_allclose(weights.mean(axis=0), 0, atol=1e-12)
+        # The last knot has its most where the cue has.
+        assert weights[cue.argmax(), -1] == weights[:, -1].max() > 0
+    aside = labelled("turning-memory", "turned by 70 degrees, by how long it swam straight", arena)
+    ways = aside.toward(seen)
+    turns = (ways * seen.own_heading[:, None]).sum(axis=-1)
+    np.testing.assert_allclose(turns, math.cos(math.radians(70)))
+    left = seen.own_heading[:, 0] * ways[:, 1, 1] - seen.own_heading[:, 1] * ways[:, 1, 0]
+    assert (left > 0).all()
+    np.testing.assert_allclose(ways.sum(axis=1), 2 * turns[:, :1] * seen.own_heading)
+    long = dataclasses.replace(seen, straight_s=np.full(N, 9.0))
+    np.testing.assert_array_equal(aside.weights(long), np.tile([0.0, 0, 0, 1], (N, 2, 1)))
+    np.testing.assert_array_equal(aside.over.weights(seen), np.ones((N, 2, 1)))
+
+
+def test_headings_go_by_the_speed_of_the_step_before(arena, seen):
+    """As by that of the step, but it may not be known: nothing then."""
+    speeds = np.linspace(0.02, 0.2, N)
+    speeds[::3] = np.nan
+    known = dataclasses.replace(seen, last_speed_m_s=speeds)
+    vectors = labelled("speed-turn-coupling", "by the last speed", arena).vectors(known)
+    assert not vectors[::3].any()
+    weights = (vectors * seen.own_heading[:, None]).sum(axis=-1)
+    np.testing.assert_allclose(weights.sum(axis=0), 0, atol=1e-12)
+    assert weights[-1, -1] == pytest.approx(weights[:, -1].max())
+    assert weights[-1, -1] > 0
+
+
+def test_fish_may_leave_by_how_near_the_robot_is(arena, seen):
+    """Beside what they do at any time; other fish do not count."""
+    leaving = labelled("robot-avoidance", "leaving its room while a robot is near", arena)
+    near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
+    n_robots = seen.is_robot.sum(axis=1)
+    np.testing.assert_allclose(leaving.weights(near)[:, 0], n_robots)
+    assert not leaving.weights(near)[:, 1].any()
+    np.testing.assert_array_equal(leaving.weights(near)[:, 2:], leaving.over.weights(near))
+    far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.6))
+    assert not leaving.weights(far)[:, :2].any()
 
 
 def test_who_heeds_nobody_has_as_much_of_its_own_way_as_of_all(arena, seen):

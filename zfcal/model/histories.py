@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,9 @@ _LATELY_S = 2.0
 
 _OPEN_S = 5.0
 """Whether others were off the walls is taken over so long."""
+
+_STRAIGHT_RAD = 0.6
+"""Wider turns are no straight swimming."""
 
 _RECENT, _FADING = 5, 0.6
 """So many turns are remembered, each that much less than the one after it."""
@@ -61,6 +65,17 @@ def stayed(states: Floats, tracks: NDArray[np.int32], dt_s: float) -> Floats:
     # Odd where the one that is there was seen to come.
     event = np.maximum.accumulate(2 * sample * (moved | other) + (moved & ~other), axis=0)
     return np.where(event % 2 == 1, (sample - event // 2) * dt_s, np.inf)
+
+
+def straight(states: Floats, dt_s: float) -> Floats:
+    """Return for how long everybody has not turned widely, or has been there, (sample, agent)."""
+    heading = np.moveaxis(states[:, [HX, HY]], 1, 2)
+    there, sample = states[:, ZONE] > 0, np.arange(len(states))[:, None]
+    turns = np.ones(there.shape, dtype=bool)
+    narrow = (heading[1:] * heading[:-1]).sum(axis=-1) > math.cos(_STRAIGHT_RAD)
+    turns[1:] = ~(narrow & there[1:] & there[:-1])
+    last = np.maximum.accumulate(np.where(turns, sample, 0), axis=0)
+    return np.asarray((sample - last) * dt_s)
 
 
 def courses(states: Floats, dt_s: float) -> Floats:

@@ -22,6 +22,7 @@ from zfcal.model.kernels.state import (
     LAG_MAX,
     LATE_COLUMNS,
     LATE_FELT_M,
+    LATE_NEAR,
     LATE_PART,
     LATE_SHARE,
     LATE_THEN,
@@ -251,7 +252,7 @@ def _steps_late(delay_s: float, dt_s: float) -> float:
 def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: int) -> Floats:
     """Return what each model sees late: see `zfcal.model.kernels.state.LATE_SHARE`."""
     made = np.ones((n_models, LATE_COLUMNS))
-    made[:, LATE_FELT_M], made[:, LATE_THEN] = 0.0, 0.0
+    made[:, [LATE_FELT_M, LATE_THEN, LATE_NEAR]] = 0.0
     for effect in effects:
         for model in range(n_models if effect.lag is not None else 0):
             given = models[model % len(models)]
@@ -261,6 +262,7 @@ def _lates(effects: Sequence[Effect], models: Sequence[Parameters], n_models: in
             made[model, LATE_FELT_M] = values["felt_m"]
             made[model, LATE_WHOLE] = values["whole"]
             made[model, LATE_THEN] = values["then"]
+            made[model, LATE_NEAR] = values["near"]
             made[model, LATE_PART] = steps - math.ceil(steps) + 1.0
     return made
 

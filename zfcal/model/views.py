@@ -31,6 +31,7 @@ from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import head_late, perceive
 from zfcal.model.kernels.state import (
     LATE_FELT_M,
+    LATE_NEAR,
     LATE_PART,
     LATE_SHARE,
     LATE_THEN,
@@ -179,7 +180,9 @@ def late_sight(scene: Scene, packed: Packed, known: Late) -> tuple[Floats, Float
         return _perceived(scene, packed, known, lag)
     toward, angle = _perceived(scene, packed, known, 0.0)
     turns, made = scene.turns, np.empty_like(toward)
-    near_m = max(float(late[LATE_FELT_M]), REPULSION_M)
+    near_m = float(late[LATE_FELT_M])
+    if late[LATE_NEAR] == 0.0:
+        near_m = max(near_m, REPULSION_M)
     is_then = _is_then(packed)
     head_late(scene.states, turns.at, turns.who, lag, near_m, is_then, toward, made)
     return made, angle

@@ -16,8 +16,8 @@ from zfcal.model.directions import turned_by
 from zfcal.model.effects import find_effect
 from zfcal.model.effects.weights import attended, evenly, precision_of_attention
 from zfcal.model.extended import maximise, with_effect
-from zfcal.model.features import LAGS, Component, Sharper, Tilt, Turned
-from zfcal.model.histories import ago_heading, recent_turn
+from zfcal.model.features import LAGS, SOON, Component, Sharper, Tilt, Turned
+from zfcal.model.histories import ago_heading, recent_turn, straight
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -241,9 +241,9 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
         "own_heading",
     ):
         np.testing.assert_allclose(getattr(found.seen, name), getattr(plain.seen, name), atol=1e-9)
-    for k in range(len(LAGS)):
+    for steps in (SOON, *LAGS):
         for name in ("ago_toward", "then_toward"):
-            ways, as_before = (getattr(seen, name)(k) for seen in (found.seen, plain.seen))
+            ways, as_before = (getattr(seen, name)(steps) for seen in (found.seen, plain.seen))
             np.testing.assert_allclose(ways, as_before, atol=1e-9)
     for name in ("base", "toward", "angle_sr"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-9)
@@ -263,9 +263,9 @@ def test_who_is_too_near_is_left_from_where_it_was(law):
     assert 10 < (known & seen.too_near).sum() < 0.2 * known.sum()
     for is_near, sign in ((seen.too_near, -1), (~seen.too_near, 1)):
         some = known & is_near
-        np.testing.assert_allclose(seen.ago_toward(0)[some], sign * way[some], atol=1e-9)
+        np.testing.assert_allclose(seen.ago_toward(1)[some], sign * way[some], atol=1e-9)
     unknown = seen.too_near & ~known & (seen.attention > 0)
-    np.testing.assert_allclose(seen.ago_toward(0)[unknown], seen.toward[unknown], atol=1e-9)
+    np.testing.assert_allclose(seen.ago_toward(1)[unknown], seen.toward[unknown], atol=1e-9)
     assert not (seen.too_near & ~seen.here).any()
 
 
@@ -355,6 +355,30 @@ def test_headings_of_steps_before_are_known_up_to_a_gap(base):
     assert not found[LAGS.index(2), :2].any()
     assert found[LAGS.index(4), 2].any()
     assert not found[LAGS.index(5), 2].any()
+
+
+def test_fish_swim_straight_since_their_last_wide_turn(base):
+    """Or since they came: the time is that of the steps since, and nobody's turn was wide."""
+    scene, fitted = base
+    seen, at, who = (
+        (law := Law(scene=scene, fitted=fitted)).draws[0].seen,
+        law.turns.at,
+        law.turns.who,
+    )
+    n_steps = np.round(seen.straight_s / scene.dt_s).astype(int)
+    assert 0 < (n_steps == 0).sum() < 0.6 * len(n_steps)
+    wide = np.abs(seen.last_turn_rad) > 0.6
+    assert (n_steps[wide] == 0).all()
+    for k in range(4):
+        some = n_steps > k
+        headings = [scene.states[at[some] - ago][:, :, :] for ago in (k, k + 1)]
+        now, before = (each[np.arange(some.sum()), :, who[some]][:, [HX, HY]] for each in headings)
+        assert ((now * before).sum(axis=1) > np.cos(0.6)).all()
+    gone = scene.states.copy()
+    gone[20, ZONE] = 0
+    since = np.round(straight(gone, scene.dt_s) / scene.dt_s).astype(int)
+    assert (since[21] == 0).all()
+    assert (since[25] <= 4).all()
 
 
 def test_what_is_drawn_turns_with_the_whole_law(base):

@@ -435,6 +435,22 @@ def test_who_is_ahead_and_swims_the_same_way_gets_attention(ask, other, heading,
     assert asked.component()[0] == 0.0
 
 
+def test_fish_may_leave_a_room_that_a_robot_is_in(ask):
+    """By e^(2 s) where a border is within reach; not for a robot elsewhere, nor for a fish."""
+    given = {"strength": 0.9, "leaves": 1.0}
+    rows = {"X": [0.0, 0.1, 0.2], "KIND": [0.0, 1.0, 0.0], "EXIT": 2.0, "MOUTH_M": 0.02}
+    asked = ask("robot-avoidance", given, ROOM=[1.0, 1.0, 2.0], **rows)
+    out, stay = (asked.factor(0.0, landing=zone) for zone in (2, 3))
+    assert out / stay == pytest.approx(math.exp(2 * 0.9))
+    assert asked.sight_of(1) == 1.0
+    assert asked.factor(0.0, i=1, landing=2) == 1.0
+    for room in ([1.0, 2.0, 1.0], [0.0, 0.0, 1.0]):
+        elsewhere = ask("robot-avoidance", given, ROOM=room, **rows)
+        assert elsewhere.factor(0.0, landing=2) == elsewhere.factor(0.0, landing=3) == 1.0
+    gone = ask("robot-avoidance", given, ROOM=[1.0, 1.0, 2.0], **rows, ZONE=[3.0, 0.0, 3.0])
+    assert gone.factor(0.0, landing=2) == gone.factor(0.0, landing=3)
+
+
 def test_fish_may_leave_for_where_others_are(ask):
     """Two of three are in the other room; whenever they went."""
     given = {"strength": 1.2, "elsewhere": 1.0, "drawn": 1.0, "turning": 1.0}

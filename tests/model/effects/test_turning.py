@@ -202,6 +202,28 @@ def test_a_kick_is_a_step_faster_than_the_last(ask):
         assert math.log(ratio) == pytest.approx(log_ratio)
 
 
+def test_straight_on_can_go_by_the_speed_of_the_step_before(ask):
+    """At 0.12 m/s by one unit, whatever the step's own speed; by nothing if that is not known."""
+    for last, log_ratio in ((0.12, 1.4), (0.07, 0.0), (math.nan, 0.0), (-1.0, 0.0)):
+        asked = ask("speed-turn-coupling", {"strength": 0.7, "last": 1.0}, SPEED=[last])
+        ratio = asked.factor(0.0, speed=0.03) / asked.factor(math.pi, speed=0.03)
+        assert math.log(ratio) == pytest.approx(log_ratio)
+
+
+def test_wide_turns_can_follow_wide_ones(ask):
+    """By the size of the last turn beyond 0.6 rad, to either side; not known, nothing."""
+    given = {"strength": 0.8, "sizes": 1.0}
+    for turn, off in ((1.0, 0.4), (-1.0, 0.4), (0.2, -0.4), (0.6, 0.0), (3.0, 2.4)):
+        rows = {"PAST_HX": [math.cos(turn)], "PAST_HY": [-math.sin(turn)]}
+        asked = ask("turning-memory", given, **rows)
+        ratio = asked.factor(0.0) / asked.factor(math.pi / 2)
+        assert math.log(ratio) == pytest.approx(-0.8 * off)
+        assert asked.factor(1.3) == pytest.approx(asked.factor(-1.3))
+        assert max(asked.factor(angle) for angle in np.linspace(-np.pi, np.pi, 41)) <= 1 + 1e-12
+    unknown = ask("turning-memory", given, PAST_HX=[0.0], PAST_HY=[0.0])
+    assert unknown.factor(0.0) == unknown.factor(2.0) == 1.0
+
+
 def test_fish_slow_down_in_turns(swim):
     """Correlation of a step's speed with the cosine of its turn, beyond the base model's."""
 

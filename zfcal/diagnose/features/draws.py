@@ -12,8 +12,16 @@ from scipy.stats.qmc import LatinHypercube
 from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
 from zfcal.model.extended import without_effects
-from zfcal.model.features import AWAY_M, LAGS, Seen
-from zfcal.model.histories import ago_heading, courses, in_open, lately, recent_turn, stayed
+from zfcal.model.features import AWAY_M, SOON, Seen
+from zfcal.model.histories import (
+    ago_heading,
+    courses,
+    in_open,
+    lately,
+    recent_turn,
+    stayed,
+    straight,
+)
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.scene import fill_states, head_late, perceive
 from zfcal.model.kernels.state import (
@@ -42,9 +50,6 @@ from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters
 from zfcal.units import HEADING_MIN_STEP_M
-
-_SOON = 0.1
-"""Share of a step of a response that is a little late."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -230,24 +235,19 @@ def _seen(
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
     toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
-    _, soon_angle = perceive(states, at, turns.who, _SOON, cos_fov, False)
+    _, soon_angle = perceive(states, at, turns.who, SOON, cos_fov, False)
     _, half_angle = perceive(states, at, turns.who, 0.5, cos_fov, False)
     late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov, False)
     older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov, False)
-    # Away from who is too near: where that one was, if the response to it is late as well.
-    too_near = here & (distance < REPULSION_M)
-    side = np.where(too_near, -1.0, 1.0)[..., None]
-    ahead = toward.copy()
-    ahead[rows, others] *= side
 
-    def ago(k: int) -> Floats:
+    def ago(steps: float) -> Floats:
         made = np.empty_like(toward)
-        head_late(states, at, turns.who, LAGS[k], 0.0, False, ahead, made)
-        return np.asarray(side * made[rows, others])
+        head_late(states, at, turns.who, steps, 0.0, False, toward, made)
+        return np.asarray(made[rows, others])
 
-    def then(k: int) -> Floats:
+    def then(steps: float) -> Floats:
         made = np.empty_like(toward)
-        head_late(states, at, turns.who, LAGS[k], REPULSION_M, True, toward, made)
+        head_late(states, at, turns.who, steps, REPULSION_M, True, toward, made)
         return np.asarray(made[rows, others])
 
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
@@ -261,7 +261,7 @@ def _seen(
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
-        soon_toward=a_while_ago(_SOON),
+        soon_toward=a_while_ago(SOON),
         half_toward=a_while_ago(0.5),
         late_toward=late[rows, others],
         older_toward=older[rows, others],
@@ -279,7 +279,7 @@ def _seen(
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         course=courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,
-        too_near=too_near,
+        too_near=here & (distance < REPULSION_M),
         in_sight=angle[rows, others] > 0,
         is_robot=(theirs(KIND, at) > 0) & here,
         other=np.where(here, steps.scene.tracks[at[:, None], others], -1),
@@ -292,6 +292,7 @@ def _seen(
         zone=turns.zone,
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
+        last_speed_m_s=own[:, SPEED],
         last_turn_rad=turned,
         ago_heading=ago_heading(states, at, turns.who),
         recent_turn_rad=recent_turn(states, at, turns.who),
@@ -299,6 +300,7 @@ def _seen(
         left_s=np.where(own[:, ROOM] > 0, own[:, LEFT_S], np.inf),
         each_left_s=np.where(left_here, since_s, np.inf),
         in_open=in_open(states, steps.scene.dt_s)[at[:, None], others],
+        straight_s=straight(states, steps.scene.dt_s)[at, turns.who],
         stayed_s=stayed(states, steps.scene.tracks, steps.scene.dt_s)[at, turns.who],
     )
 
@@ -313,8 +315,8 @@ def _turned_back(seen: Seen, back: Floats) -> Seen:
         half_toward=turned_by(seen.half_toward, b),
         late_toward=turned_by(seen.late_toward, b),
         older_toward=turned_by(seen.older_toward, b),
-        ago_toward=lambda k: turned_by(seen.ago_toward(k), b),
-        then_toward=lambda k: turned_by(seen.then_toward(k), b),
+        ago_toward=lambda steps: turned_by(seen.ago_toward(steps), b),
+        then_toward=lambda steps: turned_by(seen.then_toward(steps), b),
         bearing=turned_by(seen.bearing, b),
         heading=turned_by(seen.heading, b),
         course=turned_by(seen.course, b),

@@ -32,49 +32,49 @@ def _late(
     )
 
 
-def _ago(k: int) -> Component:
+def _ago(steps: int) -> Component:
     """Return where others were some steps ago, from where the fish is; near ones are felt."""
-    return _late(f"{LAGS[k]} steps", lambda seen: _if_far(seen, k), lambda seen: seen.attention)
+    return _late(f"{steps} steps", lambda seen: _if_far(seen, steps), lambda seen: seen.attention)
 
 
-def _of_all_ago(k: int) -> Component:
+def _of_all_ago(steps: float) -> Component:
     """Return the same of near ones too: away from where they were."""
     return _late(
-        f"{LAGS[k]} steps, near ones too",
-        lambda seen: seen.ago_toward(k),
+        f"{steps:g} steps, near ones too",
+        lambda seen: seen.ago_toward(steps),
         lambda seen: seen.attention,
     )
 
 
-def _if_far(seen: Seen, k: int) -> Floats:
+def _if_far(seen: Seen, steps: int) -> Floats:
     """Return where others were, and of near ones where they are, shape (step, other, 2)."""
-    return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward(k))
+    return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward(steps))
 
 
-def _then(k: int) -> Component:
+def _then(steps: int) -> Component:
     """Return where others were some steps ago, from where the fish was."""
     return _late(
-        f"{LAGS[k]} steps, from there",
-        lambda seen: seen.then_toward(k),
+        f"{steps} steps, from there",
+        lambda seen: seen.then_toward(steps),
         lambda seen: seen.attention,
     )
 
 
 _NEAR_M = (0.05, 0.15, 0.3)
 
-_FEW_LAGS = 3
-"""Of `LAGS` the first ones: responses to who is next to the fish are quick."""
+_QUICK = (0.5, 1, 2, 3)
+"""Steps by which responses to who is next to the fish may be late too: they are quick."""
 
 
-def _by_distance(k: int) -> Component:
+def _by_distance(steps: int) -> Component:
     """Return a response that is late by a share of its own for each distance."""
 
     def weights(seen: Seen) -> Floats:
         return seen.attention[..., None] * hats_where(seen.here, seen.distance_m, _NEAR_M)
 
     return Component(
-        label=f"{LAGS[k]} steps, by distance",
-        toward=lambda seen: _if_far(seen, k),
+        label=f"{steps} steps, by distance",
+        toward=lambda seen: _if_far(seen, steps),
         weights=weights,
         instead=weights,
         high=1.0,
@@ -85,14 +85,18 @@ _SOON_M = (0.03, 0.06, 0.15, 0.4)
 _FAR_M = 0.06
 
 
-def _soon(label: str, by: Callable[[Seen], Floats]) -> Component:
+def _soon(
+    label: str,
+    by: Callable[[Seen], Floats],
+    toward: Literal["soon_toward", "soon_ago_toward"] = "soon_toward",
+) -> Component:
     """Return a response that is late by tenths of a step, of weights of each other one."""
 
     def weights(seen: Seen) -> Floats:
         return seen.attention[..., None] * by(seen)
 
     return Component(
-        label=f"a tenth of a step, {label}", toward="soon_toward",
+        label=f"a tenth of a step, {label}", toward=toward,
         weights=weights, instead=weights, high=3.0,
     )  # fmt: skip
 
@@ -136,6 +140,10 @@ def _beyond(reach_m: float, lag: Literal["half a step", "a step"]) -> Component:
     )
 
 
+def _all(seen: Seen) -> Floats:
+    return seen.here[..., None].astype(np.float64)
+
+
 def _soon_by_distance(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _SOON_M)
 
@@ -145,16 +153,22 @@ def _far(seen: Seen) -> Floats:
     return (seen.here & (seen.distance_m > _FAR_M))[..., None].astype(np.float64)
 
 
+_ALL_SOON = _soon("near ones too", _all, "soon_ago_toward")
+"""Of who is too near as well: the fish swims away from where that one was."""
+
+
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", "soon_toward", lambda seen: seen.attention, 3.0),
     _late("half a step", "half_toward", lambda seen: seen.attention),
     _late("half a step, sight", "half_toward", lambda seen: seen.half_attention),
     _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
     _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
-    *(_ago(k) for k in range(len(LAGS))),
-    *(_of_all_ago(k) for k in range(_FEW_LAGS)),
-    *(_then(k) for k in range(len(LAGS))),
-    *(_by_distance(k) for k in range(len(LAGS))),
+    *map(_ago, LAGS),
+    *map(_of_all_ago, _QUICK),
+    _ALL_SOON,
+    by_circumstances(_ALL_SOON, of_each=True),
+    *map(_then, LAGS),
+    *map(_by_distance, LAGS),
     _soon("by distance", _soon_by_distance),
     by_circumstances(_soon("far ones", _far), of_each=True),
     _FAR_SOON,
@@ -210,6 +224,14 @@ EFFECT = Effect(
             default=0.0,
             says="0: from where the fish is; 1: from where it was at that moment.",
         ),
+        EffectParameter(
+            name="near",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="With whole 0: 1 swims away from where those that are too near were, 0 from where "
+            "they are.",
+        ),
     ),
     strength="share",
     lag="delay_s",
@@ -224,9 +246,13 @@ EFFECT = Effect(
             for delay_s in (0.02, 0.035, 0.06, 0.1, 0.15, 0.3)
         ),
         *({"delay_s": delay_s, "felt_m": 0.05, "whole": 0.0} for delay_s in (0.02, 0.05, 0.1)),
+        *(
+            {"delay_s": delay_s, "felt_m": 0.0, "whole": 0.0, "near": 1.0}
+            for delay_s in (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.6)
+        ),
     ),
     lacks=needs_neighbour,
     identity_s=2.4,
-    fixed=("delay_s", "felt_m", "whole", "then"),
+    fixed=("delay_s", "felt_m", "whole", "then", "near"),
     features=lambda _arena: _FEATURES,
 )

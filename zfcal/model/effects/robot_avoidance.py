@@ -21,19 +21,32 @@ from zfcal.model.effects.forms import (
     sine_to,
     tilt,
     turn_to,
+    way_out,
 )
 from zfcal.model.effects.weights import (
     ATTENTION,
     aside_of,
+    every_step,
     factor_on_attention,
     precision_of_attention,
     turning_as_a_whole,
 )
-from zfcal.model.features import AWAY_M, Along, Component, Feature, Landing, Seen, Tilt, Turned
+from zfcal.model.features import (
+    AWAY_M,
+    Along,
+    Component,
+    Feature,
+    Landing,
+    Leaving,
+    Seen,
+    Tilt,
+    Turned,
+)
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION, SIGHT
-from zfcal.model.kernels.state import FOLLOWS, KIND, X, Y
+from zfcal.model.kernels.rooms import find_rooms
+from zfcal.model.kernels.state import FOLLOWS, KIND, ROOM, ZONE, X, Y
 
 _NEAR_M = 0.1
 _PER_STRENGTH = 0.1
@@ -44,7 +57,7 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]  #
     """Change the attention that a robot gets."""
     if not state[KIND * n + j] > 0.0:
         return 1.0
-    if parameters[5] > 0.0:
+    if parameters[5] > 0.0 or parameters[6] > 0.0:
         return 1.0
     return math.exp(-parameters[0] * (1.0 - parameters[1]) * (1.0 - parameters[2]))
 
@@ -82,9 +95,24 @@ def from_robots(state: Hooked, sight: Hooked, n: int, i: int) -> tuple[float, fl
     return x, y, most
 
 
+@inlined
+def with_robot(state: Hooked, n: int, i: int) -> bool:
+    """Tell whether a robot is in the room of an agent."""
+    room = state[ROOM * n + i]
+    for j in range(n):
+        is_robot = state[KIND * n + j] > 0.0 and state[ZONE * n + j] > 0.0
+        if is_robot and j != i and room > 0.0 and state[ROOM * n + j] == room:
+            return True
+    return False
+
+
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings away from the robots that are seen; the nearer, the more."""
+    """Weigh headings away from the robots that are seen, or out of a room with one in it."""
+    if parameters[6] > 0.0:
+        if not with_robot(state, n, i):
+            return 1.0
+        return tilt(parameters[0], way_out(state, n, i, (ux, uy, landing), 0.0), 1.0)
     leaning = parameters[1]
     if parameters[5] > 0.0:
         leaning = RAD_PER_STRENGTH * state[FOLLOWS * n + i] * of_base(parameters[5])
@@ -152,6 +180,12 @@ def _leaning_near(seen: Seen) -> Floats:
     return np.asarray(np.einsum("sj,sjd->sd", near, seen.bearing)[:, None])
 
 
+def _leaving(seen: Seen) -> Floats:
+    """Return how near the robot is, and one of all steps, shape (step, knot)."""
+    near = hats(seen.distance_m, _LEFT_M)[..., :-1] * seen.is_robot[..., None]
+    return np.column_stack([near.sum(axis=1), every_step(seen)])
+
+
 def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
     aside = aside_of(seen, seen.bearing, along_walls=along_walls)
     return np.asarray(-np.einsum("sjb,sj->sb", _robots(seen), aside))
@@ -171,6 +205,7 @@ def _from_robot(seen: Seen, rows: NDArray[np.intp], xy_m: Floats) -> Floats:
 
 
 _LANDS_M = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)
+_LEFT_M = (0.1, 0.25, 0.5)
 _TO_ROBOT = Along(cue="distance to the robot (m)", knots=_KNOTS_M)
 
 _FEATURES: tuple[Feature, ...] = (
@@ -195,6 +230,14 @@ _FEATURES: tuple[Feature, ...] = (
     Turned(label="turning", by=_turning, neighbours=False, along=_TO_ROBOT),
     *turning_as_a_whole(partial(_turning, along_walls=True), along=_TO_ROBOT),
     factor_on_attention(_by_its_speed, label="attention to robots, by their speed"),
+    Leaving(
+        label="leaving its room while a robot is near", weights=_leaving,
+        along=Along(
+            cue="distance to the robot (m)", knots=_LEFT_M[:-1], besides=("at any time",)
+        ),
+        # More than at any time.
+        over=Leaving(label="at any time", weights=every_step),
+    ),
     precision_of_attention(_to_robots, "precision of robots"),
     by_circumstances(
         factor_on_attention(_to_robots, label="attention to robots"),
@@ -259,6 +302,14 @@ EFFECT = Effect(
             "prefer the sense that leads away. 2: so do the directions to neighbours and those "
             "along walls.",
         ),
+        EffectParameter(
+            name="leaves",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: it gets the attention of a fish, and others leave a room that it is in more "
+            "readily: half the log odds of a step out of it.",
+        ),
     ),
     probe=0.01,
     component=component,
@@ -267,19 +318,21 @@ EFFECT = Effect(
     rotation=rotation,
     whole_rotation=whole_rotation,
     harmonics=1,
+    not_harmonic="leaves",
     shapes=lambda _arena: ({"flight": 0.0}, {"flight": 1.0}),
-    further_shapes=lambda _arena: (
+    further_shapes=lambda arena: (
+        *([{"leaves": 1.0}] if find_rooms(arena)[0] else []),
         *({"drawn": 1.0, "reach_m": far_m, "kappa": 5.0} for far_m in (0.07, 0.12, 0.2, 0.35)),
         {"turning": 1.0},
         {"turning": 2.0},
     ),
     lacks=_lacks,
-    fixed=("flight", "drawn", "turning"),
+    fixed=("flight", "drawn", "turning", "leaves"),
     idle=lambda values: (
         () if values["drawn"] > 0 and not values["turning"] > 0 else ("reach_m", "kappa")
     ),
     needs={
-        "factor": ("flight", "turning"),
+        "factor": ("flight", "turning", "leaves"),
         "component": ("drawn",),
         "rotation": ("turning",),
         "whole_rotation": ("turning",),

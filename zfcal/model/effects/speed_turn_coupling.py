@@ -47,6 +47,10 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         off /= parameters[4] * parameters[4]
         straight = (1.0 - off) * math.exp(-0.5 * off)
     usual_m_s, last_m_s = parameters[1], state[SPEED * n + i]
+    if parameters[5] > 0.0:
+        if not last_m_s >= 0.0:
+            return 1.0
+        speed = last_m_s
     if parameters[3] > 0.0 and last_m_s >= 0.0:  # not where it is not known
         usual_m_s = last_m_s
     quick = quickness(speed + SPEED_M_S - usual_m_s)
@@ -66,6 +70,16 @@ def _by_speed(seen: Seen) -> Floats:
     return np.asarray(_quicker(seen)[..., None] * seen.own_heading[:, None])
 
 
+def _by_last_speed(seen: Seen) -> Floats:
+    """Return the same of the speed of the step before; nothing where that is not known."""
+    known = np.isfinite(seen.last_speed_m_s)[:, None]
+    weights = hats(np.nan_to_num(seen.last_speed_m_s), _LAST_M_S)
+    mean = weights.mean(axis=0, where=known) if known.any() else 0.0
+    weights = np.where(known, weights - mean, 0.0)
+    return np.asarray(weights[:, 1:, None] * seen.own_heading[:, None])
+
+
+_LAST_M_S = (0.03, 0.08, 0.14)
 _KNOTS_RAD = (0.0, 0.5, 1.0, 2.0, 3.2)
 
 
@@ -151,6 +165,7 @@ _FEATURES: tuple[Feature, ...] = (
         alone=each_under(Tilt(label="ahead", vectors=_ahead)),
         without=("the speed",),
     ),
+    Tilt(label="by the last speed", vectors=_by_last_speed),
     Sharper(label="sharper by speed", by=_quicker),
     # More than at all speeds alike, which would be another law of turns.
     Component(
@@ -218,13 +233,20 @@ EFFECT = Effect(
             default=0.35,
             says="Where local: turns beyond which headings are less preferred, in radians.",
         ),
+        EffectParameter(
+            name="last",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the speed of the step before counts, not that of the step itself.",
+        ),
     ),
     probe=0.01,
     factor=factor,
     harmonics=1,
     not_harmonic="local",
-    further_shapes=lambda _arena: ({"local": 1.0}, {"local": 1.0, "kick": 1.0}),
-    fixed=("usual_m_s", "local", "kick"),
+    further_shapes=lambda _arena: ({"local": 1.0}, {"local": 1.0, "kick": 1.0}, {"last": 1.0}),
+    fixed=("usual_m_s", "local", "kick", "last"),
     idle=lambda values: () if values["local"] else ("width_rad",),
     shown_against="speed",
     other_forms=("generic:speed:own-turn",),

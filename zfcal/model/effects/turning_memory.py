@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,17 @@ from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import leftward, tilt
 from zfcal.model.effects.weights import only, turning_as_a_whole
-from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Sharper, Tilt, Turned
+from zfcal.model.features import (
+    LAGS,
+    Along,
+    Component,
+    Feature,
+    OneOf,
+    Seen,
+    Sharper,
+    Tilt,
+    Turned,
+)
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -20,19 +31,29 @@ from zfcal.model.kernels.state import FOLLOWS, HX, HY, PAST_HX, PAST_HY
 
 _PER_STRENGTH = 0.1
 _KAPPA = 9.0
+_USUAL_RAD = 0.6
+"""A turn after which the next ones are as the base model has them."""
+
 _SLIGHT = 0.09
 """Sine of a turn that is none."""
 
+_STRAIGHT_S = (0.0, 1.0, 3.0, 6.0)
+_WIDER_RAD = (0.0, 0.5, 1.5)
 _KNOTS_RAD = (0.0, 0.4, 0.8, 1.6, math.pi)
 
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the sine of their turn times that of the last turn."""
+    """Weigh headings by the sine of their turn times that of the last, or by both their sizes."""
     if parameters[3] > 0.0 or parameters[4] > 0.0:
         return 1.0
     hx, hy = state[HX * n + i], state[HY * n + i]
     px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
+    if parameters[5] > 0.0:
+        narrow = _USUAL_RAD - abs(math.atan2(px * hy - py * hx, px * hx + py * hy))
+        if px == 0.0 and py == 0.0:  # not known
+            narrow = 0.0
+        return tilt(parameters[0], narrow * (hx * ux + hy * uy), abs(narrow))
     # A fish that has turned back has no side to go on to.
     last = (px * hy - py * hx) * max(0.0, px * hx + py * hy) ** parameters[2]
     return tilt(parameters[0], last * leftward(state, n, i, ux, uy, parameters[1]), abs(last))
@@ -128,6 +149,41 @@ def _by_last_turn(seen: Seen) -> Floats:
     return np.asarray((weights - weights.mean(axis=0))[:, 1:])
 
 
+def _straight_by_last_turn(seen: Seen) -> Floats:
+    """Return the own heading, weighed by what the last turn has beside the mean of all steps."""
+    weights = hats(np.abs(seen.last_turn_rad), _WIDER_RAD)
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+
+
+def _straight_by_time(seen: Seen) -> Floats:
+    """Return it weighed by what the time since a wide turn has beside the mean of all steps."""
+    weights = hats(seen.straight_s, _STRAIGHT_S)
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+
+
+def _aside(degrees: int) -> Component:
+    """Return wide turns to either side, by how long the fish has gone without one."""
+
+    def toward(seen: Seen) -> Floats:
+        both = [turned_by(seen.own_heading, side * math.radians(degrees)) for side in (-1, 1)]
+        return np.stack(both, axis=1)
+
+    def weights(seen: Seen) -> Floats:
+        return np.repeat(hats(seen.straight_s, _STRAIGHT_S)[:, None], 2, axis=1)
+
+    label = f"turned by {degrees} degrees"
+    alike = Component(
+        label=label, toward=toward, kappa=_KAPPA,
+        weights=lambda seen: np.ones((len(seen.zone), 2, 1)),
+    )  # fmt: skip
+    # More than at all times alike, which would be another law of turns.
+    along = Along(cue="time since a wide turn (s)", knots=_STRAIGHT_S)
+    return replace(
+        alike, label=f"{label}, by how long it swam straight", weights=weights,
+        along=along, over=alike,
+    )  # fmt: skip
+
+
 def _by_last_turn_off_walls(seen: Seen) -> Floats:
     return _by_last_turn(seen) * _remembers(seen)[:, None]
 
@@ -210,6 +266,9 @@ _FEATURES: tuple[Feature, ...] = (
             for twice in (False, True)
         ),
     ),
+    OneOf(kind="turned aside", features=tuple(map(_aside, (50, 70, 100)))),
+    Tilt(label="going straight, by the last turn", vectors=_straight_by_last_turn),
+    Tilt(label="going straight, by how long it did", vectors=_straight_by_time),
     Sharper(label="sharper by the last turn", by=_by_last_turn),
     Sharper(label="sharper by the last turn, off the walls", by=_by_last_turn_off_walls),
     _LEANING,
@@ -264,6 +323,14 @@ EFFECT = Effect(
             says="1: some headings are drawn about the one that the last turn leads on to, or back "
             "to, as a component of the weight 0.1 per strength; not along a wall.",
         ),
+        EffectParameter(
+            name="sizes",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: wide turns follow wide ones, to either side: straight on against a right "
+            "angle loses a factor of e to the strength per radian of the last turn beyond 0.6.",
+        ),
     ),
     probe=0.01,
     component=component,
@@ -275,13 +342,14 @@ EFFECT = Effect(
     ),
     further_shapes=lambda _arena: (
         {"drawn": 1.0},
+        {"sizes": 1.0},
         *(
             {"turning": 1.0, "along_walls": along, "forgets_wide": wide}
             for along in (0.0, 1.0)
             for wide in (0.0, 1.0)
         ),
     ),
-    fixed=("along_walls", "forgets_wide", "turning", "drawn"),
+    fixed=("along_walls", "forgets_wide", "turning", "drawn", "sizes"),
     needs={"rotation": ("turning",), "component": ("drawn",)},
     identity_s=0.8,
     shown_against="turn",

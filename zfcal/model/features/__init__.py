@@ -12,7 +12,7 @@ The files of effects say which features theirs are. How they are fitted stands i
 
 from __future__ import annotations
 
-from zfcal.model.features.seen import AWAY_M, LAGS, Seen
+from zfcal.model.features.seen import AWAY_M, LAGS, SOON, Seen
 from zfcal.model.features.sorts import (
     MOST_SHARPER,
     Along,
@@ -34,6 +34,7 @@ __all__ = [
     "AWAY_M",
     "LAGS",
     "MOST_SHARPER",
+    "SOON",
     "Along",
     "Choosable",
     "Component",

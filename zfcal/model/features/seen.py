@@ -14,6 +14,9 @@ from zfcal.arrays import Floats
 AWAY_M = 9.0
 """In place of the distance to one who is not there."""
 
+SOON = 0.1
+"""Share of a step of a response that is a little late."""
+
 LAGS = (1, 2, 3, 4, 5, 8)
 """Steps by which a response may be late."""
 
@@ -36,7 +39,7 @@ class Seen:
         Likewise, had all others been where they were a tenth of a step before, half a step, one and
         two.
     ago_toward, then_toward
-        Of a place among `LAGS`: where the others were so many steps before, seen or not, shape
+        Of a number of steps: where the others were so many steps before, seen or not, shape
         (step, other, 2). From where the fish is, and away from there for who is too near now; and
         from where it was itself, near ones as they are now. Worked out whenever they are asked for:
         kept they would be a third of all.
@@ -62,6 +65,8 @@ class Seen:
     zone, track : ndarray of int, shape (step,)
     own_speed_m_s : ndarray, shape (step,)
         Of the step itself, which is given.
+    last_speed_m_s : ndarray, shape (step,)
+        Of the step before; NaN where it is not known.
     last_turn_rad : ndarray, shape (step,)
         To the left; 0 where it is not known.
     ago_heading : ndarray, shape (lag, step, 2)
@@ -76,6 +81,8 @@ class Seen:
         Since each other one left it, though it may have come back; infinite for who did not.
     in_open : ndarray, shape (step, other)
         Share of the last five seconds that the other was off the walls.
+    straight_s : ndarray, shape (step,)
+        Since the fish last turned by more than 0.6 rad, or came.
     stayed_s : ndarray, shape (step,)
         Since the fish came into its room, or between the rooms, or into the recording.
     """
@@ -90,8 +97,8 @@ class Seen:
     half_attention: Floats
     late_attention: Floats
     older_attention: Floats
-    ago_toward: Callable[[int], Floats]
-    then_toward: Callable[[int], Floats]
+    ago_toward: Callable[[float], Floats]
+    then_toward: Callable[[float], Floats]
     bearing: Floats
     distance_m: Floats
     off_axis_rad: Floats
@@ -113,6 +120,7 @@ class Seen:
     zone: NDArray[np.int64]
     track: NDArray[np.int32]
     own_speed_m_s: Floats
+    last_speed_m_s: Floats
     last_turn_rad: Floats
     ago_heading: Floats
     recent_turn_rad: Floats
@@ -120,6 +128,7 @@ class Seen:
     left_s: Floats
     each_left_s: Floats
     in_open: Floats
+    straight_s: Floats
     stayed_s: Floats
     _made: dict[Callable[[Seen], Floats], Floats] = field(
         default_factory=dict, init=False, repr=False
@@ -135,6 +144,11 @@ class Seen:
     def nearest(self) -> Floats:
         """One for the nearest other one, else 0, shape (step, other, 1)."""
         return self.chosen(-self.distance_m, self.here)
+
+    @property
+    def soon_ago_toward(self) -> Floats:
+        """Where the others were a tenth of a step before: see ``ago_toward``."""
+        return self.ago_toward(SOON)
 
     @property
     def in_front_m(self) -> Floats:

@@ -75,7 +75,10 @@ class Component:
     """
 
     label: str
-    toward: Weights | Literal["toward", "bearing", "heading", "soon_toward", "half_toward"]
+    toward: (
+        Weights
+        | Literal["toward", "bearing", "heading", "soon_toward", "soon_ago_toward", "half_toward"]
+    )
     weights: Weights
     kappa: float | Literal["own", "neighbours", "sharper"] = "neighbours"
     instead: Weights | bool = False

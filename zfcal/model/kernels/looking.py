@@ -12,6 +12,7 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     LATE_FELT_M,
+    LATE_NEAR,
     LATE_SHARE,
     LATE_THEN,
     LATE_WHOLE,
@@ -75,12 +76,14 @@ def note_late(
         out[k, 1] = sight.dx_m[k] * sight.toward_per_m[k]
         out[k, 2] = sight.dy_m[k] * sight.toward_per_m[k]
         away = math.hypot(sight.dx_m[k], sight.dy_m[k])
-        if late[LATE_WHOLE] == 0.0 and away > late[LATE_FELT_M] and sight.toward_per_m[k] > 0.0:
+        is_late = sight.toward_per_m[k] > 0.0 or late[LATE_NEAR] > 0.0
+        if late[LATE_WHOLE] == 0.0 and away > late[LATE_FELT_M] and is_late:
             is_then = late[LATE_THEN] > 0.0
             x, y = (past[slot, 0, i], past[slot, 1, i]) if is_then else (state[X, i], state[Y, i])
             dx, dy = past[slot, 0, j] - x, past[slot, 1, j] - y
-            length = math.hypot(dx, dy)
-            if length > 0.0:
+            # Away from who is too near now.
+            length = math.copysign(math.hypot(dx, dy), sight.toward_per_m[k])
+            if length != 0.0:
                 out[k, 1], out[k, 2] = dx / length, dy / length
 
 

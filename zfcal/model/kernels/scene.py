@@ -9,7 +9,7 @@ import numpy as np
 from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
-from zfcal.model.kernels.perception import make_sight, see
+from zfcal.model.kernels.perception import REPULSION_M, make_sight, see
 from zfcal.model.kernels.state import (
     DT_S,
     HX,
@@ -169,14 +169,14 @@ def head_late(
     states: Floats, at: Ints, who: Ints, lag: float, felt_m: float, is_then: bool, toward: Floats,
     made: Floats,
 ) -> None:  # fmt: skip
-    """Write unit vectors to where others were; to where they are who are near.
+    """Write unit vectors to where others were, away from there for who is too near now.
 
     Parameters
     ----------
     lag
         Steps by which others are late.
     felt_m
-        Neighbours as near as that are felt at once.
+        Neighbours as near as that are felt at once: their directions are those of ``toward``.
     is_then
         Whether it is the direction from where the fish itself was.
     toward, made : ndarray, shape (step, agent, 2)
@@ -188,13 +188,11 @@ def head_late(
         x, y = _once(states, at[s], own_lag, X, i), _once(states, at[s], own_lag, Y, i)
         for j in range(states.shape[2]):
             made[s, j, 0], made[s, j, 1] = toward[s, j, 0], toward[s, j, 1]
-            near_x, near_y = own[X, j] - own[X, i], own[Y, j] - own[Y, i]
-            if (
-                not _was_there(states, at[s], lag, j)
-                or near_x * near_x + near_y * near_y <= felt_m * felt_m
-            ):
+            now_m = math.hypot(own[X, j] - own[X, i], own[Y, j] - own[Y, i])
+            if now_m <= felt_m or not _was_there(states, at[s], lag, j):
                 continue
             dx, dy = _once(states, at[s], lag, X, j) - x, _once(states, at[s], lag, Y, j) - y
-            away = math.sqrt(dx * dx + dy * dy)
+            away = math.hypot(dx, dy)
             if away > 0.0:
+                away = -away if now_m < REPULSION_M else away
                 made[s, j, 0], made[s, j, 1] = dx / away, dy / away

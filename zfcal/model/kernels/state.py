@@ -54,9 +54,9 @@ LAG_MAX = 10
 KAPPA_BASE, KAPPA_F, ALPHA, ZONE_COLUMNS = range(4)
 
 # What is late of what agents see: which share; beyond which distance; whether who is seen, and
-# how large, is late too, or the direction alone; and whether it is seen from where the agent itself
-# was.
-LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART, LATE_THEN, LATE_COLUMNS = range(6)
+# how large, is late too, or the direction alone; whether it is seen from where the agent itself
+# was; and whether the direction away from who is too near is late as well.
+LATE_SHARE, LATE_FELT_M, LATE_WHOLE, LATE_PART, LATE_THEN, LATE_NEAR, LATE_COLUMNS = range(7)
 
 # Laws of a zone's tables of von Mises draws.
 LAW_BASE, LAW_F, LAWS = range(3)
@@ -94,7 +94,7 @@ class Packed(NamedTuple):
         Steps by which agents respond late, the begun one counted: others are seen where they were.
     lates : ndarray, shape (model, LATE_COLUMNS)
         Columns LATE_SHARE, LATE_FELT_M (m), LATE_WHOLE, LATE_PART, the share of the begun step,
-        and LATE_THEN.
+        LATE_THEN and LATE_NEAR.
     clock_s : ndarray, shape (2,)
         Time of the trial at the first sample, and seconds of the trial in a second
         that is simulated; for effects that change over a trial.
