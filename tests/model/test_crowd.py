@@ -18,9 +18,10 @@ from zfcal.model.kernels.crowd_cells import look_near, make_crowd, sort, weigh_r
 from zfcal.model.kernels.crowd_runs import record_crowd_run
 from zfcal.model.kernels.geometry import zone_of
 from zfcal.model.kernels.perception import LENGTH_M, make_sight, most_sr, see
+from zfcal.model.kernels.placing import settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import record_run
-from zfcal.model.kernels.state import HX, HY, STATES, ZONE, X, Y, make_work, settle
+from zfcal.model.kernels.state import HX, HY, STATES, ZONE, X, Y, make_work
 from zfcal.model.packing import pack
 from zfcal.model.simulate import (
     MOST_IN_FULL,

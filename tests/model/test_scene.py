@@ -11,6 +11,7 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,
+    LATELY,
     LEFT_S,
     NEVER_S,
     PAST_HX,
@@ -319,6 +320,22 @@ def test_the_order_of_tracks_does_not_matter(two_rooms, walk):
     assert np.array_equal(one.track[order[0]], two.track[order[1]])
     assert np.array_equal(one.taken[order[0]], two.taken[order[1]])
     assert np.array_equal(one.share[order[0]], two.share[order[1]])
+
+
+def test_the_mean_of_speeds_fades_and_begins_anew_after_a_gap(two_rooms):
+    """Of each sample e^(-dt / 2 s) of it is kept; the first known speed is all of it."""
+    far = np.cumsum([0, 0.01, 0.02, 0.005, 0.0, 0.01])
+    path = [(ROOM_A[0] - 0.05 + x, ROOM_A[1]) for x in far]
+    scene = make_scene(samples_of([*path[:4], AWAY, *path[4:]]), two_rooms)
+    kept, mean = math.exp(-DT_S / 2), 0.01 / DT_S
+    found = scene.states[:, LATELY, 0]
+    assert found[0] == 0.0
+    assert found[1] == pytest.approx(mean)
+    for k, step_m in ((2, 0.02), (3, 0.005)):
+        mean = kept * mean + (1 - kept) * step_m / DT_S
+        assert found[k] == pytest.approx(mean)
+    assert found[5] == 0.0
+    assert found[6] == pytest.approx(0.01 / DT_S)
 
 
 def test_thinning_leaves_states_alone(two_rooms, walk):

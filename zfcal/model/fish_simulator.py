@@ -16,6 +16,7 @@ from zfcal.model.kernels.heading import apply_move
 from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
+from zfcal.model.kernels.placing import place, remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
 from zfcal.model.kernels.state import (
@@ -32,9 +33,6 @@ from zfcal.model.kernels.state import (
     X,
     Y,
     make_work,
-    place,
-    remember,
-    settle,
 )
 from zfcal.model.packing import pack
 from zfcal.model.simulate import burn_in_steps, individuals, tank_of

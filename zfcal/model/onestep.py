@@ -14,6 +14,7 @@ from zfcal.model.kernels.heading import density_on_grid, draw_exact, draw_on_gri
 from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.mixture import gather
 from zfcal.model.kernels.perception import Sight, make_sight
+from zfcal.model.kernels.placing import remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.state import (
     DT_S,
@@ -31,8 +32,6 @@ from zfcal.model.kernels.state import (
     X,
     Y,
     make_work,
-    remember,
-    settle,
 )
 from zfcal.model.packing import pack
 from zfcal.model.simulate import check_sampler, tank_of

@@ -15,6 +15,7 @@ from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
+from zfcal.model.kernels.placing import remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
 from zfcal.model.kernels.state import (
@@ -23,6 +24,7 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,
+    LATELY,
     LEFT_AT_S,
     LEFT_FROM,
     LEFT_S,
@@ -39,8 +41,6 @@ from zfcal.model.kernels.state import (
     X,
     Y,
     make_work,
-    remember,
-    settle,
 )
 from zfcal.model.simulate import tank_of
 
@@ -166,7 +166,7 @@ def _measure(state: Floats, time_s: float, found: Floats, first: int, tank: Tank
             continue
         if not was_there:
             # Whoever comes back may be another one.
-            for field in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM):
+            for field in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM, LATELY):
                 state[field, i] = 0.0
             state[LEFT_AT_S, i], state[SPEED, i] = -NEVER_S, np.nan
         else:

@@ -84,6 +84,29 @@ def test_speed_lasts(ask):
     assert slow.speed() == pytest.approx((0.005 / 0.07) ** 0.25)
 
 
+def test_the_mean_of_the_last_speeds_can_count(ask):
+    """In place of the last one; where none is known nothing changes."""
+    given = {"exponent": 0.8, "lately": 1.0}
+    asked = ask("burst-and-coast", given, SPEED=[0.02], LATELY=[0.14])
+    assert asked.speed() == pytest.approx(2**0.8)
+    assert ask("burst-and-coast", given, SPEED=[0.02]).speed() == 1.0
+    evenly = ask("burst-and-coast", given | {"evenly": 1.0}, SPEED=[0.02], LATELY=[0.12])
+    assert evenly.speed() == pytest.approx(math.exp(0.8))
+
+
+def test_fish_are_fast_for_some_time_or_rest_after_it(swim):
+    """Correlation of a speed with the mean of the five before the last, beyond the base model's."""
+
+    def correlation(xy):
+        speed = np.linalg.norm(np.diff(xy, axis=0), axis=-1)
+        before = np.lib.stride_tricks.sliding_window_view(speed[:-2], 5, axis=0).mean(axis=-1)
+        return np.corrcoef(before.ravel(), speed[6:].ravel())[0, 1]
+
+    plain = correlation(swim()[0])
+    assert correlation(swim("burst-and-coast", {"exponent": 0.8, "lately": 1.0})[0]) > plain + 0.1
+    assert correlation(swim("burst-and-coast", {"exponent": -0.8, "lately": 1.0})[0]) < plain - 0.05
+
+
 def test_bursts_last_or_alternate(swim):
     """Correlation of successive speeds, of either sign; without the effect hardly any."""
 

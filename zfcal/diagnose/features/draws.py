@@ -28,6 +28,7 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,
+    LATELY,
     LEFT_AT_S,
     LEFT_FROM,
     LEFT_S,
@@ -153,7 +154,7 @@ def drawn(steps: Steps, errors_m: Floats) -> Draw:
         tank_of(arena),
     )  # fmt: skip
     # Speeds decide who is fast, and are not what is in doubt.
-    kept = [SPEED, ROOM, LEFT_S, LEFT_AT_S, LEFT_FROM]
+    kept = [SPEED, LATELY, ROOM, LEFT_S, LEFT_AT_S, LEFT_FROM]
     made[:, kept] = states[:, kept]
     return draw_of(steps, made, view_of(replace(steps.scene, states=made), steps.parameters))
 

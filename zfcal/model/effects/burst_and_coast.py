@@ -11,14 +11,18 @@ from zfcal.model.effects.forms import SPEED_M_S, log_speed, quickness, times_fas
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import SPEED as SPEED_HOOK
-from zfcal.model.kernels.state import SPEED
+from zfcal.model.kernels.state import LATELY, SPEED
 from zfcal.model.paces import LATELY_S, LONGER_S, Copied, Pace, Spread, Swum
 
 
 @hook(SPEED_HOOK)
 def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Return a power of the own last speed, over the usual speed."""
+    """Return a power of the own last speed, or of the mean of the last ones, over the usual one."""
     last = state[SPEED * n + i]
+    if parameters[3] > 0.0:
+        last = state[LATELY * n + i]
+        if not last > 0.0:  # not known
+            return times_faster(0.0)
     if parameters[2] > 0.0:
         return times_faster(parameters[0] * quickness(last + SPEED_M_S - parameters[1]))
     return times_faster(parameters[0] * log_speed(last, parameters[1]))
@@ -88,12 +92,24 @@ EFFECT = Effect(
             default=0.0,
             says="0: a power of that speed; 1: an exponential of it, per 0.05 m/s.",
         ),
+        EffectParameter(
+            name="lately",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: the mean of the last speeds, which fades with two seconds, in place of the "
+            "last one.",
+        ),
     ),
     strength="exponent",
     probe=0.01,
     speed=speed,
-    further_shapes=lambda _arena: ({"evenly": 1.0},),
-    fixed=("usual_m_s", "evenly"),
+    further_shapes=lambda _arena: (
+        {"evenly": 1.0},
+        {"lately": 1.0},
+        {"lately": 1.0, "evenly": 1.0},
+    ),
+    fixed=("usual_m_s", "evenly", "lately"),
     shown_against="speed",
     other_forms=("generic:speed:own-speed",),
     paces=(

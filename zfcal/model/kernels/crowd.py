@@ -28,6 +28,7 @@ from zfcal.model.kernels.heading import (
     stay,
 )
 from zfcal.model.kernels.perception import in_vectors, most_sr, see_first
+from zfcal.model.kernels.placing import settle
 from zfcal.model.kernels.random import State as Random
 from zfcal.model.kernels.random import next_word, uniform
 from zfcal.model.kernels.staircase import staircase_turn
@@ -48,7 +49,6 @@ from zfcal.model.kernels.state import (
     Work,
     X,
     Y,
-    settle,
 )
 
 

@@ -15,6 +15,7 @@ from zfcal.model.kernels.heading import apply_move, draw_move
 from zfcal.model.kernels.looking import look, look_back, note_late
 from zfcal.model.kernels.pairs import bin_of
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
+from zfcal.model.kernels.placing import place, place_at, remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.state import (
     DT_S,
@@ -33,10 +34,6 @@ from zfcal.model.kernels.state import (
     X,
     Y,
     make_work,
-    place,
-    place_at,
-    remember,
-    settle,
     splits,
 )
 

@@ -10,11 +10,13 @@ from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import REPULSION_M, make_sight, see
+from zfcal.model.kernels.placing import remember, settle
 from zfcal.model.kernels.state import (
     DT_S,
     HX,
     HY,
     KIND,
+    LATELY,
     LEFT_AT_S,
     LEFT_FROM,
     LEFT_S,
@@ -28,8 +30,6 @@ from zfcal.model.kernels.state import (
     ZONE,
     X,
     Y,
-    remember,
-    settle,
 )
 
 
@@ -77,7 +77,7 @@ def fill_states(
                     state[HX, i], state[HY, i] = dx / length, dy / length
             elif zone > 0:
                 # Whoever comes back may be another one.
-                for row in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM):
+                for row in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM, LATELY):
                     state[row, i] = 0.0
                 state[LEFT_AT_S, i] = -NEVER_S
             state[SPEED, i] = length / clock[1]
