@@ -394,6 +394,12 @@ def test_wide_turns_go_by_the_last_one_and_by_how_long_there_was_none(arena, see
         np.testing.assert_allclose(weights.mean(axis=0), 0, atol=1e-12)
         # The last knot has its most where the cue has.
         assert weights[cue.argmax(), -1] == weights[:, -1].max() > 0
+    everywhere, off_walls = (
+        labelled("turning-memory", f"going straight, by the last turn{where}", arena).vectors(seen)
+        for where in ("", ", off the walls")
+    )
+    assert not off_walls[seen.follows_walls].any()
+    np.testing.assert_array_equal(off_walls[~seen.follows_walls], everywhere[~seen.follows_walls])
     aside = labelled("turning-memory", "turned by 70 degrees, by how long it swam straight", arena)
     ways = aside.toward(seen)
     turns = (ways * seen.own_heading[:, None]).sum(axis=-1)
@@ -407,12 +413,9 @@ def test_wide_turns_go_by_the_last_one_and_by_how_long_there_was_none(arena, see
 
 
 def test_headings_go_by_the_speed_of_the_step_before(arena, seen):
-    """As by that of the step, but it may not be known: nothing then."""
-    speeds = np.linspace(0.02, 0.2, N)
-    speeds[::3] = np.nan
-    known = dataclasses.replace(seen, last_speed_m_s=speeds)
+    """As by that of the step."""
+    known = dataclasses.replace(seen, last_speed_m_s=np.linspace(0.02, 0.2, N))
     vectors = labelled("speed-turn-coupling", "by the last speed", arena).vectors(known)
-    assert not vectors[::3].any()
     weights = (vectors * seen.own_heading[:, None]).sum(axis=-1)
     np.testing.assert_allclose(weights.sum(axis=0), 0, atol=1e-12)
     assert weights[-1, -1] == pytest.approx(weights[:, -1].max())
@@ -420,15 +423,23 @@ def test_headings_go_by_the_speed_of_the_step_before(arena, seen):
 
 
 def test_fish_may_leave_by_how_near_the_robot_is(arena, seen):
-    """Beside what they do at any time; other fish do not count."""
+    """Or because one is in their room; other fish do not count."""
     leaving = labelled("robot-avoidance", "leaving its room while a robot is near", arena)
     near = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.1))
-    n_robots = seen.is_robot.sum(axis=1)
-    np.testing.assert_allclose(leaving.weights(near)[:, 0], n_robots)
+    np.testing.assert_allclose(leaving.weights(near)[:, 0], seen.is_robot.sum(axis=1))
     assert not leaving.weights(near)[:, 1].any()
-    np.testing.assert_array_equal(leaving.weights(near)[:, 2:], leaving.over.weights(near))
     far = dataclasses.replace(seen, distance_m=np.full((N, OTHERS), 0.6))
-    assert not leaving.weights(far)[:, :2].any()
+    assert not leaving.weights(far).any()
+    shared = labelled("robot-avoidance", "leaving a room with a robot in it", arena)
+    one, other = (np.array(room.centroid.coords[0]) for room in find_rooms(arena)[1])
+    for own, robot, with_it in ((one, one + 0.02, 1), (other, one, 0), (one, other, 0)):
+        to_robot = robot - own
+        far_m = np.linalg.norm(to_robot)
+        placed = dataclasses.replace(
+            seen, xy_m=np.tile(own, (N, 1)), distance_m=np.tile([0.01, 0.01, far_m], (N, 1)),
+            bearing=np.tile(to_robot / far_m, (N, OTHERS, 1)),
+        )  # fmt: skip
+        np.testing.assert_array_equal(shared.weights(placed), np.full((N, 1), with_it))
 
 
 def test_who_heeds_nobody_has_as_much_of_its_own_way_as_of_all(arena, seen):

@@ -150,6 +150,22 @@ def test_a_response_that_lags_sees_where_the_others_were():
     assert shares[0] > shares[1] + 0.1
 
 
+@pytest.mark.parametrize("near", [0.0, 1.0])
+@pytest.mark.parametrize("whole", [0.0, 1.0])
+@pytest.mark.parametrize(("delay_s", "share"), [(0.2, 0.9), (0.1, 1.0), (0.3, 0.5)])
+def test_a_fish_that_comes_back_is_seen_where_it_is(delay_s, share, whole, near):
+    """Where it was nobody knows: every draw of the next step has a heading all the same."""
+    effect = {"delay_s": delay_s, "share": share, "whole": whole, "near": near}
+    packed = pack([with_effects(**{"reaction-delay": effect})], ARENA)
+    for seed in range(40):
+        made = Among(ARENA, np.zeros(1), dt_s=0.2)
+        for k, others in enumerate((NOWHERE[None], OTHERS[:1])):
+            made.measure(0.2 * k, others)
+            made.place(*OWN)
+            move = made.step(packed, seed)
+        assert math.isfinite(move.heading_rad)
+
+
 def test_unknown_headings_are_no_obstacle():
     """Fish that never moved, and an agent that never did: a step all the same, inside."""
     others = OTHERS.copy()

@@ -129,6 +129,7 @@ def both_sides(candidate: Candidate) -> tuple[Candidate, ...]:
 
 
 _LATE_STEPS = (0.5, 1.0, 1.5, 2.0)
+_NEAR_STEPS = (0.3, 0.5, 1.0, 2.0, 3.0)
 """Steps of a recording by which a response may be late, beside those delays that a file names."""
 
 _FELT_M = (0.1, 0.14, 0.2)
@@ -188,6 +189,11 @@ def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
             {effect.lag: steps * scene.dt_s, "felt_m": felt_m, "whole": 0.0}
             for felt_m in _FELT_M
             for steps in _LATE_STEPS[:2]
+            if steps * scene.dt_s <= longest_s
+        ]
+        shapes += [
+            {effect.lag: steps * scene.dt_s, "felt_m": 0.0, "whole": 0.0, "near": 1.0}
+            for steps in _NEAR_STEPS
             if steps * scene.dt_s <= longest_s
         ]
         shapes += [

@@ -68,14 +68,20 @@ def stayed(states: Floats, tracks: NDArray[np.int32], dt_s: float) -> Floats:
 
 
 def straight(states: Floats, dt_s: float) -> Floats:
-    """Return for how long everybody has not turned widely, or has been there, (sample, agent)."""
+    """Return for how long everybody has not turned widely, or has been there, (sample, agent).
+
+    Steps too short to have a heading do not count: who rests does not swim straight.
+    """
     heading = np.moveaxis(states[:, [HX, HY]], 1, 2)
     there, sample = states[:, ZONE] > 0, np.arange(len(states))[:, None]
     turns = np.ones(there.shape, dtype=bool)
     narrow = (heading[1:] * heading[:-1]).sum(axis=-1) > math.cos(_STRAIGHT_RAD)
     turns[1:] = ~(narrow & there[1:] & there[:-1])
+    moved = np.zeros(there.shape, dtype=bool)
+    moved[1:] = (heading[1:] != heading[:-1]).any(axis=-1)
+    n_moved = np.cumsum(moved, axis=0)
     last = np.maximum.accumulate(np.where(turns, sample, 0), axis=0)
-    return np.asarray((sample - last) * dt_s)
+    return np.asarray((n_moved - np.take_along_axis(n_moved, last, axis=0)) * dt_s)
 
 
 def courses(states: Floats, dt_s: float) -> Floats:

@@ -358,27 +358,26 @@ def test_headings_of_steps_before_are_known_up_to_a_gap(base):
 
 
 def test_fish_swim_straight_since_their_last_wide_turn(base):
-    """Or since they came: the time is that of the steps since, and nobody's turn was wide."""
+    """Or since they came: no turn since was wide, and rest does not count."""
     scene, fitted = base
-    seen, at, who = (
-        (law := Law(scene=scene, fitted=fitted)).draws[0].seen,
-        law.turns.at,
-        law.turns.who,
-    )
+    law = Law(scene=scene, fitted=fitted)
+    seen, at, who = law.draws[0].seen, law.turns.at, law.turns.who
     n_steps = np.round(seen.straight_s / scene.dt_s).astype(int)
     assert 0 < (n_steps == 0).sum() < 0.6 * len(n_steps)
-    wide = np.abs(seen.last_turn_rad) > 0.6
-    assert (n_steps[wide] == 0).all()
+    assert (n_steps[np.abs(seen.last_turn_rad) > 0.6] == 0).all()
     for k in range(4):
         some = n_steps > k
-        headings = [scene.states[at[some] - ago][:, :, :] for ago in (k, k + 1)]
-        now, before = (each[np.arange(some.sum()), :, who[some]][:, [HX, HY]] for each in headings)
+        now, before = (
+            scene.states[at[some] - ago, :, who[some]][:, [HX, HY]] for ago in (k, k + 1)
+        )
         assert ((now * before).sum(axis=1) > np.cos(0.6)).all()
     gone = scene.states.copy()
     gone[20, ZONE] = 0
     since = np.round(straight(gone, scene.dt_s) / scene.dt_s).astype(int)
     assert (since[21] == 0).all()
     assert (since[25] <= 4).all()
+    resting = np.repeat(scene.states[30:31], 4, axis=0)
+    assert not straight(resting, scene.dt_s).any()
 
 
 def test_what_is_drawn_turns_with_the_whole_law(base):

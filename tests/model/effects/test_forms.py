@@ -447,6 +447,8 @@ def test_fish_may_leave_a_room_that_a_robot_is_in(ask):
     for room in ([1.0, 2.0, 1.0], [0.0, 0.0, 1.0]):
         elsewhere = ask("robot-avoidance", given, ROOM=room, **rows)
         assert elsewhere.factor(0.0, landing=2) == elsewhere.factor(0.0, landing=3) == 1.0
+    inner = ask("robot-avoidance", given, ROOM=[1.0, 1.0, 2.0], **{**rows, "MOUTH_M": 0.2})
+    assert inner.factor(0.0, landing=3) == 1.0
     gone = ask("robot-avoidance", given, ROOM=[1.0, 1.0, 2.0], **rows, ZONE=[3.0, 0.0, 3.0])
     assert gone.factor(0.0, landing=2) == gone.factor(0.0, landing=3)
 

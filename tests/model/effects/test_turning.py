@@ -220,8 +220,9 @@ def test_wide_turns_can_follow_wide_ones(ask):
         assert math.log(ratio) == pytest.approx(-0.8 * off)
         assert asked.factor(1.3) == pytest.approx(asked.factor(-1.3))
         assert max(asked.factor(angle) for angle in np.linspace(-np.pi, np.pi, 41)) <= 1 + 1e-12
-    unknown = ask("turning-memory", given, PAST_HX=[0.0], PAST_HY=[0.0])
-    assert unknown.factor(0.0) == unknown.factor(2.0) == 1.0
+    for rows in ({"PAST_HX": [0.0]}, {"PAST_HX": [0.0], "PAST_HY": [1.0], "FOLLOWS": [1.0]}):
+        none = ask("turning-memory", given, **rows)
+        assert none.factor(0.0) == none.factor(2.0) == 1.0
 
 
 def test_fish_slow_down_in_turns(swim):

@@ -10,7 +10,6 @@ import shapely
 
 from zfcal.arena import Arena
 from zfcal.arrays import Floats
-from zfcal.model.directions import in_tank
 from zfcal.model.effects.base import Company, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_under
 from zfcal.model.effects.forms import (
@@ -27,6 +26,7 @@ from zfcal.model.effects.weights import (
     aside_of,
     every_step,
     only,
+    rooms_of,
     turning_as_a_whole,
     who,
 )
@@ -201,12 +201,7 @@ def _elsewhere(rooms: Sequence[shapely.Geometry]) -> Weights:
     """
 
     def weights(seen: Seen) -> Floats:
-        bearing = in_tank(seen.x_axis, seen.bearing)
-        others = seen.xy_m[:, None] + seen.distance_m[..., None] * bearing
-        mine = np.stack([shapely.contains_xy(room, seen.xy_m) for room in rooms], axis=-1)
-        theirs = np.stack(
-            [shapely.contains_xy(room, others[..., 0], others[..., 1]) for room in rooms], axis=-1
-        )
+        mine, theirs = rooms_of(seen, rooms)
         in_room = mine.any(axis=-1, keepdims=True)
         away = in_room & (theirs & ~mine[:, None]).any(axis=-1) & seen.here
         share = away.sum(axis=1) / np.maximum(seen.here.sum(axis=1), 1)

@@ -106,6 +106,12 @@ def of_base(turning: float) -> bool:
 
 
 @inlined
+def mouth_is_near(state: Hooked, n: int, i: int) -> bool:
+    """Tell whether a step of an agent could lead out of its room."""
+    return state[MOUTH_M * n + i] < _MOUTH_REACH_M
+
+
+@inlined
 def way_out(
     state: Hooked, n: int, i: int, move: tuple[float, float, int], heading_share: float
 ) -> float:
@@ -122,7 +128,7 @@ def way_out(
     ux, uy, landing = move
     cosine = ux * state[MOUTH_X * n + i] + uy * state[MOUTH_Y * n + i]
     crossing = 0.0
-    if state[MOUTH_M * n + i] < _MOUTH_REACH_M:
+    if mouth_is_near(state, n, i):
         crossing = 1.0 if landing == state[EXIT * n + i] else -1.0
     return heading_share * cosine + (1.0 - heading_share) * crossing
 

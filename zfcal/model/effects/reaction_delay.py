@@ -215,7 +215,7 @@ EFFECT = Effect(
             high=1.0,
             default=1.0,
             says="1: whom fish see, and how large, is of that moment; 0: the direction alone, and "
-            "near ones are felt at once.",
+            "near ones are felt at once unless near is 1.",
         ),
         EffectParameter(
             name="then",
@@ -248,7 +248,7 @@ EFFECT = Effect(
         *({"delay_s": delay_s, "felt_m": 0.05, "whole": 0.0} for delay_s in (0.02, 0.05, 0.1)),
         *(
             {"delay_s": delay_s, "felt_m": 0.0, "whole": 0.0, "near": 1.0}
-            for delay_s in (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.6)
+            for delay_s in (0.01, 0.02, 0.05)
         ),
     ),
     lacks=needs_neighbour,

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from zfcal.arena import Arena
 from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Company, Effect, EffectParameter
@@ -17,6 +20,7 @@ from zfcal.model.effects.forms import (
     Hooked,
     apart,
     beyond,
+    mouth_is_near,
     of_base,
     sine_to,
     tilt,
@@ -26,9 +30,9 @@ from zfcal.model.effects.forms import (
 from zfcal.model.effects.weights import (
     ATTENTION,
     aside_of,
-    every_step,
     factor_on_attention,
     precision_of_attention,
+    rooms_of,
     turning_as_a_whole,
 )
 from zfcal.model.features import (
@@ -41,6 +45,7 @@ from zfcal.model.features import (
     Seen,
     Tilt,
     Turned,
+    Weights,
 )
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -110,7 +115,7 @@ def with_robot(state: Hooked, n: int, i: int) -> bool:
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """Weigh headings away from the robots that are seen, or out of a room with one in it."""
     if parameters[6] > 0.0:
-        if not with_robot(state, n, i):
+        if not (with_robot(state, n, i) and mouth_is_near(state, n, i)):
             return 1.0
         return tilt(parameters[0], way_out(state, n, i, (ux, uy, landing), 0.0), 1.0)
     leaning = parameters[1]
@@ -181,9 +186,20 @@ def _leaning_near(seen: Seen) -> Floats:
 
 
 def _leaving(seen: Seen) -> Floats:
-    """Return how near the robot is, and one of all steps, shape (step, knot)."""
+    """Return how near the robot is, shape (step, knot)."""
     near = hats(seen.distance_m, _LEFT_M)[..., :-1] * seen.is_robot[..., None]
-    return np.column_stack([near.sum(axis=1), every_step(seen)])
+    return np.asarray(near.sum(axis=1))
+
+
+def _in_the_room(rooms: Sequence[shapely.Geometry]) -> Weights:
+    """Return one where a robot is in the fish's room, shape (step, 1)."""
+
+    def weights(seen: Seen) -> Floats:
+        mine, theirs = rooms_of(seen, rooms)
+        with_it = (theirs & mine[:, None]).any(axis=-1) & seen.is_robot
+        return np.asarray(with_it.any(axis=1), dtype=np.float64)[:, None]
+
+    return weights
 
 
 def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
@@ -231,12 +247,9 @@ _FEATURES: tuple[Feature, ...] = (
     *turning_as_a_whole(partial(_turning, along_walls=True), along=_TO_ROBOT),
     factor_on_attention(_by_its_speed, label="attention to robots, by their speed"),
     Leaving(
-        label="leaving its room while a robot is near", weights=_leaving,
-        along=Along(
-            cue="distance to the robot (m)", knots=_LEFT_M[:-1], besides=("at any time",)
-        ),
-        # More than at any time.
-        over=Leaving(label="at any time", weights=every_step),
+        label="leaving its room while a robot is near",
+        weights=_leaving,
+        along=Along(cue="distance to the robot (m)", knots=_LEFT_M[:-1]),
     ),
     precision_of_attention(_to_robots, "precision of robots"),
     by_circumstances(
@@ -247,6 +260,14 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     by_circumstances(Tilt(label="leaning near it", vectors=_leaning_near)),
 )  # fmt: skip
+
+
+def _features(arena: Arena) -> tuple[Feature, ...]:
+    rooms = find_rooms(arena)[1]
+    if not rooms:
+        return _FEATURES
+    shared = Leaving(label="leaving a room with a robot in it", weights=_in_the_room(rooms))
+    return (*_FEATURES, shared)
 
 
 EFFECT = Effect(
@@ -337,7 +358,7 @@ EFFECT = Effect(
         "rotation": ("turning",),
         "whole_rotation": ("turning",),
     },
-    features=lambda _arena: _FEATURES,
+    features=_features,
 )
 
 

@@ -71,12 +71,9 @@ def _by_speed(seen: Seen) -> Floats:
 
 
 def _by_last_speed(seen: Seen) -> Floats:
-    """Return the same of the speed of the step before; nothing where that is not known."""
-    known = np.isfinite(seen.last_speed_m_s)[:, None]
-    weights = hats(np.nan_to_num(seen.last_speed_m_s), _LAST_M_S)
-    mean = weights.mean(axis=0, where=known) if known.any() else 0.0
-    weights = np.where(known, weights - mean, 0.0)
-    return np.asarray(weights[:, 1:, None] * seen.own_heading[:, None])
+    """Return the same of the speed of the step before."""
+    weights = hats(seen.last_speed_m_s, _LAST_M_S)
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
 
 
 _LAST_M_S = (0.03, 0.08, 0.14)
@@ -238,7 +235,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: the speed of the step before counts, not that of the step itself.",
+            says="1: the speed of the step before counts, not that of the step itself; not with "
+            "kick.",
         ),
     ),
     probe=0.01,

@@ -51,8 +51,8 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     px, py = state[PAST_HX * n + i], state[PAST_HY * n + i]
     if parameters[5] > 0.0:
         narrow = _USUAL_RAD - abs(math.atan2(px * hy - py * hx, px * hx + py * hy))
-        if px == 0.0 and py == 0.0:  # not known
-            narrow = 0.0
+        if state[FOLLOWS * n + i] > 0.0 or (px == 0.0 and py == 0.0):  # both ways, or not known
+            return 1.0
         return tilt(parameters[0], narrow * (hx * ux + hy * uy), abs(narrow))
     # A fish that has turned back has no side to go on to.
     last = (px * hy - py * hx) * max(0.0, px * hx + py * hy) ** parameters[2]
@@ -153,6 +153,10 @@ def _straight_by_last_turn(seen: Seen) -> Floats:
     """Return the own heading, weighed by what the last turn has beside the mean of all steps."""
     weights = hats(np.abs(seen.last_turn_rad), _WIDER_RAD)
     return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+
+
+def _off_walls(seen: Seen) -> Floats:
+    return _straight_by_last_turn(seen) * ~seen.follows_walls[:, None, None]
 
 
 def _straight_by_time(seen: Seen) -> Floats:
@@ -266,8 +270,9 @@ _FEATURES: tuple[Feature, ...] = (
             for twice in (False, True)
         ),
     ),
-    OneOf(kind="turned aside", features=tuple(map(_aside, (50, 70, 100)))),
+    *map(_aside, (50, 70, 100)),
     Tilt(label="going straight, by the last turn", vectors=_straight_by_last_turn),
+    Tilt(label="going straight, by the last turn, off the walls", vectors=_off_walls),
     Tilt(label="going straight, by how long it did", vectors=_straight_by_time),
     Sharper(label="sharper by the last turn", by=_by_last_turn),
     Sharper(label="sharper by the last turn, off the walls", by=_by_last_turn_off_walls),
@@ -329,7 +334,8 @@ EFFECT = Effect(
             high=1.0,
             default=0.0,
             says="1: wide turns follow wide ones, to either side: straight on against a right "
-            "angle loses a factor of e to the strength per radian of the last turn beyond 0.6.",
+            "angle loses a factor of e to the strength per radian of the last turn beyond 0.6; "
+            "not along a wall.",
         ),
     ),
     probe=0.01,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.directions import lengths
+from zfcal.model.directions import in_tank, lengths
 from zfcal.model.effects.circumstances import each_fish, each_under
 from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Turned, Weights
 
@@ -190,3 +192,13 @@ def precision_of_attention(
 ATTENTION = each_under(factor_on_attention(evenly))
 LESS_ATTENTION = each_under(factor_on_attention(evenly, high=0.0))
 """What fish may attend to by circumstances, whoever it is: in any measure, and less alone."""
+
+
+def rooms_of(
+    seen: Seen, rooms: Sequence[shapely.Geometry]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which room a fish is in, (step, room), and each other, (step, other, room)."""
+    bearing = in_tank(seen.x_axis, seen.bearing)
+    x, y = np.moveaxis(seen.xy_m[:, None] + seen.distance_m[..., None] * bearing, -1, 0)
+    mine = np.stack([shapely.contains_xy(room, seen.xy_m) for room in rooms], axis=-1)
+    return mine, np.stack([shapely.contains_xy(room, x, y) for room in rooms], axis=-1)

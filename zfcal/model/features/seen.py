@@ -66,7 +66,7 @@ class Seen:
     own_speed_m_s : ndarray, shape (step,)
         Of the step itself, which is given.
     last_speed_m_s : ndarray, shape (step,)
-        Of the step before; NaN where it is not known.
+        Of the step before.
     last_turn_rad : ndarray, shape (step,)
         To the left; 0 where it is not known.
     ago_heading : ndarray, shape (lag, step, 2)

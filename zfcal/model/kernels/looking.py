@@ -81,9 +81,9 @@ def note_late(
             is_then = late[LATE_THEN] > 0.0
             x, y = (past[slot, 0, i], past[slot, 1, i]) if is_then else (state[X, i], state[Y, i])
             dx, dy = past[slot, 0, j] - x, past[slot, 1, j] - y
-            # Away from who is too near now.
+            # Away from who is too near now. NaN for who was not there: as it is now, then.
             length = math.copysign(math.hypot(dx, dy), sight.toward_per_m[k])
-            if length != 0.0:
+            if abs(length) > 0.0:
                 out[k, 1], out[k, 2] = dx / length, dy / length
 
 
