@@ -586,25 +586,11 @@ def test_a_delay_between_steps_is_likeliest_where_it_is(two_rooms, model):
     assert nats[0.3] > nats[0.4] + 20
 
 
-def test_near_ones_that_are_left_late_are_likeliest_so(two_rooms, model):
-    """Of fish that swim away from where those next to them were, and of others."""
-    given = {"delay_s": 0.3, "whole": 0.0}
-    late = {t: having(model, {"reaction-delay": {**given, "near": t}}) for t in (0.0, 1.0)}
-    for true, other in ((0.0, 1.0), (1.0, 0.0)):
-        xy_m, _ = simulate_tracks(late[true], two_rooms, n_agents=5, n_steps=1000, seed=9)
-        scene = make_scene(samples_of(xy_m), two_rooms)
-        nats = {
-            w: sum(nats_of(x, t, view_of(scene, m)).sum() for x, t in pairs(scene, m))
-            for w, m in late.items()
-        }
-        assert nats[true] > nats[other] + 20
-
-
-@pytest.mark.parametrize("whole", [1.0, 0.0])
-def test_a_former_sight_is_likeliest_where_it_is(two_rooms, model, whole):
-    """Of fish that head where another was seen then, beside one that was seen from here."""
+@pytest.mark.parametrize(("whole", "what"), [(1.0, "then"), (0.0, "then"), (0.0, "near")])
+def test_a_late_response_is_likeliest_as_it_is(two_rooms, model, whole, what):
+    """Where another was seen, from there or from here; who is next late, or at once."""
     given = {"delay_s": 0.4, "whole": whole}
-    late = {t: having(model, {"reaction-delay": {**given, "then": t}}) for t in (0.0, 1.0)}
+    late = {t: having(model, {"reaction-delay": {**given, what: t}}) for t in (0.0, 1.0)}
     for true, other in ((0.0, 1.0), (1.0, 0.0)):
         xy_m, _ = simulate_tracks(late[true], two_rooms, n_agents=5, n_steps=1000, seed=9)
         scene = make_scene(samples_of(xy_m), two_rooms)

@@ -17,7 +17,7 @@ from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_under, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
-from zfcal.model.effects.weights import only
+from zfcal.model.effects.weights import only, own_heading_by
 from zfcal.model.features import (
     Along,
     Component,
@@ -71,9 +71,7 @@ def _by_speed(seen: Seen) -> Floats:
 
 
 def _by_last_speed(seen: Seen) -> Floats:
-    """Return the same of the speed of the step before."""
-    weights = hats(seen.last_speed_m_s, _LAST_M_S)
-    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+    return own_heading_by(seen, hats(seen.last_speed_m_s, _LAST_M_S))
 
 
 _LAST_M_S = (0.03, 0.08, 0.14)

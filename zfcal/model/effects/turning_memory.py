@@ -12,7 +12,7 @@ from zfcal.model.directions import left_of, turned_by
 from zfcal.model.effects.base import Control, Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import leftward, tilt
-from zfcal.model.effects.weights import only, turning_as_a_whole
+from zfcal.model.effects.weights import only, own_heading_by, turning_as_a_whole
 from zfcal.model.features import (
     LAGS,
     Along,
@@ -150,9 +150,7 @@ def _by_last_turn(seen: Seen) -> Floats:
 
 
 def _straight_by_last_turn(seen: Seen) -> Floats:
-    """Return the own heading, weighed by what the last turn has beside the mean of all steps."""
-    weights = hats(np.abs(seen.last_turn_rad), _WIDER_RAD)
-    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+    return own_heading_by(seen, hats(np.abs(seen.last_turn_rad), _WIDER_RAD))
 
 
 def _off_walls(seen: Seen) -> Floats:
@@ -160,9 +158,7 @@ def _off_walls(seen: Seen) -> Floats:
 
 
 def _straight_by_time(seen: Seen) -> Floats:
-    """Return it weighed by what the time since a wide turn has beside the mean of all steps."""
-    weights = hats(seen.straight_s, _STRAIGHT_S)
-    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+    return own_heading_by(seen, hats(seen.straight_s, _STRAIGHT_S))
 
 
 def _aside(degrees: int) -> Component:

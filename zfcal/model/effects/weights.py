@@ -77,6 +77,11 @@ def to_one_sense(seen: Seen, share: Floats | float = 1.0) -> Floats:
     return np.stack([half, -half], axis=1)[..., None]
 
 
+def own_heading_by(seen: Seen, weights: Floats) -> Floats:
+    """Return the own heading, by what weights but the first have beside their mean of all steps."""
+    return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
+
+
 def own_ways(seen: Seen) -> Floats:
     """Return where the base law draws without others: ahead, or both ways along a wall.
 
