@@ -24,9 +24,10 @@ from zfcal.behaviour.statistics import Statistics, measure
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import in_vectors, make_sight
+from zfcal.model.kernels.placing import settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import advance, start
-from zfcal.model.kernels.state import GRID, STATES, ZONE, Packed, X, Y, make_work, settle
+from zfcal.model.kernels.state import GRID, STATES, ZONE, Packed, X, Y, make_work
 from zfcal.model.simulate import burn_in_steps, individuals, pack, tank_of
 from zfcal.parameters import Parameters, natural
 from zfcal.tracks import FISH, Samples

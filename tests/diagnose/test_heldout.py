@@ -215,7 +215,7 @@ def test_sums_by_block_by_hand():
 
 def test_a_candidate_takes_its_shape_from_the_parameters():
     """All but the strength; what is not given has its default."""
-    late = {"delay_s": 0.4, "felt_m": 0.0, "whole": 1.0, "then": 0.0}
+    late = {"delay_s": 0.4, "felt_m": 0.0, "whole": 1.0, "then": 0.0, "near": 0.0}
     assert candidate_of("reaction-delay", {"share": 0.3, "delay_s": 0.4}).shape == late
     shape = candidate_of("alignment", {"weight": 3.0, "kappa": 5.0}).shape
     assert "weight" not in shape

@@ -35,17 +35,24 @@ def packed_with(own, effect, arena, **given):
     # Leaning, where some headings may be drawn or turned instead: that is no factor.
     place = {"x_m": here[X] + 0.05, "y_m": here[Y], "drawn": 0.0}
     place |= {"turning": 0.0} if effect.name in {"turning-memory", "turning-bias"} else {}
-    place |= {"into_zone": 0.0, effect.not_harmonic: 0.0}
+    place |= {"into_zone": 0.0, "sizes": 0.0, "last": 0.0, effect.not_harmonic: 0.0}
     middling |= {name: at for name, at in place.items() if name in middling} | given
     model = with_effect(own.fitted.parameters, effect.name, middling)
     return pack([model], arena)
 
 
-@pytest.mark.parametrize("effect", SMOOTH, ids=lambda effect: effect.name)
-def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, few, tank):
+@pytest.mark.parametrize(
+    ("effect", "given"),
+    [
+        *(pytest.param(effect, {}, id=effect.name) for effect in SMOOTH),
+        pytest.param(find_effect("turning-memory"), {"sizes": 1.0}, id="sizes"),
+        pytest.param(find_effect("speed-turn-coupling"), {"last": 1.0}, id="last"),
+    ],
+)
+def test_harmonics_give_the_factor_at_every_heading_that_lands(effect, given, few, tank):
     """An effect that says it is a polynomial of some degree is one, up to a common factor."""
     own, scene = few
-    packed = packed_with(own, effect, tank)
+    packed = packed_with(own, effect, tank, **given)
     angle_sr = view_of(scene, own.fitted.parameters).angle_sr
     whole, at_taken = factors_of(scene, packed, angle_sr)
     form = polynomial_of({effect.name: {}})

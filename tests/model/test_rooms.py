@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from zfcal.arena import make_arena
+from zfcal.model.kernels.placing import remember
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import (
     LEFT_AT_S,
@@ -23,7 +24,6 @@ from zfcal.model.kernels.state import (
     ZONE,
     X,
     Y,
-    remember,
 )
 from zfcal.model.simulate import tank_of
 from zfcal.model.tank import make_tank

@@ -7,6 +7,7 @@ import pytest
 
 from zfcal.calibrate.group import Group
 from zfcal.errors import InputError
+from zfcal.model.kernels.placing import place, place_at
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.state import (
     DT_S,
@@ -21,8 +22,6 @@ from zfcal.model.kernels.state import (
     ZONE,
     X,
     Y,
-    place,
-    place_at,
 )
 from zfcal.model.simulate import individuals, pack, simulate_counts, simulate_tracks, tank_of
 from zfcal.model.start import Start, seen_at

@@ -16,9 +16,10 @@ from zfcal.arena import Bins, make_arena
 from zfcal.errors import InputError
 from zfcal.model.kernels.compiled import kernel
 from zfcal.model.kernels.perception import make_sight
+from zfcal.model.kernels.placing import place
 from zfcal.model.kernels.random import next_word, seeded
 from zfcal.model.kernels.run import advance, record_run
-from zfcal.model.kernels.state import STATES, make_work, place
+from zfcal.model.kernels.state import STATES, make_work
 from zfcal.model.onestep import draw_headings, heading_density
 from zfcal.model.packing import pack, pack_genes
 from zfcal.model.simulate import (

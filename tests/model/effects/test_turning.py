@@ -205,7 +205,8 @@ def test_a_kick_is_a_step_faster_than_the_last(ask):
 def test_straight_on_can_go_by_the_speed_of_the_step_before(ask):
     """At 0.12 m/s by one unit, whatever the step's own speed; by nothing if that is not known."""
     for last, log_ratio in ((0.12, 1.4), (0.07, 0.0), (math.nan, 0.0), (-1.0, 0.0)):
-        asked = ask("speed-turn-coupling", {"strength": 0.7, "last": 1.0}, SPEED=[last])
+        given = {"strength": 0.7, "last": 1.0, "kick": 1.0}
+        asked = ask("speed-turn-coupling", given, SPEED=[last])
         ratio = asked.factor(0.0, speed=0.03) / asked.factor(math.pi, speed=0.03)
         assert math.log(ratio) == pytest.approx(log_ratio)
 

@@ -51,7 +51,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
         if not last_m_s >= 0.0:
             return 1.0
         speed = last_m_s
-    if parameters[3] > 0.0 and last_m_s >= 0.0:  # not where it is not known
+    elif parameters[3] > 0.0 and last_m_s >= 0.0:  # not where it is not known
         usual_m_s = last_m_s
     quick = quickness(speed + SPEED_M_S - usual_m_s)
     return tilt(parameters[0], quick * straight, abs(quick))
@@ -233,8 +233,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: the speed of the step before counts, not that of the step itself; not with "
-            "kick.",
+            says="1: the speed of the step before counts, not that of the step itself, whatever "
+            "kick is.",
         ),
     ),
     probe=0.01,
