@@ -364,7 +364,9 @@ def test_fish_swim_straight_since_their_last_wide_turn(base):
     seen, at, who = law.draws[0].seen, law.turns.at, law.turns.who
     n_steps = np.round(seen.straight_s / scene.dt_s).astype(int)
     assert 0 < (n_steps == 0).sum() < 0.6 * len(n_steps)
-    assert (n_steps[np.abs(seen.last_turn_rad) > 0.6] == 0).all()
+    size = np.abs(seen.last_turn_rad)
+    assert (n_steps[size > 0.6] == 0).all()
+    assert (n_steps[(size > 1e-9) & (size < 0.6)] > 0).all()
     for k in range(4):
         some = n_steps > k
         now, before = (

@@ -78,7 +78,17 @@ def to_one_sense(seen: Seen, share: Floats | float = 1.0) -> Floats:
 
 
 def own_heading_by(seen: Seen, weights: Floats) -> Floats:
-    """Return the own heading, by what weights but the first have beside their mean of all steps."""
+    """Return the own heading, by what weights but the first have beside their mean of all steps.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (step, weight)
+
+    Returns
+    -------
+    ndarray, shape (step, weight - 1, 2)
+        Vectors of a tilt.
+    """
     return np.asarray((weights - weights.mean(axis=0))[:, 1:, None] * seen.own_heading[:, None])
 
 

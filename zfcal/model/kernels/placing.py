@@ -41,8 +41,8 @@ from zfcal.model.kernels.state import (
     Y,
 )
 
-LATELY_S = 2.0
-"""What the mean of the own speeds fades with."""
+_FADES_S = 2.0
+"""After so long a speed counts 1/e as much in the mean of the own ones, in seconds."""
 
 
 @inlined
@@ -114,7 +114,7 @@ def remember(state: Floats, tank: Tank) -> None:
         if zone == 0:  # who is not seen has not left
             continue
         if state[SPEED, i] >= 0.0:  # known
-            kept = math.exp(-state[DT_S, i] / LATELY_S) if state[LATELY, i] > 0.0 else 0.0
+            kept = math.exp(-state[DT_S, i] / _FADES_S) if state[LATELY, i] > 0.0 else 0.0
             state[LATELY, i] = kept * state[LATELY, i] + (1.0 - kept) * state[SPEED, i]
         state[FOLLOWS, i] = 1.0 if tank.follows[zone] else 0.0
         state[EXIT, i] = rooms.exit_zone
