@@ -75,13 +75,20 @@ class Tree:
     Parameters
     ----------
     path
-        A folder in which its packages lie under their installed names.
+        Where commands are run: a folder in which its packages lie under their installed names, or
+        an empty one, in which those that are installed are found.
     limit_s
         Processor time that a command may take; None for any.
     """
 
     path: Path
     limit_s: int | None = None
+
+    @classmethod
+    def installed(cls, folder: Path) -> Tree:
+        """Take what is installed: its kernels are compiled already, as a user's are."""
+        folder.mkdir()
+        return cls(path=folder)
 
     @classmethod
     def of(cls, checkout: Path, folder: Path, limit_s: int | None = None) -> Tree:
@@ -198,10 +205,12 @@ def measure(lengths: Sequence[Length], before: Path | None, results: Path) -> di
     """Measure trials of every length; what is known is kept after each."""
     found: dict[str, Any] = {"machine": machine(), "load_before": load(), "limit_s": LIMIT_S}
     with tempfile.TemporaryDirectory() as folder:
-        trees = {"now": Tree.of(ROOT, Path(folder) / "tree-now")}
-        if before is not None:
+        here = Path(folder) / "tree-now"
+        if before is None:
+            trees = {"now": Tree.installed(here)}
+        else:
             older = Tree.of(before, Path(folder) / "tree-before", LIMIT_S)
-            trees = {"before": older, **trees}
+            trees = {"before": older, "now": Tree.of(ROOT, here)}
         found["lengths"] = []
         for number, length in enumerate(lengths):
             place = Path(folder) / f"length-{number}"

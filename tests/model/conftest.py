@@ -83,6 +83,10 @@ def seen():
         angle = rng.uniform(-np.pi, np.pi, shape)
         return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
+    def sight():
+        soon, half, late, older = rng.uniform(0.1, 2.0, (4, n, others))
+        return late, older, soon, half
+
     robot = np.zeros((n, others), dtype=bool)
     robot[:, -1] = True
     ago, then = (dict(zip(LAGS, each, strict=True)) for each in ways(2, len(LAGS), n, others))
@@ -90,16 +94,16 @@ def seen():
     return Seen(
         attention=rng.uniform(0.1, 2.0, (n, others)),
         toward=ways(n, others),
-        soon_toward=ways(n, others),
-        half_toward=ways(n, others),
+        shortly_ago_toward=dict(zip((SOON, 0.5), ways(2, n, others), strict=True)).__getitem__,
         ago_toward=ago.__getitem__,
         then_toward=then.__getitem__,
-        late_toward=ways(n, others),
-        older_toward=ways(n, others),
-        soon_attention=rng.uniform(0.1, 2.0, (n, others)),
-        half_attention=rng.uniform(0.1, 2.0, (n, others)),
-        late_attention=rng.uniform(0.1, 2.0, (n, others)),
-        older_attention=rng.uniform(0.1, 2.0, (n, others)),
+        sight_ago=dict(
+            zip(
+                (1.0, 2.0, SOON, 0.5),
+                zip([*ways(2, n, others)] * 2, sight(), strict=True),
+                strict=True,
+            )
+        ).__getitem__,
         bearing=ways(n, others),
         distance_m=rng.uniform(0.03, 0.5, (n, others)),
         off_axis_rad=rng.uniform(0, np.pi, (n, others)),

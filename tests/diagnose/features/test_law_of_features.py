@@ -2,12 +2,13 @@
 
 import dataclasses
 import math
+import weakref
 
 import numpy as np
 import pytest
 from scipy.special import i0e, ndtr
 
-from zfcal.diagnose.features.draws import Steps, draw_of, errors_of
+from zfcal.diagnose.features.draws import Steps, _turned_back, draw_of, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
@@ -234,13 +235,14 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     found, plain = draw_of(steps, states, view), law.draws[0]
     for name in (
         "toward",
-        "late_toward",
         "soon_toward",
         "bearing",
         "heading",
         "own_heading",
     ):
         np.testing.assert_allclose(getattr(found.seen, name), getattr(plain.seen, name), atol=1e-9)
+    for ago, as_before in zip(found.seen.sight_ago(1.0), plain.seen.sight_ago(1.0), strict=True):
+        np.testing.assert_allclose(ago, as_before, atol=1e-9)
     for steps in (SOON, *LAGS):
         for name in ("ago_toward", "then_toward"):
             ways, as_before = (getattr(seen, name)(steps) for seen in (found.seen, plain.seen))
@@ -248,6 +250,31 @@ def test_directions_of_a_draw_are_turned_back_to_the_heading_taken(law):
     for name in ("base", "toward", "angle_sr"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-9)
     np.testing.assert_allclose(found.seen.off_axis_rad, plain.seen.off_axis_rad, atol=1e-7)
+
+
+def test_a_draw_keeps_what_was_seen_and_nothing_that_it_was_made_from(law):
+    """Neither all states nor directions before they were turned: eight draws would hold them."""
+    scene = law.scene
+    states = scene.states.copy()
+    states[:, X] += 1e-4 * np.sin(np.arange(len(states)))[:, None]
+    steps = Steps(
+        scene=scene, parameters=law.fitted.parameters, rows=law.rows, turns=law.turns,
+        follows=law.follows, alpha=law.alpha,
+    )  # fmt: skip
+    seen = draw_of(steps, states, law.fitted.view).seen
+    kept = weakref.ref(states)
+    del states
+    assert kept() is None
+    arrays = [getattr(seen, field.name) for field in dataclasses.fields(seen)]
+    arrays = [each for each in arrays if isinstance(each, np.ndarray)]
+    assert len(arrays) > 20
+    assert all(each.base is None or each.base.nbytes <= 2 * each.nbytes for each in arrays)
+    before = dataclasses.replace(seen, bearing=seen.bearing.copy())
+    turned, kept = _turned_back(before, np.full(len(seen.zone), 0.3)), weakref.ref(before.bearing)
+    del before
+    assert kept() is None
+    for late in (turned.ago_toward(1.0), turned.then_toward(1.0), *turned.sight_ago(1.0)):
+        assert np.isfinite(late).all()
 
 
 def test_who_is_too_near_is_left_from_where_it_was(law):
@@ -276,12 +303,13 @@ def test_others_come_into_view_late(law):
     """
     seen = law.draws[0].seen
     new = [
-        float(((seen.attention > 0) & (ago == 0)).mean())
-        for ago in (seen.soon_attention, seen.half_attention, seen.late_attention)
+        float(((seen.attention > 0) & (seen.sight_ago(steps)[1] == 0)).mean())
+        for steps in (SOON, 0.5, 1.0)
     ]
     assert 0 < new[0] < new[1] < new[2] < 0.2
-    both = (seen.attention > 0) & (seen.soon_attention > 0)
-    ratio = np.log(seen.soon_attention[both] / seen.attention[both])
+    soon = seen.sight_ago(SOON)[1]
+    both = (seen.attention > 0) & (soon > 0)
+    ratio = np.log(soon[both] / seen.attention[both])
     assert np.abs(np.median(ratio)) < 0.05
 
 

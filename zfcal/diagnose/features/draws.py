@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +15,7 @@ from scipy.stats.qmc import LatinHypercube
 from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
 from zfcal.model.extended import without_effects
-from zfcal.model.features import AWAY_M, SOON, Seen
+from zfcal.model.features import AWAY_M, Seen
 from zfcal.model.histories import (
     ago_heading,
     courses,
@@ -51,6 +54,8 @@ from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters
 from zfcal.units import HEADING_MIN_STEP_M
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -220,13 +225,15 @@ def _seen(
         distance = np.linalg.norm(away, axis=-1)
         return away / np.maximum(distance, 1e-9)[..., None], distance
 
+    # Where positions are exact there is one draw, and what is asked of it again and again is kept.
+    kept = cache if states is steps.scene.states else _as_it_is
     here = theirs(ZONE, at) > 0
     now_x, now_y = theirs(X, at), theirs(Y, at)
     then_x, then_y = theirs(X, before), theirs(Y, before)
     bearing, distance = to(now_x, now_y)
     present = here[..., None]
 
-    def a_while_ago(share: float) -> Floats:
+    def shortly_ago(share: float) -> Floats:
         """Return where the base law draws to, by where all were some of a step before."""
         x, y = (1 - share) * now_x + share * then_x, (1 - share) * now_y + share * then_y
         way, away_m = to(x, y)
@@ -236,19 +243,21 @@ def _seen(
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
     toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
-    _, soon_angle = perceive(states, at, turns.who, SOON, cos_fov, False)
-    _, half_angle = perceive(states, at, turns.who, 0.5, cos_fov, False)
-    late, late_angle = perceive(states, at, turns.who, 1.0, cos_fov, False)
-    older, older_angle = perceive(states, at, turns.who, 2.0, cos_fov, False)
+    # Where all were and no more of the states, which would be kept as long as what was seen is.
+    places = np.ascontiguousarray(states[:, : ZONE + 1])
+
+    def sight(steps_ago: float) -> tuple[Floats, Floats]:
+        late, angle = perceive(places, at, turns.who, steps_ago, cos_fov, False)
+        return late[rows, others], steps.alpha[:, None] * angle[rows, others]
 
     def ago(steps: float) -> Floats:
         made = np.empty_like(toward)
-        head_late(states, at, turns.who, steps, 0.0, False, toward, made)
+        head_late(places, at, turns.who, steps, 0.0, False, toward, made)
         return np.asarray(made[rows, others])
 
     def then(steps: float) -> Floats:
         made = np.empty_like(toward)
-        head_late(states, at, turns.who, steps, REPULSION_M, True, toward, made)
+        head_late(places, at, turns.who, steps, REPULSION_M, True, toward, made)
         return np.asarray(made[rows, others])
 
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
@@ -262,14 +271,8 @@ def _seen(
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
-        soon_toward=a_while_ago(SOON),
-        half_toward=a_while_ago(0.5),
-        late_toward=late[rows, others],
-        older_toward=older[rows, others],
-        soon_attention=steps.alpha[:, None] * soon_angle[rows, others],
-        half_attention=steps.alpha[:, None] * half_angle[rows, others],
-        late_attention=steps.alpha[:, None] * late_angle[rows, others],
-        older_attention=steps.alpha[:, None] * older_angle[rows, others],
+        shortly_ago_toward=kept(shortly_ago),
+        sight_ago=kept(sight),
         ago_toward=ago,
         then_toward=then,
         bearing=bearing * present,
@@ -293,7 +296,7 @@ def _seen(
         zone=turns.zone,
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
-        last_speed_m_s=own[:, SPEED],
+        last_speed_m_s=own[:, SPEED].copy(),  # All of `own` would be kept with a view.
         last_turn_rad=turned,
         ago_heading=ago_heading(states, at, turns.who),
         recent_turn_rad=recent_turn(states, at, turns.who),
@@ -306,18 +309,28 @@ def _seen(
     )
 
 
+def _as_it_is(function: Callable[[float], T]) -> Callable[[float], T]:
+    return function
+
+
 def _turned_back(seen: Seen, back: Floats) -> Seen:
     """Return what was seen with all directions turned, so that headings are the measured ones."""
     b = back[:, None]
+    # Not those of `seen`, all of which would be kept as long as these are.
+    ago, then = seen.ago_toward, seen.then_toward
+    shortly_ago, sight = seen.shortly_ago_toward, seen.sight_ago
+
+    def sight_turned(steps: float) -> tuple[Floats, Floats]:
+        toward, attention = sight(steps)
+        return turned_by(toward, b), attention
+
     return replace(
         seen,
         toward=turned_by(seen.toward, b),
-        soon_toward=turned_by(seen.soon_toward, b),
-        half_toward=turned_by(seen.half_toward, b),
-        late_toward=turned_by(seen.late_toward, b),
-        older_toward=turned_by(seen.older_toward, b),
-        ago_toward=lambda steps: turned_by(seen.ago_toward(steps), b),
-        then_toward=lambda steps: turned_by(seen.then_toward(steps), b),
+        shortly_ago_toward=lambda share: turned_by(shortly_ago(share), b),
+        sight_ago=sight_turned,
+        ago_toward=lambda steps: turned_by(ago(steps), b),
+        then_toward=lambda steps: turned_by(then(steps), b),
         bearing=turned_by(seen.bearing, b),
         heading=turned_by(seen.heading, b),
         course=turned_by(seen.course, b),

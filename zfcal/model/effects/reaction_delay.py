@@ -12,7 +12,7 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import needs_neighbour
-from zfcal.model.features import LAGS, Component, Feature, OneOf, Seen, Weights
+from zfcal.model.features import LAGS, SOON, Component, Feature, OneOf, Seen, Weights
 from zfcal.model.kernels.hats import hats_where
 
 
@@ -104,7 +104,7 @@ def _soon(
 _FAR_SOON = Component(
     label="a tenth of a step, sight, far ones",
     toward="soon_toward",
-    weights=lambda seen: seen.soon_attention[..., None] * _far(seen),
+    weights=lambda seen: seen.sight_ago(SOON)[1][..., None] * _far(seen),
     instead=lambda seen: seen.attention[..., None] * _far(seen),
     high=1.0,
 )
@@ -114,7 +114,7 @@ _FAR_LATER = replace(
     _FAR_SOON,
     label="half a step, sight, far ones",
     toward="half_toward",
-    weights=lambda seen: seen.half_attention[..., None] * _far(seen),
+    weights=lambda seen: seen.sight_ago(0.5)[1][..., None] * _far(seen),
 )
 
 
@@ -129,14 +129,23 @@ def _beyond(reach_m: float, lag: Literal["half a step", "a step"]) -> Component:
         return (seen.here & (seen.distance_m > reach_m))[..., None].astype(np.float64)
 
     def late(seen: Seen) -> Floats:
-        return (seen.half_attention if is_half else seen.late_attention)[..., None] * far(seen)
+        return seen.sight_ago(0.5 if is_half else 1.0)[1][..., None] * far(seen)
 
     return Component(
         label=f"{lag}, sight, beyond {reach_m:g} m",
-        toward="half_toward" if is_half else lambda seen: seen.late_toward,
+        toward="half_toward" if is_half else lambda seen: seen.sight_ago(1.0)[0],
         weights=late,
         instead=lambda seen: seen.attention[..., None] * far(seen),
         high=1.0,
+    )
+
+
+def _in_sight(word: str, steps: float) -> Component:
+    """Return that whom the fish sees, and where, is late by some steps."""
+    return _late(
+        f"{word}, sight",
+        lambda seen: seen.sight_ago(steps)[0],
+        lambda seen: seen.sight_ago(steps)[1],
     )
 
 
@@ -160,9 +169,9 @@ _ALL_SOON = _soon("near ones too", _all, "soon_ago_toward")
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", "soon_toward", lambda seen: seen.attention, 3.0),
     _late("half a step", "half_toward", lambda seen: seen.attention),
-    _late("half a step, sight", "half_toward", lambda seen: seen.half_attention),
-    _late("a step, sight", lambda seen: seen.late_toward, lambda seen: seen.late_attention),
-    _late("two steps, sight", lambda seen: seen.older_toward, lambda seen: seen.older_attention),
+    _late("half a step, sight", "half_toward", lambda seen: seen.sight_ago(0.5)[1]),
+    _in_sight("a step", 1.0),
+    _in_sight("two steps", 2.0),
     *map(_ago, LAGS),
     *map(_of_all_ago, _QUICK),
     _ALL_SOON,

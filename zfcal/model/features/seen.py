@@ -29,20 +29,18 @@ class Seen:
     ----------
     attention : ndarray, shape (step, other)
         alpha times the solid angle at which each other agent is seen; 0 for who is not seen.
-    toward, soon_toward, half_toward : ndarray, shape (step, other, 2)
-        Where the base law draws to, away from who is too near: now, where the other was a tenth of
-        a step before, and half a step. Zeros for who is not there.
-    late_toward, older_toward : ndarray, shape (step, other, 2)
-        The same of whom the fish would have seen, had all others been where they were a step
-        before, and two.
-    soon_attention, half_attention, late_attention, older_attention : ndarray, shape (step, other)
-        Likewise, had all others been where they were a tenth of a step before, half a step, one and
-        two.
+    toward : ndarray, shape (step, other, 2)
+        Where the base law draws to, away from who is too near. Zeros for who is not there.
+    shortly_ago_toward
+        Of a share of a step: the same, by where the others were that much of a step before.
+    sight_ago
+        Of a number of steps: ``toward`` and ``attention`` of whom the fish would have seen, had all
+        others been where they were so many steps before.
     ago_toward, then_toward
         Of a number of steps: where the others were so many steps before, seen or not, shape
         (step, other, 2). From where the fish is, and away from there for who is too near now; and
-        from where it was itself, near ones as they are now. Worked out whenever they are asked for:
-        kept they would be a third of all.
+        from where it was itself, near ones as they are now. What was long ago, or a moment, is
+        worked out whenever it is asked for: kept it would be half of all.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
@@ -89,14 +87,8 @@ class Seen:
 
     attention: Floats
     toward: Floats
-    soon_toward: Floats
-    half_toward: Floats
-    late_toward: Floats
-    older_toward: Floats
-    soon_attention: Floats
-    half_attention: Floats
-    late_attention: Floats
-    older_attention: Floats
+    shortly_ago_toward: Callable[[float], Floats]
+    sight_ago: Callable[[float], tuple[Floats, Floats]]
     ago_toward: Callable[[float], Floats]
     then_toward: Callable[[float], Floats]
     bearing: Floats
@@ -144,6 +136,16 @@ class Seen:
     def nearest(self) -> Floats:
         """One for the nearest other one, else 0, shape (step, other, 1)."""
         return self.chosen(-self.distance_m, self.here)
+
+    @property
+    def soon_toward(self) -> Floats:
+        """Where the base law draws to, by where the others were a tenth of a step before."""
+        return self.shortly_ago_toward(SOON)
+
+    @property
+    def half_toward(self) -> Floats:
+        """Where the base law draws to, by where the others were half a step before."""
+        return self.shortly_ago_toward(0.5)
 
     @property
     def soon_ago_toward(self) -> Floats:
