@@ -7,6 +7,7 @@ in ``benchmarks/results`` and ``docs``. The day is measured with ``--day``, and 
     .venv/bin/python benchmarks/speed/bench_long.py --day
     .venv/bin/python benchmarks/speed/bench_long.py --before ../older-checkout
 
+The commands are those of the installed package if that is this checkout.
 With an older checkout every command is run by it as well, in turn, and what both have
 made is compared byte by byte.
 """
@@ -70,7 +71,7 @@ TINY = (Length(name="three minutes at 15 Hz", duration="3min", fps=15, imported=
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tree:
-    """A checkout whose commands can be run.
+    """A checkout whose commands can be run, or what is installed.
 
     Parameters
     ----------
@@ -85,10 +86,20 @@ class Tree:
     limit_s: int | None = None
 
     @classmethod
-    def installed(cls, folder: Path) -> Tree:
-        """Take what is installed: its kernels are compiled already, as a user's are."""
+    def here(cls, folder: Path) -> Tree:
+        """Take what is installed if it is this checkout: its kernels are compiled, as a user's are.
+
+        Where it is another one, or none, this checkout is laid out.
+        """
+        source = "import pathlib, zfcal; print(pathlib.Path(zfcal.__file__).resolve().parents[1])"
         folder.mkdir()
-        return cls(path=folder)
+        found = subprocess.run(
+            [sys.executable, "-c", source], cwd=folder, capture_output=True, text=True, check=False
+        )
+        if found.stdout.strip() == str(ROOT):
+            return cls(path=folder)
+        folder.rmdir()
+        return cls.of(ROOT, folder)
 
     @classmethod
     def of(cls, checkout: Path, folder: Path, limit_s: int | None = None) -> Tree:
@@ -207,7 +218,7 @@ def measure(lengths: Sequence[Length], before: Path | None, results: Path) -> di
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder) / "tree-now"
         if before is None:
-            trees = {"now": Tree.installed(here)}
+            trees = {"now": Tree.here(here)}
         else:
             older = Tree.of(before, Path(folder) / "tree-before", LIMIT_S)
             trees = {"before": older, "now": Tree.of(ROOT, here)}

@@ -25,6 +25,15 @@ def test_the_benchmark_of_long_trials_runs(tiny):
         assert f"| {row['command']} | " in text
 
 
+def test_a_checkout_is_laid_out_or_found_installed(script, repository, tmp_path):
+    """Its commands run in either; only the one that is laid out lies in the folder."""
+    tree = script("speed.bench_long").Tree
+    laid_out, installed = tree.of(repository, tmp_path / "of"), tree.here(tmp_path / "here")
+    assert all(each.run("check", "--help")["wall_s"] > 0 for each in (laid_out, installed))
+    assert (tmp_path / "of" / "zfcal_cli" / "main.py").exists()
+    assert list(installed.path.iterdir()) == []
+
+
 @pytest.mark.slow
 def test_the_roofline_runs(tiny):
     """The bound is below what the kernel takes."""

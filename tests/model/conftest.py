@@ -83,10 +83,6 @@ def seen():
         angle = rng.uniform(-np.pi, np.pi, shape)
         return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
-    def sight():
-        soon, half, late, older = rng.uniform(0.1, 2.0, (4, n, others))
-        return late, older, soon, half
-
     robot = np.zeros((n, others), dtype=bool)
     robot[:, -1] = True
     ago, then = (dict(zip(LAGS, each, strict=True)) for each in ways(2, len(LAGS), n, others))
@@ -97,13 +93,10 @@ def seen():
         shortly_ago_toward=dict(zip((SOON, 0.5), ways(2, n, others), strict=True)).__getitem__,
         ago_toward=ago.__getitem__,
         then_toward=then.__getitem__,
-        sight_ago=dict(
-            zip(
-                (1.0, 2.0, SOON, 0.5),
-                zip([*ways(2, n, others)] * 2, sight(), strict=True),
-                strict=True,
-            )
-        ).__getitem__,
+        sight_ago={1.0: ways(n, others), 2.0: ways(n, others)}.__getitem__,
+        attention_ago={
+            steps: rng.uniform(0.1, 2.0, (n, others)) for steps in (SOON, 0.5, 1.0, 2.0)
+        }.__getitem__,
         bearing=ways(n, others),
         distance_m=rng.uniform(0.03, 0.5, (n, others)),
         off_axis_rad=rng.uniform(0, np.pi, (n, others)),

@@ -127,7 +127,7 @@ def test_who_is_not_there_has_no_weight(arena, seen):
         here=none.astype(bool),
         is_robot=none.astype(bool),
         attention=none,
-        sight_ago=lambda _steps: (seen.toward, none),
+        attention_ago=lambda _steps: none,
         distance_m=none + AWAY_M,
     )
     for name in ("alignment", "interaction-range", "reaction-delay", "robot-avoidance"):
@@ -860,7 +860,7 @@ def test_tenths_of_a_step_count_for_those_that_are_not_next_to_the_fish(arena, s
     for label in ("", ", by who", ", by the zone", ", by the time", ", by the last turn"):
         sight = labelled("reaction-delay", f"a tenth of a step, sight, far ones{label}", arena)
         assert not sight.weights(near).any()
-        np.testing.assert_allclose(sight.weights(far).sum(axis=-1), seen.sight_ago(0.1)[1])
+        np.testing.assert_allclose(sight.weights(far).sum(axis=-1), seen.attention_ago(0.1))
         np.testing.assert_allclose(sight.instead(far).sum(axis=-1), seen.attention)
     by_zone = labelled("reaction-delay", "a tenth of a step, far ones, by the zone", arena)
     np.testing.assert_allclose(

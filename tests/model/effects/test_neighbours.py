@@ -230,8 +230,8 @@ def test_fish_keep_away_from_the_robot(swim, bearings, flight):
 
 
 @pytest.mark.parametrize("reach_m", [0.06, 0.1, 0.14, 0.2])
-@pytest.mark.parametrize(("lag", "late"), [("half a step", "half"), ("a step", "late")])
-def test_those_beyond_a_distance_are_late_and_all_others_are_not(seen, reach_m, lag, late):
+@pytest.mark.parametrize(("lag", "steps"), [("half a step", 0.5), ("a step", 1.0)])
+def test_those_beyond_a_distance_are_late_and_all_others_are_not(seen, reach_m, lag, steps):
     """What is seen late takes the place of what is seen at once, of far ones alone."""
     (choice,) = (
         each
@@ -244,7 +244,8 @@ def test_those_beyond_a_distance_are_late_and_all_others_are_not(seen, reach_m, 
     far = seen.distance_m > reach_m
     assert far.any()
     assert not far.all()
-    assert own.weights(seen)[..., 0] == pytest.approx(far * getattr(seen, f"{late}_attention"))
+    assert own.weights(seen)[..., 0] == pytest.approx(far * seen.attention_ago(steps))
     assert own.instead(seen)[..., 0] == pytest.approx(far * seen.attention)
     toward = own.toward(seen) if callable(own.toward) else getattr(seen, own.toward)
-    np.testing.assert_array_equal(toward, getattr(seen, f"{late}_toward"))
+    late = seen.half_toward if steps < 1 else seen.sight_ago(steps)
+    np.testing.assert_array_equal(toward, late)

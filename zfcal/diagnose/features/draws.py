@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +53,6 @@ from zfcal.model.tank import tank_of
 from zfcal.model.views import View, view_of
 from zfcal.parameters import Parameters
 from zfcal.units import HEADING_MIN_STEP_M
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -220,8 +217,11 @@ def _seen(
     def theirs(row: int, when: NDArray[np.int64]) -> Floats:
         return np.asarray(states[when[:, None], row, others])
 
+    # What is kept by functions of the past holds as little as it can: neither `own` nor `states`.
+    own_xy, places = own[:, [X, Y]], np.ascontiguousarray(states[:, : ZONE + 1])
+
     def to(when_x: Floats, when_y: Floats) -> tuple[Floats, Floats]:
-        away = np.stack([when_x - own[:, X, None], when_y - own[:, Y, None]], axis=-1)
+        away = np.stack([when_x - own_xy[:, :1], when_y - own_xy[:, 1:]], axis=-1)
         distance = np.linalg.norm(away, axis=-1)
         return away / np.maximum(distance, 1e-9)[..., None], distance
 
@@ -243,12 +243,13 @@ def _seen(
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
     toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
-    # Where all were and no more of the states, which would be kept as long as what was seen is.
-    places = np.ascontiguousarray(states[:, : ZONE + 1])
 
-    def sight(steps_ago: float) -> tuple[Floats, Floats]:
-        late, angle = perceive(places, at, turns.who, steps_ago, cos_fov, False)
-        return late[rows, others], steps.alpha[:, None] * angle[rows, others]
+    def sight_ago(ago: float) -> Floats:
+        return np.asarray(perceive(places, at, turns.who, ago, cos_fov, False)[0][rows, others])
+
+    def attention_ago(ago: float) -> Floats:
+        _, angle = perceive(places, at, turns.who, ago, cos_fov, False)
+        return np.asarray(steps.alpha[:, None] * angle[rows, others])
 
     def ago(steps: float) -> Floats:
         made = np.empty_like(toward)
@@ -272,7 +273,8 @@ def _seen(
         attention=steps.alpha[:, None] * angle[rows, others],
         toward=toward[rows, others],
         shortly_ago_toward=kept(shortly_ago),
-        sight_ago=kept(sight),
+        sight_ago=kept(sight_ago),
+        attention_ago=cache(attention_ago),  # It is asked most, and is half as large.
         ago_toward=ago,
         then_toward=then,
         bearing=bearing * present,
@@ -291,12 +293,12 @@ def _seen(
         x_axis=np.broadcast_to((1.0, 0.0), heading.shape),
         along_wall=own[:, [TAU_X, TAU_Y]],
         way_out=np.where(own[:, [ROOM]] > 0, own[:, [MOUTH_X, MOUTH_Y]], 0.0),
-        xy_m=own[:, [X, Y]],
+        xy_m=own_xy,
         follows_walls=steps.follows,
         zone=turns.zone,
         track=turns.track,
         own_speed_m_s=turns.speed_m_s,
-        last_speed_m_s=own[:, SPEED].copy(),  # All of `own` would be kept with a view.
+        last_speed_m_s=own[:, SPEED].copy(),  # A view would keep all of `own`.
         last_turn_rad=turned,
         ago_heading=ago_heading(states, at, turns.who),
         recent_turn_rad=recent_turn(states, at, turns.who),
@@ -309,26 +311,22 @@ def _seen(
     )
 
 
-def _as_it_is(function: Callable[[float], T]) -> Callable[[float], T]:
+def _as_it_is(function: Callable[[float], Floats]) -> Callable[[float], Floats]:
+    """Return a function that works out anew whatever it is asked."""
     return function
 
 
 def _turned_back(seen: Seen, back: Floats) -> Seen:
     """Return what was seen with all directions turned, so that headings are the measured ones."""
     b = back[:, None]
-    # Not those of `seen`, all of which would be kept as long as these are.
+    # Functions of `seen` itself would keep all of it.
     ago, then = seen.ago_toward, seen.then_toward
-    shortly_ago, sight = seen.shortly_ago_toward, seen.sight_ago
-
-    def sight_turned(steps: float) -> tuple[Floats, Floats]:
-        toward, attention = sight(steps)
-        return turned_by(toward, b), attention
-
+    shortly_ago, sight_ago = seen.shortly_ago_toward, seen.sight_ago
     return replace(
         seen,
         toward=turned_by(seen.toward, b),
         shortly_ago_toward=lambda share: turned_by(shortly_ago(share), b),
-        sight_ago=sight_turned,
+        sight_ago=lambda steps: turned_by(sight_ago(steps), b),
         ago_toward=lambda steps: turned_by(ago(steps), b),
         then_toward=lambda steps: turned_by(then(steps), b),
         bearing=turned_by(seen.bearing, b),

@@ -104,7 +104,7 @@ def _soon(
 _FAR_SOON = Component(
     label="a tenth of a step, sight, far ones",
     toward="soon_toward",
-    weights=lambda seen: seen.sight_ago(SOON)[1][..., None] * _far(seen),
+    weights=lambda seen: seen.attention_ago(SOON)[..., None] * _far(seen),
     instead=lambda seen: seen.attention[..., None] * _far(seen),
     high=1.0,
 )
@@ -114,7 +114,7 @@ _FAR_LATER = replace(
     _FAR_SOON,
     label="half a step, sight, far ones",
     toward="half_toward",
-    weights=lambda seen: seen.sight_ago(0.5)[1][..., None] * _far(seen),
+    weights=lambda seen: seen.attention_ago(0.5)[..., None] * _far(seen),
 )
 
 
@@ -129,11 +129,11 @@ def _beyond(reach_m: float, lag: Literal["half a step", "a step"]) -> Component:
         return (seen.here & (seen.distance_m > reach_m))[..., None].astype(np.float64)
 
     def late(seen: Seen) -> Floats:
-        return seen.sight_ago(0.5 if is_half else 1.0)[1][..., None] * far(seen)
+        return seen.attention_ago(0.5 if is_half else 1.0)[..., None] * far(seen)
 
     return Component(
         label=f"{lag}, sight, beyond {reach_m:g} m",
-        toward="half_toward" if is_half else lambda seen: seen.sight_ago(1.0)[0],
+        toward="half_toward" if is_half else lambda seen: seen.sight_ago(1.0),
         weights=late,
         instead=lambda seen: seen.attention[..., None] * far(seen),
         high=1.0,
@@ -144,8 +144,8 @@ def _in_sight(word: str, steps: float) -> Component:
     """Return that whom the fish sees, and where, is late by some steps."""
     return _late(
         f"{word}, sight",
-        lambda seen: seen.sight_ago(steps)[0],
-        lambda seen: seen.sight_ago(steps)[1],
+        lambda seen: seen.sight_ago(steps),
+        lambda seen: seen.attention_ago(steps),
     )
 
 
@@ -169,7 +169,7 @@ _ALL_SOON = _soon("near ones too", _all, "soon_ago_toward")
 _FEATURES: tuple[Feature, ...] = (
     _late("a tenth of a step", "soon_toward", lambda seen: seen.attention, 3.0),
     _late("half a step", "half_toward", lambda seen: seen.attention),
-    _late("half a step, sight", "half_toward", lambda seen: seen.sight_ago(0.5)[1]),
+    _late("half a step, sight", "half_toward", lambda seen: seen.attention_ago(0.5)),
     _in_sight("a step", 1.0),
     _in_sight("two steps", 2.0),
     *map(_ago, LAGS),

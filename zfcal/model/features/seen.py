@@ -32,15 +32,17 @@ class Seen:
     toward : ndarray, shape (step, other, 2)
         Where the base law draws to, away from who is too near. Zeros for who is not there.
     shortly_ago_toward
-        Of a share of a step: the same, by where the others were that much of a step before.
-    sight_ago
+        Of a share of a step: where the base law draws to, away from who is too near, by where the
+        others were that much of a step before, shape (step, other, 2).
+    sight_ago, attention_ago
         Of a number of steps: ``toward`` and ``attention`` of whom the fish would have seen, had all
-        others been where they were so many steps before.
+        others been where they were so many steps before, shape (step, other, 2) and (step, other).
     ago_toward, then_toward
         Of a number of steps: where the others were so many steps before, seen or not, shape
         (step, other, 2). From where the fish is, and away from there for who is too near now; and
-        from where it was itself, near ones as they are now. What was long ago, or a moment, is
-        worked out whenever it is asked for: kept it would be half of all.
+        from where it was itself, near ones as they are now. These are worked out whenever they
+        are asked for, and so are those above where positions err: kept they would be half of all.
+        What all five return is not to be written to.
     bearing : ndarray, shape (step, other, 2)
         To the other.
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
@@ -88,7 +90,8 @@ class Seen:
     attention: Floats
     toward: Floats
     shortly_ago_toward: Callable[[float], Floats]
-    sight_ago: Callable[[float], tuple[Floats, Floats]]
+    sight_ago: Callable[[float], Floats]
+    attention_ago: Callable[[float], Floats]
     ago_toward: Callable[[float], Floats]
     then_toward: Callable[[float], Floats]
     bearing: Floats
@@ -139,12 +142,12 @@ class Seen:
 
     @property
     def soon_toward(self) -> Floats:
-        """Where the base law draws to, by where the others were a tenth of a step before."""
+        """See ``shortly_ago_toward``: a tenth of a step before."""
         return self.shortly_ago_toward(SOON)
 
     @property
     def half_toward(self) -> Floats:
-        """Where the base law draws to, by where the others were half a step before."""
+        """See ``shortly_ago_toward``: half a step before."""
         return self.shortly_ago_toward(0.5)
 
     @property
