@@ -238,13 +238,7 @@ STORIES = (
         parts=(("docs/figures.md", None), ("docs/statistics.md", "Where D says little")),
         prepare=days,
         before=f"zfcal analyse trial day1 day2 day3 && zfcal calibrate trial {QUICK}",
-        changes=(
-            ("--publish score", f"--publish score {QUICK} --force"),
-            (
-                "diagnose trial --width double --format pdf",
-                "diagnose trial --quick --width double --format pdf",
-            ),
-        ),
+        changes=(("--publish score", f"--publish score {QUICK} --force"),),
     ),
     Story(
         name="python",
