@@ -41,7 +41,8 @@ class Seen:
         Of a number of steps: where the others were so many steps before, seen or not, shape
         (step, other, 2). From where the fish is, and away from there for who is too near now; and
         from where it was itself, near ones as they are now. These are worked out whenever they
-        are asked for, and so are those above where positions err: kept they would be half of all.
+        are asked for, and so are directions above where positions err: kept they would be half of
+        all.
         What all five return is not to be written to.
     bearing : ndarray, shape (step, other, 2)
         To the other.
