@@ -34,6 +34,14 @@ def test_a_checkout_is_laid_out_or_found_installed(script, repository, tmp_path)
     assert list(installed.path.iterdir()) == []
 
 
+def test_where_another_checkout_is_installed_this_one_is_laid_out(script, tmp_path, monkeypatch):
+    """So that no other program is timed in its name."""
+    bench = script("speed.bench_long")
+    monkeypatch.setattr(bench, "ROOT", tmp_path / "elsewhere")
+    found = bench.Tree.here(tmp_path / "here")
+    assert (found.path / "zfcal").readlink() == tmp_path / "elsewhere" / "zfcal"
+
+
 @pytest.mark.slow
 def test_the_roofline_runs(tiny):
     """The bound is below what the kernel takes."""
