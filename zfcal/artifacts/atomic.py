@@ -16,7 +16,8 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-from zfcal.artifacts.reading.contents import check_contents, forget_content, open_to_write
+from zfcal.artifacts.reading.contents import check_contents, forget_content
+from zfcal.artifacts.reading.opening import open_to_write
 from zfcal.artifacts.reading.places import check_inside, way_back
 from zfcal.errors import StorageError, TakenError
 

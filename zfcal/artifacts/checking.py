@@ -24,7 +24,8 @@ from zfcal.artifacts.lineage import Lineage, package_version, read_lineage
 from zfcal.artifacts.machine import check_computer
 from zfcal.artifacts.mcap_files import overview
 from zfcal.artifacts.models import read_model, read_model_for
-from zfcal.artifacts.reading.contents import hash_of, open_regular, unreadable
+from zfcal.artifacts.reading.contents import hash_of
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.artifacts.reading.places import check_inside, is_regular
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import (

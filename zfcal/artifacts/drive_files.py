@@ -25,7 +25,8 @@ from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, to_json
 from zfcal.artifacts.mcap_files import Overview, read_messages
 from zfcal.artifacts.pose_files import LIBRARY
-from zfcal.artifacts.reading.contents import numbered_of, open_to_write
+from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.reading.opening import open_to_write
 from zfcal.artifacts.reading.parsing import json_of
 from zfcal.artifacts.reading.places import check_inside
 from zfcal.errors import DamagedError, InputError

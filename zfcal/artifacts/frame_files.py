@@ -30,8 +30,9 @@ from mcap_protobuf.schema import register_schema
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage, package_version
 from zfcal.artifacts.mcap_files import BROKEN, Overview, read_messages, records_of
-from zfcal.artifacts.reading.contents import numbered_of, open_regular, unreadable
+from zfcal.artifacts.reading.contents import numbered_of
 from zfcal.artifacts.reading.limits import CHUNK_BYTES, largest
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.artifacts.reading.pixels import check_pixels
 from zfcal.artifacts.reading.places import check_inside
 from zfcal.errors import DamagedError, InputError

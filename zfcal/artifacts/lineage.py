@@ -17,7 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias, Union
 
-from zfcal.artifacts.reading.contents import open_regular, read_limited, unreadable
+from zfcal.artifacts.reading.opening import open_regular, read_limited, unreadable
 from zfcal.artifacts.reading.parsing import json_of, toml_of
 from zfcal.errors import DamagedError, InputError
 

@@ -21,8 +21,8 @@ from mcap.exceptions import EndOfFile, McapError, UnsupportedCompressionError
 from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from zfcal.artifacts.reading.contents import open_regular, unreadable
 from zfcal.artifacts.reading.limits import CHUNK_BYTES, largest
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.errors import DamagedError
 
 BROKEN = (

@@ -19,7 +19,8 @@ from zfcal.arena import Arena
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage
 from zfcal.artifacts.pose_messages import as_json, as_poses, as_scene, from_json, register
-from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of, open_to_write
+from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of
+from zfcal.artifacts.reading.opening import open_to_write
 from zfcal.artifacts.reading.places import check_inside
 from zfcal.artifacts.tailing import Tail
 from zfcal.errors import DamagedError, InputError

@@ -17,8 +17,9 @@ from zfcal.artifacts.arrays import numbers_of
 from zfcal.artifacts.atomic import write_whole
 from zfcal.artifacts.columns import TABLE_SCHEMAS, form_of, make_table, problem_of
 from zfcal.artifacts.lineage import JSON, LINEAGE_KEY, Lineage, first_line, to_json
-from zfcal.artifacts.reading.contents import open_regular, read_bytes, unreadable
+from zfcal.artifacts.reading.contents import read_bytes
 from zfcal.artifacts.reading.limits import TABLE_BYTES, TABLE_ROWS, largest, too_large
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.artifacts.reading.parsing import json_of
 from zfcal.errors import DamagedError, InputError, SchemaError
 from zfcal.tracks import KINDS, Tracks

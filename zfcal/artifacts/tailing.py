@@ -16,8 +16,8 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata
 
 from zfcal.artifacts.mcap_files import BROKEN, unpacked
-from zfcal.artifacts.reading.contents import open_regular, unreadable
 from zfcal.artifacts.reading.limits import CHUNK_BYTES, check_size, largest
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.errors import DamagedError
 
 _MAGIC = b"\x89MCAP0\r\n"

@@ -16,7 +16,7 @@ from typing import TypeAlias, final
 
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import first_line
-from zfcal.artifacts.reading.contents import open_regular
+from zfcal.artifacts.reading.opening import open_regular
 from zfcal.artifacts.reading.places import check_inside
 from zfcal.stages.segments import STEP_S
 from zfcal.trial import CONFIG_NAME, second_of

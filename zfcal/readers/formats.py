@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from zfcal.artifacts.reading.contents import open_regular, unreadable
 from zfcal.artifacts.reading.limits import check_size
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported
 from zfcal.readers.cats import read_cats

@@ -19,7 +19,8 @@ from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
 from zfcal.artifacts.models import read_model_for, read_result
-from zfcal.artifacts.reading.contents import numbered_of, open_regular
+from zfcal.artifacts.reading.contents import numbered_of
+from zfcal.artifacts.reading.opening import open_regular
 from zfcal.artifacts.segments import read_segment, segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import FOLLOWING, RULES, SCORES, STATS, read_extra, read_table

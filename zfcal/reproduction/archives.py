@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from zfcal.artifacts.atomic import write_bytes_whole
-from zfcal.artifacts.reading.contents import read_limited
+from zfcal.artifacts.reading.opening import read_limited
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError

@@ -19,7 +19,7 @@ from zfcal.artifacts.arenas import (
 from zfcal.artifacts.atomic import write_text_whole
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import read_model_for, write_model
-from zfcal.artifacts.reading.contents import read_limited
+from zfcal.artifacts.reading.opening import read_limited
 from zfcal.artifacts.reading.places import is_regular
 from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.errors import InputError, ZfcalError

@@ -16,8 +16,9 @@ from typing import final
 from zfcal.arena import Arena
 from zfcal.artifacts.freshness import hash_inputs
 from zfcal.artifacts.lineage import JSON
-from zfcal.artifacts.reading.contents import hash_of, one_content, open_regular, unreadable
+from zfcal.artifacts.reading.contents import hash_of, one_content
 from zfcal.artifacts.reading.limits import check_size
+from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.artifacts.segments import read_segment, segment_name, segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.behaviour.located import Located, locate

@@ -14,10 +14,10 @@ from zfcal.artifacts.reading.contents import (
     hash_of,
     hold_steady,
     one_content,
-    open_regular,
     read_bytes,
     sha256_of,
 )
+from zfcal.artifacts.reading.opening import open_regular
 from zfcal.artifacts.settings import read_trial, write_trial
 from zfcal.errors import ChangedError, InputError
 from zfcal.trial import Trial

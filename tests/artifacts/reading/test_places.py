@@ -9,7 +9,8 @@ import pytest
 from zfcal.artifacts.atomic import append_bytes, write_bytes_whole
 from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.lock import lock
-from zfcal.artifacts.reading.contents import numbered_of, open_regular, open_to_write, read_bytes
+from zfcal.artifacts.reading.contents import numbered_of, read_bytes
+from zfcal.artifacts.reading.opening import open_regular, open_to_write
 from zfcal.artifacts.reading.places import numbered, way_back
 from zfcal.errors import InputError, StorageError
 

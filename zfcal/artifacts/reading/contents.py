@@ -1,7 +1,4 @@
-"""Reading files of a trial: regular ones only, and each with one content for one piece of work.
-
-A file that a symbolic link leads out of its trial is not opened (`places`), and one that is
-too large is not read (`limits`).
+"""What files of a trial hold: each has one content for one piece of work.
 
 An artifact states the SHA-256 of what it was made from. That is the hash of the bytes that
 were read, not of those that lie there later: within `one_content` every look at a file,
@@ -13,9 +10,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import io
 import os
-import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,8 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, final
 
-from zfcal.artifacts.reading.limits import check_size, most_bytes, too_large
-from zfcal.artifacts.reading.places import KINDS, check_inside, numbered, way_back
+from zfcal.artifacts.reading.opening import open_regular, read_limited, unreadable
+from zfcal.artifacts.reading.places import numbered
 from zfcal.errors import ChangedError, InputError
 
 Looks: TypeAlias = tuple[int, ...]
@@ -33,10 +28,6 @@ Looks: TypeAlias = tuple[int, ...]
 
 _HASHES: dict[Looks, tuple[Looks, str]] = {}
 """For each inode what its file looked like when it was hashed, and the hash."""
-
-_NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-_NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
-"""How a link is refused and a pipe keeps nobody waiting; Windows has neither flags nor need."""
 
 _TICK_NS = 50_000_000
 """Files are stamped by a clock that ticks every few milliseconds. Two contents that are written
@@ -208,77 +199,6 @@ def forget_content(path: Path) -> None:
         seen.forget(path)
 
 
-def open_regular(path: Path) -> io.BufferedReader:
-    """Open a regular file for reading; a pipe, a device or a folder keeps nobody waiting.
-
-    Raises
-    ------
-    OSError
-        It is missing, no regular file, lies outside the trial that its path names, or
-        cannot be opened; see `unreadable`.
-    """
-    descriptor = _descriptor(path, os.O_RDONLY)
-    return os.fdopen(descriptor, "rb")
-
-
-def open_to_write(path: Path, *, append: bool = False) -> io.BufferedWriter:
-    """Open a file of a trial that grows in its place: a new one, or one that is a regular file.
-
-    Parameters
-    ----------
-    path
-        Its place. A symbolic link there is refused: what it leads to is another file.
-    append
-        Whether what is there stays.
-
-    Raises
-    ------
-    OSError
-        The place cannot be written, is no regular file, or lies outside the trial.
-    """
-    how = os.O_APPEND if append else os.O_TRUNC
-    descriptor = _descriptor(path, os.O_WRONLY | os.O_CREAT | _NO_FOLLOW | how)
-    return os.fdopen(descriptor, "ab" if append else "wb")
-
-
-def _descriptor(path: Path, flags: int) -> int:
-    if "\0" in str(path):
-        raise OSError(errno.EINVAL, "a name cannot hold a zero byte", str(path))
-    check_inside(path)
-    descriptor = os.open(path, flags | _NO_WAIT, 0o666)
-    kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
-    if kind != stat.S_IFREG:
-        os.close(descriptor)
-        number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
-        text = f"expected a regular file, got {KINDS.get(kind, 'something else')}"
-        raise OSError(number, text, str(path))
-    if _NO_WAIT and hasattr(os, "set_blocking"):
-        os.set_blocking(descriptor, True)
-    return descriptor
-
-
-def read_limited(path: Path) -> bytes:
-    """Return what a regular file holds, unless that is more than a file of its kind may have.
-
-    Nothing is noted of it: see `read_bytes`.
-
-    Raises
-    ------
-    OSError
-        As `open_regular`.
-    DamagedError
-        It is too large.
-    """
-    most = most_bytes(path)
-    with open_regular(path) as file:
-        size = os.fstat(file.fileno()).st_size
-        check_size(path, size)
-        data = file.read(most + 1)
-    if len(data) > most:
-        raise too_large(path, len(data), most)
-    return data
-
-
 def read_bytes(path: Path) -> bytes:
     """Return what a regular file holds, all at once; the hash of these very bytes is noted.
 
@@ -367,16 +287,6 @@ def sha256_of(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(path, error) from error
-
-
-def unreadable(path: Path, error: OSError) -> InputError:
-    """Return the error for a file that cannot be opened for reading."""
-    if isinstance(error, FileNotFoundError):
-        return InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
-    hint = "Check that it is a file, and its permissions."
-    if error.errno == errno.EXDEV:
-        hint = way_back(path)
-    return InputError(f"{path}: cannot be read ({error.strerror or error}).", hint=hint)
 
 
 def looks_of(path: Path | str) -> Looks | None:

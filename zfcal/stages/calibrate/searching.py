@@ -13,7 +13,7 @@ from pathlib import Path
 from zfcal.artifacts.atomic import append_bytes, check_free, write_bytes_whole
 from zfcal.artifacts.lineage import JSON, Lineage, to_json
 from zfcal.artifacts.machine import cores
-from zfcal.artifacts.reading.contents import read_limited
+from zfcal.artifacts.reading.opening import read_limited
 from zfcal.calibrate.baselines import random_search, unchanged
 from zfcal.calibrate.checkpoint import from_bytes, to_bytes
 from zfcal.calibrate.pace import Deadline

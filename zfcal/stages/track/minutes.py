@@ -12,7 +12,8 @@ from typing import TypeAlias, final
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
-from zfcal.artifacts.reading.contents import check_contents, numbered_of, open_regular
+from zfcal.artifacts.reading.contents import check_contents, numbered_of
+from zfcal.artifacts.reading.opening import open_regular
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
