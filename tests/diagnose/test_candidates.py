@@ -209,6 +209,7 @@ def test_no_response_is_later_than_it_can_be(scene_of):
         ("interaction-range", "attention", "BY_DISTANCE", None),
         ("crowding", "company, by how many are near", "BY_NEAREST", (0.03, 0.1, 0.25)),
         ("group-cohesion", "drawn to each", "BY_NEAREST", None),
+        ("fatigue", find_effect("fatigue").paces[0].label, "BY_TIME", None),
     ],
 )
 def test_a_curve_goes_by_what_a_feature_does(candidate, scene_of, name, label, cue, knots):

@@ -182,6 +182,41 @@ def test_bold_fish_that_swim_into_the_open_have_that_form(question):
     assert effect.strength["spread"] == pytest.approx(0.7, abs=0.3)
 
 
+@pytest.mark.parametrize(
+    ("clear", "tried"),
+    [
+        ([4.0, 3.0, 2.1, 1.9, 0.5], [4.0, 3.0, 2.1]),
+        ([9.0, 8.0, 7.0, 6.0, 5.6, 5.5, 5.4], [9.0, 8.0, 7.0, 6.0, 5.6, 5.5]),
+        ([-0.4, -0.5], [-0.4]),
+    ],
+)
+def test_forms_that_say_little_are_not_put_into_the_model(monkeypatch, clear, tried):
+    """Those within reach of the clearest are, six at most; the one that is worth most is taken."""
+    effect = find_effect("directional-drift")
+    scores = [
+        SimpleNamespace(
+            clearness=own,
+            candidate=SimpleNamespace(effect=effect, shape={effect.fixed[0]: float(n)}),
+        )
+        for n, own in enumerate(clear)
+    ]
+    fitted = []
+
+    def refit(_screen, score, n_workers):
+        assert n_workers >= 1
+        fitted.append(score.clearness)
+        return SimpleNamespace(worth=-score.clearness, nats=0.0, gain=np.zeros(9))
+
+    monkeypatch.setattr(common, "further_forms", lambda *_: [])
+    monkeypatch.setattr(common, "ask_all", lambda *_: scores[::-1])
+    monkeypatch.setattr(common, "refit", refit)
+    monkeypatch.setattr(common, "curved", lambda *_: None)
+    case = SimpleNamespace(listed=(), generic=(), scene=None, question=SimpleNamespace(n_workers=1))
+    _, best = common.in_the_model(case, None, gain(effect.name, np.zeros(9)))
+    assert fitted == tried
+    assert best.clearness == tried[-1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("direction_rad", [2.0, 2.0 - math.pi])
 def test_of_a_direction_and_its_opposite_the_right_one_is_fitted(question, direction_rad):

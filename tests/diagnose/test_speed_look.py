@@ -14,6 +14,7 @@ from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.speed_look import gone_given, speed_look
 from zfcal.model.effects import find_effect
+from zfcal.model.kernels.curves import BY_TIME
 
 LIT = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach_m": 0.35}}
 
@@ -57,6 +58,19 @@ def test_crowding_in_a_lit_room_is_named(case):
     shy = LIT | {"crowding": {"per_neighbour": 0.1, "radius_m": 0.35}}
     names = [each.choice.best.name for each in speed_look(case(shy, seed=40), nothing()).steps]
     assert names == ["crowding"]
+
+
+@pytest.mark.slow
+def test_speeds_that_sag_and_recover_are_fatigue(case):
+    """They are as fast at the end as at the beginning: the form goes by the time, as a curve."""
+    ends = {"by": 1.0, "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}
+    sag = {"per_hour": 0.0, "usual_at_s": 300.0, "more_1": 2.0, "more_3": -2.0}
+    (step,) = speed_look(case({"fatigue": ends | sag}), nothing()).steps
+    assert step.choice.best.name == "fatigue"
+    values = step.choice.best.values
+    assert values["by"] == BY_TIME
+    assert values["more_1"] > 0.5
+    assert values["more_3"] < -0.5
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from zfcal.diagnose.confirming import holds
 from zfcal.diagnose.naming import SURE, Choice, Refit, refit
 from zfcal.diagnose.null import from_replicates, run_null, theory
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import LEAST_NATS, LEVEL, Asked, Best, Step, best_of
+from zfcal.diagnose.selection import IN_REACH, LEAST_NATS, LEVEL, Asked, Best, Step, best_of
 from zfcal.diagnose.steadiness import MINUTES_S, has_pulses, is_steady
 from zfcal.model.effects import Effect
 
@@ -28,10 +28,6 @@ _RIVALS = 3
 
 _CLEAR_Z = 6.0
 """An effect beyond the list is named on clearer evidence than a listed one."""
-
-_IN_REACH = 0.5
-"""Share of the clearest one's standard errors below which another one is not put into the model:
-it would have to gain four times what its score promises."""
 
 _REPLICATES = 8
 
@@ -149,7 +145,7 @@ class Unfeatured:
         if not ranked:
             return None
         n_workers = self.case.question.n_workers
-        near = [best for best in ranked if abs(best.z) >= _IN_REACH * abs(ranked[0].z)][:_RIVALS]
+        near = [best for best in ranked if abs(best.z) >= IN_REACH * abs(ranked[0].z)][:_RIVALS]
         made = [refit(screen, best.score, n_workers=n_workers) for best in near]
         for k in np.argsort([-each.worth for each in made]):
             step = Step(choice=Choice(best=made[k]), best=near[k], before=screen)

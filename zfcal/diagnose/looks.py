@@ -20,7 +20,7 @@ from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import LEVEL, Best, Step
+from zfcal.diagnose.selection import IN_REACH, LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
@@ -32,7 +32,8 @@ BY_ITSELF = 4.0
 bears it out and something is left."""
 
 _FORMS = 6
-"""Forms of an effect, the clearest ones, that are put into the model to see which gains most."""
+"""Forms of an effect, the clearest ones, that are put into the model to see which gains most; those
+alone that are within reach of the clearest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -270,7 +271,8 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -each.clearness):
         forms.setdefault(form_of(score.candidate), score)
-    tried = list(forms.values())[:_FORMS]
+    first, *others = list(forms.values())[:_FORMS]
+    tried = [first, *(o for o in others if o.clearness >= IN_REACH * first.clearness)]
     # Side by side: each by itself leaves workers idle between its steps.
     n_workers = case.question.n_workers
     with ThreadPoolExecutor(n_workers) as pool:

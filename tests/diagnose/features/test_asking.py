@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 from zfcal.artifacts.arenas import load_arena
 from zfcal.diagnose.features.asking import _absorbed, _askable, _one, fits_beside, gains_of
 from zfcal.diagnose.features.curves import redrawn
-from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEVEL

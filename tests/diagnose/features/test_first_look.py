@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.features.first_look import FirstLook, basis_of, off, thinned
-from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.model.effects import all_effects, find_effect
 from zfcal.model.effects.circumstances import by_circumstances

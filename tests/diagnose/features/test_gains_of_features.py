@@ -12,7 +12,8 @@ from scipy.stats import chi2, ncx2
 from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
 from zfcal.diagnose.features.climbing import climb, climb_within
 from zfcal.diagnose.features.false_gains import ByNoise
-from zfcal.diagnose.features.gains import Fits, Gain
+from zfcal.diagnose.features.fits import Fits
+from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import answer, best_by_name, tell, tried
 from zfcal.model.effects import all_effects, find_effect
@@ -67,6 +68,46 @@ def test_nothing_is_gained_where_nothing_is_missing(base):
     assert tell(found) is None
     assert {each.name for each in found} == {e.name for e in all_effects() if not e.on_speed}
     assert -10 < best_by_name(found)[0].nats < 6
+
+
+def test_what_promises_less_than_it_costs_is_not_fitted(nothing, monkeypatch):
+    """A first look says so; it counts as tried, and is fitted where it is asked for by its kind."""
+    effect = find_effect("turning-memory")
+    single = [
+        each
+        for each in effect.features(nothing.law.scene.arena)
+        if not isinstance(each, (OneOf, Sharper))
+    ]
+    promised = {each.label: nothing.first_look.nats(each) for each in single}
+    idle = {label for label, nats in promised.items() if nats < 0}
+    assert idle
+    fitted = []
+    fit = Fits.fit
+
+    def noted(fits, feature):
+        fitted.append(feature.label)
+        return fit(fits, feature)
+
+    monkeypatch.setattr(Fits, "fit", noted)
+    found = {each.label: each for each in gains_of(nothing.law, [effect])}
+    assert set(promised) <= set(found)
+    assert not idle & set(fitted)
+    assert set(promised) - idle <= set(fitted)
+    assert all(not found[label].log_p.any() for label in idle)
+    assert {found[label].n_strengths for label in idle} == {1}
+    fitted.clear()
+    one = min(promised, key=promised.__getitem__)
+    (alone,) = gains_of(nothing.law, [effect], kinds={(effect.name, one)})
+    assert one in fitted
+    assert alone.log_p.any()
+
+
+def test_what_is_not_fitted_has_to_make_up_for_another_law(nothing):
+    """As what is fitted has: the base alone is likelier by that law."""
+    beyond = nothing.null_log_p + 0.01
+    fits = replace(nothing, beyond=beyond)
+    (feature, *_) = find_effect("turning-memory").features(nothing.law.scene.arena)
+    assert fits.nothing("turning-memory", feature).log_p == pytest.approx(-0.01)
 
 
 @pytest.mark.slow

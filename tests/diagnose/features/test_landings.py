@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from zfcal.diagnose.features.asking import fits_beside, gains_of
-from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import tell

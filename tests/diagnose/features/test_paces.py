@@ -97,6 +97,17 @@ def test_fish_that_are_slow_in_turns_are_no_crowd_given_the_turn(nothing, change
         assert (left < 0.2 * alone) is is_gone
 
 
+def test_a_second_neighbour_may_count_for_all_others(nothing, changed):
+    """Fish that are slower in company of more than one: yet another changes nothing."""
+    near = nothing.swum.here * np.exp(-0.5 * (nothing.swum.distance_m / 0.1) ** 2)
+    times = np.ones(len(nothing.scene.moves))
+    times[nothing.rows] = np.where(near.sum(axis=1) > 1.5, 0.85, 1.0)
+    found = pace_gains(changed(times), [find_effect("crowding")])
+    nats = {each.label: each.nats for each in found}
+    assert nats["company, few or many"] > 1.3 * nats["number"] > 10
+    assert nats["company, few or many"] > 1.3 * nats["the nearest"]
+
+
 def late(paces):
     """Slower for the last third of the recording."""
     return np.where(paces.swum.time > 0.65, 0.85, 1.0)

@@ -9,7 +9,8 @@ from dataclasses import replace
 from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
-from zfcal.diagnose.features.gains import Fits, Gain
+from zfcal.diagnose.features.fits import Fits
+from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
@@ -52,7 +53,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     effects
         Those without features are left out.
     kinds
-        Names and kinds of those that are asked for; None for all.
+        Names and kinds of those that are asked for, each of which is fitted; None for all, of which
+        those that promise more than their strengths cost are.
     beside
         Effects that are there: whatever form they have, what they explain is not asked.
     beyond : ndarray, shape (step,), optional
@@ -72,7 +74,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     ]
     fits.prepare([feature for _, feature in asked])
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
-        found = list(pool.map(lambda pair: _gains(fits, *pair), asked))
+        fit_all = kinds is not None
+        found = list(pool.map(lambda pair: _gains(fits, *pair, fit_all=fit_all), asked))
         # One fish has nobody to follow: then a feature of who is who has no strength at all.
         some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
         hopeful = _hopeful([gain for _, gain in some])
@@ -128,7 +131,7 @@ def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
     """Return the feature of an effect that gains most; None where none can be fitted."""
     asked = _askable(fits.law, effect)
     fits.prepare(asked)
-    found = [pair for feature in asked for pair in _gains(fits, effect.name, feature)]
+    found = [pair for each in asked for pair in _gains(fits, effect.name, each, fit_all=True)]
     some = [pair for pair in found if pair[1].n_strengths]
     best = max(some, key=lambda pair: pair[1].nats, default=None)
     if best is not None and isinstance(best[0], Landing) and not fits.off_walls:
@@ -234,10 +237,13 @@ def kind_of(feature: Feature) -> str:
     return feature.kind if isinstance(feature, OneOf) else feature.label
 
 
-def _gains(fits: Fits, name: str, feature: Feature) -> list[tuple[Single, Gain]]:
+def _gains(
+    fits: Fits, name: str, feature: Feature, *, fit_all: bool = False
+) -> list[tuple[Single, Gain]]:
     """Return a feature, or the most promising of several, with what they add."""
     if not isinstance(feature, OneOf):
-        return [(feature, fits.gain(name, feature))]
+        is_fitted = fit_all or fits.may_gain(feature)
+        return [(feature, (fits.gain if is_fitted else fits.nothing)(name, feature))]
     chosen = fits.most_promising(feature)
     if not chosen:
         # It counts as one that was asked for.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from zfcal.arrays import Floats, Ints
 from zfcal.diagnose.features.asking import best_feature, fits_beside
 from zfcal.diagnose.features.climbing import Fit
-from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.screening import Screen

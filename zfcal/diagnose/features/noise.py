@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from zfcal.diagnose.features.gains import Fits
+from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import DRAWS, Law
 from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene

@@ -28,6 +28,8 @@ def speed(state, sight, n, i, parameters, chance):  # type: ignore[no-untyped-de
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
 _NEAR_M = (0.0, 0.08, 0.25)
 _COMPANY_M = 0.1
+_COMPANY = (0.0, 1.0, 2.0, 4.0)
+"""Others nearby: the first one may count, and a third one no more."""
 
 
 def _number(swum: Swum) -> Floats:
@@ -39,6 +41,10 @@ def _number(swum: Swum) -> Floats:
 def _company(swum: Swum) -> Floats:
     near = swum.here * np.exp(-0.5 * (swum.distance_m / _COMPANY_M) ** 2)
     return np.asarray(near.sum(axis=1, keepdims=True))
+
+
+def _few_or_many(swum: Swum) -> Floats:
+    return hats(_company(swum)[:, 0], _COMPANY)[:, 1:]
 
 
 def _spread_by_nearest(swum: Swum) -> Floats:
@@ -92,6 +98,7 @@ EFFECT = Effect(
     paces=(
         Pace(label="number", weights=_number),
         *paces_by(Pace(label="company", weights=_company), "who", "the time"),
+        Pace(label="company, few or many", weights=_few_or_many),
         Pace(label="the nearest", weights=_nearest),
         Pace(label="somebody ahead", weights=_ahead),
         Spread(label="slow and fast ones, by how many are near", weights=_company),

@@ -54,7 +54,7 @@ EFFECT = Effect(
     per_hour=True,
     shown_against="time",
     paces=(
-        Pace(label="time", weights=_by_time),
+        Pace(label="speed, by the time", weights=_by_time),
         *paces_by(Pace(label="steadily", weights=lambda swum: swum.time[:, None]), "who"),
     ),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -123,6 +124,12 @@ _Asked: TypeAlias = tuple[Floats, shapely.Polygon | None]
 
 def _features(arena: Arena) -> tuple[Feature, ...]:
     """Return features of places all over the tank, felt everywhere or in their own room."""
+    return _of_tank(arena.outline.wkb, arena)
+
+
+@lru_cache(maxsize=8)
+def _of_tank(_outline: bytes, arena: Arena) -> tuple[Feature, ...]:
+    """Return them, looked for once: a diagnosis asks for them again and again."""
     x_min, y_min, x_max, y_max = arena.outline.bounds
     spots = [
         np.array([x, y])
