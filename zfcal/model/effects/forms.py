@@ -180,6 +180,8 @@ def nearest_seen(state: Hooked, sight: Hooked, n: int, i: int) -> int:
 def seen_by_rank(state: Hooked, sight: Hooked, n: int, i: int, rank: float) -> int:
     """Return who is so many-th nearest, from one on, of those that agent i sees; -1 for nobody."""
     found, last, last_j = -1, -1.0, -1
+    if rank >= n:  # There are not so many others, whoever is in sight.
+        return -1
     for _ in range(int(rank)):
         found, least = -1, math.inf
         for j in range(n):

@@ -1,4 +1,8 @@
-"""What effects say of measured states: components, rotations, factors, speeds."""
+"""What effects say of measured states: components, rotations, factors, speeds.
+
+What asks effects is compiled without reference counts (`lean`). The arrays of a model travel in a
+tuple, and each of a million calls counted all of them: a call took 260 ns, and takes 23.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
-from zfcal.model.kernels.compiled import inlined, kernel
+from zfcal.model.kernels.compiled import inlined, kernel, lean
 from zfcal.model.kernels.hooks import (
     call_component,
     call_factor,
@@ -37,8 +41,16 @@ def attend(
     angle_sr, changed : ndarray, shape (step, agent)
         Given, and received.
     """
+    _attend(states, at, who, packed, angle_sr, changed, np.zeros(states.shape[2] ** 2))
+
+
+@lean
+def _attend(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, changed: Floats,
+    row: Floats,
+) -> None:  # fmt: skip
+    """Do that; ``row`` is zeros, for what agents see."""
     n = states.shape[2]
-    row = np.zeros(n * n)
     for s in range(at.size):
         i = who[s]
         for j in range(n):
@@ -71,8 +83,17 @@ def ask_components(
     parts : ndarray, shape (step, component, PART)
         Receives weight, unit vector and kappa; weight 0 where there is none.
     """
+    row, out = np.zeros(states.shape[2] ** 2), np.zeros(3)
+    _ask_components(states, at, who, packed, angle_sr, parts, row, out)
+
+
+@lean
+def _ask_components(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, parts: Floats,
+    row: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """Do that; ``row`` is zeros for what agents see, ``out`` for a unit vector and kappa."""
     n = states.shape[2]
-    row, out = np.zeros(n * n), np.zeros(3)
     for s in range(at.size):
         i = who[s]
         for j in range(n):
@@ -103,8 +124,16 @@ def ask_rotations(
         Of the model: those that turn the base's directions, or all.
     angle : ndarray, shape (step,)
     """
+    _ask_rotations(states, at, who, packed, hooks, angle_sr, angle, np.zeros(states.shape[2] ** 2))
+
+
+@lean
+def _ask_rotations(
+    states: Floats, at: Ints, who: Ints, packed: Packed, hooks: Ints, angle_sr: Floats,
+    angle: Floats, row: Floats,
+) -> None:  # fmt: skip
+    """Do that; ``row`` is zeros, for what agents see."""
     n = states.shape[2]
-    row = np.zeros(n * n)
     for s in range(at.size):
         i, angle[s] = who[s], 0.0
         for j in range(n):
@@ -162,11 +191,26 @@ def ask_factors(
     tilt_taken : ndarray, shape (step,)
         At the heading taken.
     """
-    n, cells = states.shape[2], share.shape[1]
-    row, own = np.zeros(n * n), np.zeros(packed.factors.shape[0], dtype=np.int64)
+    cells = share.shape[1]
+    row, own = np.zeros(states.shape[2] ** 2), np.zeros(packed.factors.shape[0], dtype=np.int64)
     gx, gy = np.empty(cells), np.empty(cells)
     for g in range(cells):
         gx[g], gy[g] = math.cos(2 * math.pi * g / cells), math.sin(2 * math.pi * g / cells)
+    _ask_factors(
+        states, at, who, packed, angle_sr, taken, speed_m_s, landing, share, probability, tilt,
+        tilt_taken, (row, own, gx, gy),
+    )  # fmt: skip
+
+
+@lean
+def _ask_factors(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, taken: Floats,
+    speed_m_s: Floats, landing: Ints, share: NDArray[np.uint8], probability: Floats,
+    tilt: Floats, tilt_taken: Floats, work: tuple[Floats, Ints, Floats, Floats],
+) -> None:  # fmt: skip
+    """Do that; ``work`` holds zeros for what agents see and for addresses, and the headings."""
+    n, cells = states.shape[2], share.shape[1]
+    row, own, gx, gy = work
     for s in range(at.size):
         i = who[s]
         for j in range(n):
@@ -250,12 +294,28 @@ def ask_harmonics(
     log_taken : ndarray, shape (step,)
         At the heading taken.
     """
-    n, points = states.shape[2], waves.shape[1]
-    row, own = np.zeros(n * n), np.zeros(packed.factors.shape[0], dtype=np.int64)
+    points = waves.shape[1]
+    row, own = np.zeros(states.shape[2] ** 2), np.zeros(packed.factors.shape[0], dtype=np.int64)
     gx, gy = np.empty(points), np.empty(points)
     for p in range(points):
         gx[p], gy[p] = math.cos(2 * math.pi * p / points), math.sin(2 * math.pi * p / points)
-    value = np.empty(points)
+    _ask_harmonics(
+        states, at, who, packed, angle_sr, speed_m_s, by_landing, waves, zones,
+        (row, own, gx, gy, np.empty(points)),
+    )  # fmt: skip
+    for s in range(at.size):
+        log_taken[s] = _polynomial(waves[s], taken[s, 0], taken[s, 1]) + zones[s, landing[s] - 1]
+
+
+@lean
+def _ask_harmonics(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, speed_m_s: Floats,
+    by_landing: bool, waves: Floats, zones: Floats,
+    work: tuple[Floats, Ints, Floats, Floats, Floats],
+) -> None:  # fmt: skip
+    """Write these; ``work`` is as `_ask_factors` takes it, and the values at each heading."""
+    n, points = states.shape[2], waves.shape[1]
+    row, own, gx, gy, value = work
     for s in range(at.size):
         i = who[s]
         for j in range(n):
@@ -275,7 +335,6 @@ def ask_harmonics(
             for z in range(1, zones.shape[1]):
                 there = _log_factor(packed, own, state, row, i, (gx[0], gy[0]), speed_m_s[s], z + 1)
                 zones[s, z] = there - value[0]
-        log_taken[s] = _polynomial(waves[s], taken[s, 0], taken[s, 1]) + zones[s, landing[s] - 1]
         for j in range(n):
             row[i * n + j] = 0.0
 
@@ -291,8 +350,16 @@ def ask_speeds(
     factor : ndarray, shape (step,)
         As for a chance of just less than one: nobody is stopped.
     """
+    _ask_speeds(states, at, who, packed, angle_sr, factor, np.zeros(states.shape[2] ** 2))
+
+
+@lean
+def _ask_speeds(
+    states: Floats, at: Ints, who: Ints, packed: Packed, angle_sr: Floats, factor: Floats,
+    row: Floats,
+) -> None:  # fmt: skip
+    """Do that; ``row`` is zeros, for what agents see."""
     n = states.shape[2]
-    row = np.zeros(n * n)
     for s in range(at.size):
         i = who[s]
         for j in range(n):
