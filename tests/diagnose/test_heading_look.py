@@ -187,11 +187,12 @@ def test_bold_fish_that_swim_into_the_open_have_that_form(question):
     [
         ([4.0, 3.0, 2.1, 1.9, 0.5], [4.0, 3.0, 2.1]),
         ([9.0, 8.0, 7.0, 6.0, 5.6, 5.5, 5.4], [9.0, 8.0, 7.0, 6.0, 5.6, 5.5]),
-        ([-0.4, -0.5], [-0.4]),
+        ([1.9, 0.4, -0.5], [1.9, 0.4, -0.5]),
+        ([-0.4, -0.5], [-0.4, -0.5]),
     ],
 )
 def test_forms_that_say_little_are_not_put_into_the_model(monkeypatch, clear, tried):
-    """Those within reach of the clearest are, six at most; the one that is worth most is taken."""
+    """Beside a clear one those within reach of it are, six at most; that worth most is taken."""
     effect = find_effect("directional-drift")
     scores = [
         SimpleNamespace(

@@ -33,7 +33,7 @@ bears it out and something is left."""
 
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most; those
-alone that are within reach of the clearest."""
+alone that are within reach of the clearest, if that one is clear at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -271,8 +271,10 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
     forms: dict[tuple[float, ...], Score] = {}
     for score in sorted(scores, key=lambda each: -each.clearness):
         forms.setdefault(form_of(score.candidate), score)
-    first, *others = list(forms.values())[:_FORMS]
-    tried = [first, *(o for o in others if o.clearness >= IN_REACH * first.clearness)]
+    tried = list(forms.values())[:_FORMS]
+    if tried[0].clearness > SURE:
+        least = IN_REACH * tried[0].clearness
+        tried = [each for each in tried if each.clearness >= least]
     # Side by side: each by itself leaves workers idle between its steps.
     n_workers = case.question.n_workers
     with ThreadPoolExecutor(n_workers) as pool:

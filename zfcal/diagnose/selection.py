@@ -25,6 +25,7 @@ LEVEL = 0.02
 """Chance of a false alarm over the whole family."""
 
 MOST_EFFECTS = 4
+
 IN_REACH = 0.5
 """Share of the clearest one's standard errors below which another effect, or form of one, is not
 put into the model: it would have to gain four times what its score promises."""

@@ -67,6 +67,26 @@ def test_a_band_along_a_wall_is_a_place(banded):
     assert told.gain.nats > 2 * max(tilts)
 
 
+@pytest.mark.slow
+def test_a_landing_that_is_asked_for_is_fitted_beside_walls_too(banded):
+    """It promises nothing, and a clear one has all landings fitted anew."""
+    fits = Fits(law=banded, off_walls=True)
+    coupling = find_effect("speed-turn-coupling")
+    idle = next(
+        each
+        for each in coupling.features(banded.scene.arena)
+        if isinstance(each, Landing) and not fits.may_gain(each)
+    )
+    clear = ("place-preference", "landing at a wall")
+    kinds = {clear, (coupling.name, idle.label)}
+    found = gains_of(banded, [find_effect(clear[0]), coupling], kinds=kinds)
+    gains = {each.key: each for each in found}
+    assert gains[clear].nats > 20
+    made = gains[coupling.name, idle.label].log_p
+    assert made.any()
+    np.testing.assert_array_equal(made, fits.gain(coupling.name, idle).log_p)
+
+
 def test_its_strengths_are_those_of_the_band(banded):
     """About three nats up to 4 cm, next to nothing from 5 cm on."""
     fits = Fits(law=banded)

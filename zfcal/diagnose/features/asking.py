@@ -31,7 +31,7 @@ from zfcal.model.features import (
 _KEPT = 2
 """Fits that a law keeps: each holds some hundred megabytes of half an hour of five fish."""
 
-_IN_REACH = 0.5
+_NEAR_BEST = 0.5
 """Share of the nats of the best one below which a feature is not fitted anew."""
 
 
@@ -53,8 +53,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     effects
         Those without features are left out.
     kinds
-        Names and kinds of those that are asked for, each of which is fitted; None for all, of which
-        those that promise more than their strengths cost are.
+        Names and kinds of those that are asked for, fitted even if they promise nothing; None for
+        all. Of several of a kind none is fitted that promises nothing, either way.
     beside
         Effects that are there: whatever form they have, what they explain is not asked.
     beyond : ndarray, shape (step,), optional
@@ -73,20 +73,24 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         if kinds is None or (effect.name, kind_of(feature)) in kinds
     ]
     fits.prepare([feature for _, feature in asked])
+    fit_all = kinds is not None
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
-        fit_all = kinds is not None
         found = list(pool.map(lambda pair: _gains(fits, *pair, fit_all=fit_all), asked))
         # One fish has nobody to follow: then a feature of who is who has no strength at all.
         some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
         hopeful = _hopeful([gain for _, gain in some])
         if any(isinstance(feature, Landing) and gain in hopeful for feature, gain in some):
-            some = _off_walls(fits, asked, some)
+            some = _off_walls(fits, asked, some, fit_all=fit_all)
             hopeful = _hopeful([gain for _, gain in some])
         return list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
 
 
 def _off_walls(
-    fits: Fits, asked: Sequence[tuple[str, Feature]], found: Sequence[tuple[Single, Gain]]
+    fits: Fits,
+    asked: Sequence[tuple[str, Feature]],
+    found: Sequence[tuple[Single, Gain]],
+    *,
+    fit_all: bool,
 ) -> list[tuple[Single, Gain]]:
     """Return what was found, landings fitted beside what all walls have in common.
 
@@ -95,7 +99,7 @@ def _off_walls(
     beside = replace(fits, off_walls=True)
     landings = [pair for pair in asked if _is_landing(pair[1])]
     others = [pair for pair in found if not isinstance(pair[0], Landing)]
-    return others + [pair for each in landings for pair in _gains(beside, *each)]
+    return others + [pair for each in landings for pair in _gains(beside, *each, fit_all=fit_all)]
 
 
 def _is_landing(feature: Feature) -> bool:
@@ -115,7 +119,7 @@ def _hopeful(gains: Sequence[Gain]) -> list[Gain]:
     return [
         gain
         for gain in best
-        if gain.p * n_tried[gain.name] < LEVEL and gain.nats > _IN_REACH * most
+        if gain.p * n_tried[gain.name] < LEVEL and gain.nats > _NEAR_BEST * most
     ]
 
 
@@ -242,8 +246,8 @@ def _gains(
 ) -> list[tuple[Single, Gain]]:
     """Return a feature, or the most promising of several, with what they add."""
     if not isinstance(feature, OneOf):
-        is_fitted = fit_all or fits.may_gain(feature)
-        return [(feature, (fits.gain if is_fitted else fits.nothing)(name, feature))]
+        of = fits.gain if fit_all or fits.may_gain(feature) else fits.nothing
+        return [(feature, of(name, feature))]
     chosen = fits.most_promising(feature)
     if not chosen:
         # It counts as one that was asked for.

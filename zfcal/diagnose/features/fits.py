@@ -176,7 +176,10 @@ class Fits:
         return {}
 
     def may_gain(self, feature: Single) -> bool:
-        """Return whether a first look says that a feature is worth a fit."""
+        """Return whether a first look says that a feature is worth a fit.
+
+        One without any strength promises exactly nothing. It is fitted, and then left out.
+        """
         return not isinstance(feature, Choosable) or self.first_look.nats(feature) >= 0
 
     def nothing(self, name: str, feature: Single) -> Gain:

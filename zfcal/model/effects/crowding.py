@@ -29,7 +29,7 @@ _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
 _NEAR_M = (0.0, 0.08, 0.25)
 _COMPANY_M = 0.1
 _COMPANY = (0.0, 1.0, 2.0, 4.0)
-"""Others nearby: the first one may count, and a third one no more."""
+"""Others nearby: a second one, or a fourth, may count less than the first."""
 
 
 def _number(swum: Swum) -> Floats:
