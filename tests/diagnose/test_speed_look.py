@@ -13,6 +13,7 @@ from zfcal.diagnose.features.naming import Answer, Told
 from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.speed_look import gone_given, speed_look
+from zfcal.diagnose.steadiness import Course
 from zfcal.model.effects import find_effect
 from zfcal.model.kernels.curves import BY_TIME
 
@@ -50,6 +51,19 @@ def test_what_speeds_lack_is_named_one_after_the_other(case):
     assert steps[1].before is steps[0].choice.best.screen
     assert all(step.choice.ties == () for step in steps)
     assert speed_look(case(), nothing()).steps == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lasts", [True, False])
+def test_scores_of_a_form_say_that_it_is_there_all_the_time(case, monkeypatch, lasts):
+    """Where its features, which have another form, leave over what differs between moments."""
+    own = case({"crowding": {"per_neighbour": 0.3}})
+    monkeypatch.setattr(Course, "in_all_phases", False)
+    monkeypatch.setattr(looking, "is_there_always", lambda _score, _scene: lasts)
+    names = [each.choice.best.name for each in speed_look(own, nothing()).steps]
+    assert names == ["crowding"] * lasts
+    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
+    assert speed_look(own, nothing()).steps == ()
 
 
 @pytest.mark.slow

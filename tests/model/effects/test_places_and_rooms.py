@@ -61,6 +61,30 @@ def test_some_headings_are_drawn_to_a_place_or_from_it(ask):
     np.testing.assert_allclose(away[1], (0.0, -1.0, 5.0), atol=1e-12)
 
 
+@pytest.mark.parametrize("strength", [0.9, -0.9])
+def test_headings_may_be_likelier_that_end_at_a_place(ask, strength):
+    """A step of 4 cm from 10 cm away ends inside 7 cm ahead alone: e^s against one."""
+    place = {"x_m": 0.5, "y_m": 0.5, "reach_m": 0.08, "lands": 1.0}
+    asked = ask("place-preference", {"strength": strength, **place}, X=0.4, Y=0.5, DT_S=0.5)
+    ratio = asked.factor(0.0, speed=0.08) / asked.factor(math.pi, speed=0.08)
+    assert ratio == pytest.approx(math.exp(strength / (1 + (0.06 / 0.08) ** 8)), rel=0.02)
+    # A step along its edge keeps the distance; one of no length is nowhere else.
+    assert asked.factor(0.0, speed=0.0) == asked.factor(2.0, speed=0.0)
+
+
+def test_fish_stay_where_headings_are_likelier_to_end(swim):
+    """Share of time within 8 cm of a place: twice as much, and no more drawn from afar."""
+
+    def shares(strength):
+        place = {"x_m": 0.25, "y_m": 0.77, "reach_m": 0.08, "lands": 1.0}
+        xy, _ = swim("place-preference", {"strength": strength, **place})
+        away = np.linalg.norm(xy - (0.25, 0.77), axis=-1)
+        return (away < 0.08).mean()
+
+    assert shares(1.5) > 1.5 * shares(0.0)
+    assert shares(-1.5) < shares(0.0) / 1.5
+
+
 def test_just_after_another_left_a_fish_heads_for_the_way_out(ask):
     """Toward the mouth against away from it: e^(2 s) at once, e^s after the memory's length."""
     asked = ask(

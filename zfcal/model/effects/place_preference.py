@@ -17,14 +17,21 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.circumstances import by_circumstances
-from zfcal.model.effects.forms import RAD_PER_STRENGTH, of_base, sine_to, tilt, turn_to
+from zfcal.model.effects.forms import (
+    RAD_PER_STRENGTH,
+    beyond,
+    of_base,
+    sine_to,
+    tilt,
+    turn_to,
+)
 from zfcal.model.effects.weights import LEANING_OUT, aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
-from zfcal.model.kernels.state import FOLLOWS, X, Y
+from zfcal.model.kernels.state import DT_S, FOLLOWS, X, Y
 from zfcal.model.kernels.ways_to import write_ways_to
 from zfcal.model.places import places
 
@@ -50,8 +57,15 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the bearing of the place; far from it less, and at it not at all."""
+    """Weigh headings by the bearing of the place, or by whether they end within its reach.
+
+    Far from the place less, and at it not at all.
+    """
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    if parameters[7] > 0.0:
+        step_m = speed * state[DT_S * n + i]
+        dx, dy = dx - step_m * ux, dy - step_m * uy
+        return tilt(parameters[0], 1.0 - beyond(math.sqrt(dx * dx + dy * dy), parameters[3]), 1.0)
     away = math.sqrt(dx * dx + dy * dy)
     if not away > 0.0 or (parameters[4] > 0.0 and not parameters[6] > 0.0):
         return 1.0
@@ -113,9 +127,13 @@ _TO_WALL = Along(cue="distance to the wall (m)", knots=_LANDS_M[:-1])
 _SPOT_M = (0.0, 0.04, 0.07, 0.1, 0.15)
 
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)
-"""Of the way to the next of these places."""
+_CLOSELY = (-0.4, -0.2, 0.0, 0.2, 0.4)
+"""Of the way to the next of these places; those in which steps end have edges."""
 
 _KAPPA = 3.0
+
+_SHELTER_M, _SHELTERS = 0.08, 36
+"""Reach of a place in which headings end, as it is first asked for, and how many places are."""
 
 
 _Asked: TypeAlias = tuple[Floats, shapely.Polygon | None]
@@ -143,13 +161,14 @@ def _of_tank(_outline: bytes, arena: Arena) -> tuple[Feature, ...]:
     asked += [(spot, room) for room in rooms for spot in spots if room.covers(shapely.Point(spot))]
     apart = np.array([x_max - x_min, y_max - y_min]) * (_UP_TO[1] - _UP_TO[0])
 
-    def near(asked_: _Asked) -> list[_Asked]:
+    def near(asked_: _Asked, shares: Sequence[float] = _BETWEEN) -> list[_Asked]:
         spot, room = asked_
         inside = arena.outline if room is None else room
-        spots = [spot + apart * (x, y) for x in _BETWEEN for y in _BETWEEN]
+        spots = [spot + apart * (x, y) for x in shares for y in shares]
         return [(each, room) for each in spots if inside.covers(shapely.Point(each))]
 
     places = [(each, near(each)) for each in asked]
+    closely = [[spot for spot, _ in near((each, None), _CLOSELY)] for each in spots]
     walls = [end for end in arena.segments_m if np.hypot(*(end[2:] - end[:2])) > _WALL_M]
     sorts = (
         ("drawn", _drawn),
@@ -158,10 +177,7 @@ def _of_tank(_outline: bytes, arena: Arena) -> tuple[Feature, ...]:
         ("turning", _turning),
         ("turning as a whole", _turning_as_a_whole),
     )
-    landings = (
-        ("landing at a wall", [_at_wall(wall) for wall in walls]),
-        ("landing at a place", [_at_spot(spot) for spot in spots]),
-    )
+    at_walls = [_at_wall(wall) for wall in walls]
     return (
         *(_of_sort(kind, sort, places) for kind, sort in sorts),
         OneOf(
@@ -174,7 +190,12 @@ def _of_tank(_outline: bytes, arena: Arena) -> tuple[Feature, ...]:
                 ).features
             ],
         ),
-        *(OneOf(kind=kind, features=features) for kind, features in landings if features),
+        *((OneOf(kind="landing at a wall", features=at_walls),) if at_walls else ()),
+        OneOf(
+            kind="landing at a place",
+            features=[_at_spot(spot) for spot in spots],
+            near=lambda k: [_at_spot(spot) for spot in closely[k]],
+        ),
     )
 
 
@@ -345,6 +366,13 @@ EFFECT = Effect(
             "of the angle to it; along a wall they prefer the sense that is nearer to it. 2: so do "
             "the directions to neighbours and those along walls.",
         ),
+        EffectParameter(
+            name="lands",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: headings that end within reach of the place are likelier, as at a shelter.",
+        ),
     ),
     probe=0.01,
     component=component,
@@ -352,13 +380,20 @@ EFFECT = Effect(
     rotation=rotation,
     whole_rotation=whole_rotation,
     harmonics=1,
+    not_harmonic="lands",
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
-    further_shapes=lambda arena: tuple(
-        {"x_m": x, "y_m": y, **form}
-        for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
-        for x, y in places(arena)
+    further_shapes=lambda arena: (
+        *(
+            {"x_m": x, "y_m": y, **form}
+            for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
+            for x, y in places(arena)
+        ),
+        *(
+            {"x_m": x, "y_m": y, "lands": 1.0, "reach_m": _SHELTER_M}
+            for x, y in places(arena, _SHELTERS)
+        ),
     ),
-    fixed=("drawn", "turning"),
+    fixed=("drawn", "turning", "lands"),
     idle=lambda values: () if values["drawn"] > 0 and not values["turning"] > 0 else ("kappa",),
     needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     other_forms=("generic:heading:place",),
