@@ -1,5 +1,6 @@
 """Features name what the law of speeds lacks; rests have a law of their own."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import _looked
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Answer, Told
+from zfcal.diagnose.features.paces import Paces
 from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.speed_look import gone_given, speed_look
@@ -62,7 +64,11 @@ def test_scores_of_a_form_say_that_it_is_there_all_the_time(case, monkeypatch, l
     monkeypatch.setattr(looking, "is_there_always", lambda _score, _scene: lasts)
     names = [each.choice.best.name for each in speed_look(own, nothing()).steps]
     assert names == ["crowding"] * lasts
-    monkeypatch.setattr(looking, "gains_by_itself", lambda _form: False)
+    # A form of less than what features gain is no form of what they see.
+    told = looking.tell(looking.pace_gains(Paces(screen=own.screen), [find_effect("crowding")]))
+    more = dataclasses.replace(told, gain=dataclasses.replace(told.gain, log_p=told.gain.log_p + 1))
+    said = Answer(told=more)
+    monkeypatch.setattr(looking._Looks, "ask", lambda _self: said)
     assert speed_look(own, nothing()).steps == ()
 
 

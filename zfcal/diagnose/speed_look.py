@@ -150,7 +150,7 @@ class _Looks:
         """Return what features name as an effect in the model; None where nothing bears it out.
 
         Its form does, or an effect beyond the list that says the same in another form; and it is
-        there all the time. Features say so, or the scores of a form that gains more than chance:
+        there all the time. Features say so, or the scores of a form that gains as much as they do:
         features of another form than fish have it in leave over what differs between moments.
         """
         step = as_step(self.case, self.screen, told)
@@ -158,7 +158,8 @@ class _Looks:
             return None
         has_form, course = gains_by_itself(step.choice.best), self.paces.course(told.gain)
         if not (course.in_all_minutes and course.in_all_phases):
-            lasts = has_form and is_there_always(step.best.score, step.before.scene)
+            has_more = has_form and step.choice.best.nats >= told.gain.nats
+            lasts = has_more and is_there_always(step.best.score, step.before.scene)
             return step if lasts else None
         if has_form or is_other_form(guess, told):
             return step
