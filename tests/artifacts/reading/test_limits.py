@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import time
+import tracemalloc
 
 import lz4.frame
 import numpy as np
@@ -15,7 +16,7 @@ from mcap.records import Chunk
 
 from zfcal.artifacts import tables
 from zfcal.artifacts.mcap_files import records_of
-from zfcal.artifacts.reading import limits
+from zfcal.artifacts.reading import limits, opening
 from zfcal.artifacts.reading.contents import read_bytes
 from zfcal.artifacts.reading.limits import VARIABLE
 from zfcal.artifacts.reading.parsing import json_of, toml_of
@@ -42,6 +43,36 @@ def test_no_toml_ends_a_run(text, says):
     with pytest.raises(ValueError, match=says):
         toml_of(text)
     assert time.monotonic() - began_s < 10
+
+
+@pytest.mark.parametrize("later", [0, 1, 200_000, 3_000_000])
+def test_a_file_is_read_whole_and_sets_aside_what_it_holds(tmp_path, monkeypatch, later):
+    """Not the gigabyte that one of its kind may have; what is written meanwhile is read as well."""
+    path, begun = tmp_path / "file.parquet", b"b" * 1000
+    path.write_bytes(begun)
+
+    def grown(file, size):
+        with file.open("ab") as more:
+            more.write(b"m" * later)
+        limits.check_size(file, size)
+
+    monkeypatch.setattr(opening, "check_size", grown)
+    tracemalloc.start()
+    data = opening.read_limited(path)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert data == begun + b"m" * later
+    assert most < 3 * len(data) + 1_000_000
+
+
+def test_a_file_that_grows_too_large_is_refused(tmp_path, monkeypatch):
+    """Its size was checked before."""
+    path = tmp_path / "file.parquet"
+    path.write_bytes(b"b" * 1000)
+    monkeypatch.setattr(opening, "most_bytes", lambda _path: 999)
+    monkeypatch.setattr(opening, "check_size", lambda _path, _size: None)
+    with pytest.raises(DamagedError):
+        opening.read_limited(path)
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
 """How a link is refused and a pipe keeps nobody waiting; Windows has neither flags nor need."""
 
+_PIECE_BYTES = 2**16
+
 
 def open_regular(path: Path) -> io.BufferedReader:
     """Open a regular file for reading; a pipe, a device or a folder keeps nobody waiting.
@@ -86,7 +88,11 @@ def read_limited(path: Path) -> bytes:
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         check_size(path, size)
-        data = file.read(most + 1)
+        # Somebody may be writing on. Reading sets aside what it is asked for: not all it may have.
+        pieces = [file.read(size + 1)]
+        while pieces[-1] and sum(map(len, pieces)) <= most:
+            pieces.append(file.read(_PIECE_BYTES))
+    data = b"".join(pieces)
     if len(data) > most:
         raise too_large(path, len(data), most)
     return data
