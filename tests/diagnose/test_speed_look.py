@@ -1,6 +1,5 @@
 """Features name what the law of speeds lacks; rests have a law of their own."""
 
-import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,11 +10,9 @@ from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import _looked
 from zfcal.diagnose.features.gains import Gain
 from zfcal.diagnose.features.naming import Answer, Told
-from zfcal.diagnose.features.paces import Paces
 from zfcal.diagnose.looks import Found
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.speed_look import gone_given, speed_look
-from zfcal.diagnose.steadiness import Course
 from zfcal.model.effects import find_effect
 from zfcal.model.kernels.curves import BY_TIME
 
@@ -53,23 +50,6 @@ def test_what_speeds_lack_is_named_one_after_the_other(case):
     assert steps[1].before is steps[0].choice.best.screen
     assert all(step.choice.ties == () for step in steps)
     assert speed_look(case(), nothing()).steps == ()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("lasts", [True, False])
-def test_scores_of_a_form_say_that_it_is_there_all_the_time(case, monkeypatch, lasts):
-    """Where its features, which have another form, leave over what differs between moments."""
-    own = case({"crowding": {"per_neighbour": 0.3}})
-    monkeypatch.setattr(Course, "in_all_phases", False)
-    monkeypatch.setattr(looking, "is_there_always", lambda _score, _scene: lasts)
-    names = [each.choice.best.name for each in speed_look(own, nothing()).steps]
-    assert names == ["crowding"] * lasts
-    # A form of less than what features gain is no form of what they see.
-    told = looking.tell(looking.pace_gains(Paces(screen=own.screen), [find_effect("crowding")]))
-    more = dataclasses.replace(told, gain=dataclasses.replace(told.gain, log_p=told.gain.log_p + 1))
-    said = Answer(told=more)
-    monkeypatch.setattr(looking._Looks, "ask", lambda _self: said)
-    assert speed_look(own, nothing()).steps == ()
 
 
 @pytest.mark.slow

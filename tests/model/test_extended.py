@@ -71,6 +71,15 @@ HOOKS = {
         "rear-blind-zone": {"ignored": 0.7},
         "reaction-delay": {"delay_s": 0.4},
     },
+    "landing": {
+        "place-preference": {
+            "strength": 2.0,
+            "x_m": 0.24,
+            "y_m": 0.77,
+            "reach_m": 0.03,
+            "lands": 1.0,
+        }
+    },
 }
 
 
@@ -198,7 +207,7 @@ MIDDLE = [(0.22, 0.77), (0.26, 0.80), (0.17, 0.74)], [0.4, 2.0, -2.5]
 
 
 @pytest.mark.parametrize(
-    "name", ["none", "component", "factor", "sight", "rotation", "whole rotation"]
+    "name", ["none", "component", "factor", "sight", "rotation", "whole rotation", "landing"]
 )
 @pytest.mark.parametrize("degrees", [-100, -20, 25, 60, 150])
 def test_the_log_density_is_that_of_a_simulated_step(two_rooms, model, name, degrees):
@@ -388,6 +397,11 @@ FREE = {
     "factor": ("turning-bias", {"strength": 0.4}, "strength"),
     "sight": ("rear-blind-zone", {"ignored": 0.8}, "ignored"),
     "whole rotation": ("group-cohesion", {"weight": 3.0, "turning": 2.0}, "weight"),
+    "landing": (
+        "place-preference",
+        {"strength": 3.0, "x_m": 0.25, "y_m": 0.77, "reach_m": 0.08, "lands": 1.0},
+        "strength",
+    ),
     "strong factor": ("generic:heading:own-turn", {"strength": 9.0}, "strength"),
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,17 +164,28 @@ def candidates_of(
     return tuple(made)
 
 
-def further_forms(effect: Effect, scene: Scene) -> tuple[Candidate, ...]:
+def further_forms(
+    effect: Effect, scene: Scene, also: Sequence[Mapping[str, float]] = ()
+) -> tuple[Candidate, ...]:
     """Return an effect at the shapes in which features alone may find it.
 
     One that responds late may do so by half a step of the recording, by one, and so on, and to what
     was seen then from where the fish was itself. One that is about a certain agent is asked of fish
     that are the same from beginning to end.
+
+    Parameters
+    ----------
+    effect
+        It.
+    scene
+        Of the recording.
+    also
+        Shapes that its best feature says.
     """
     sure = _lasting_fish(scene)
     shapes = [
         shape
-        for shape in effect.further_shapes(scene.arena)
+        for shape in (*effect.further_shapes(scene.arena), *also)
         if "who" not in shape or shape["who"] in sure
     ]
     if effect.lag is not None:

@@ -265,7 +265,7 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
     a strength that goes by these as well.
     """
     own = [each for each in (*case.listed, *case.generic) if each.name == gain.name]
-    own += further_forms(find_effect(gain.name), case.scene)
+    own += further_forms(find_effect(gain.name), case.scene, gain.forms)
     asked = [side for each in own for side in both_sides(each)]
     scores = ask_all(screen, asked, case.question.n_workers)
     forms: dict[tuple[float, ...], Score] = {}

@@ -34,7 +34,7 @@ from zfcal.diagnose.looks import (
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import MOST_EFFECTS, Step
-from zfcal.diagnose.steadiness import Of, is_there_always
+from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
 
 
@@ -150,18 +150,13 @@ class _Looks:
         """Return what features name as an effect in the model; None where nothing bears it out.
 
         Its form does, or an effect beyond the list that says the same in another form; and it is
-        there all the time. Features say so, or the scores of a form that gains as much as they do:
-        features of another form than fish have it in leave over what differs between moments.
+        there all the time.
         """
-        step = as_step(self.case, self.screen, told)
-        if step is None:
-            return None
-        has_form, course = gains_by_itself(step.choice.best), self.paces.course(told.gain)
+        course = self.paces.course(told.gain)
         if not (course.in_all_minutes and course.in_all_phases):
-            has_more = has_form and step.choice.best.nats >= told.gain.nats
-            lasts = has_more and is_there_always(step.best.score, step.before.scene)
-            return step if lasts else None
-        if has_form or is_other_form(guess, told):
+            return None
+        step = as_step(self.case, self.screen, told)
+        if step is None or gains_by_itself(step.choice.best) or is_other_form(guess, told):
             return step
         return step if told.lead > BY_ITSELF or self._explains(told) else None
 

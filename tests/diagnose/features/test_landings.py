@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import tell
+from zfcal.diagnose.looks import in_the_model
+from zfcal.diagnose.screening import Screen
 from zfcal.model.effects import all_effects, find_effect
-from zfcal.model.extended import maximise, with_effect
+from zfcal.model.extended import maximise
 from zfcal.model.features import Landing, OneOf, Tilt
 from zfcal.model.kernels.landing import ANGLES
 
@@ -88,29 +91,28 @@ def test_a_landing_that_is_asked_for_is_fitted_beside_walls_too(banded):
 
 
 @pytest.mark.slow
-def test_a_shelter_between_the_places_that_are_tried_is_found(base, worlds):
+@pytest.mark.parametrize("middle", [(0.815, 0.145), (0.187, 0.599)])
+def test_a_shelter_between_the_places_that_are_tried_goes_into_the_model(base, worlds, middle):
     """A disc of 6 cm in which steps are likelier to end: where it is, how wide and how strong."""
     scene, fitted = base
-    middle, reach_m, strength = np.array([0.815, 0.145]), 0.06, 2.5
+    reach_m, strength = 0.06, 2.5
     inside = np.linalg.norm(ends_of(scene) - middle, axis=-1) < reach_m
     factor = np.where(inside, math.exp(strength), 1.0)
     drawn = worlds.redrawn(scene, fitted, np.random.default_rng(5), lambda _angle: factor)
-    law = Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
-    places = find_effect("place-preference")
+    screen = Screen(scene=drawn, fitted=maximise(drawn, fitted.parameters))
 
-    gains = gains_of(law, [places])
+    gains = gains_of(
+        Law(scene=drawn, fitted=screen.fitted), [find_effect("place-preference")], n_workers=2
+    )
     best = max(gains, key=lambda gain: gain.nats)
     assert best.kind == "landing at a place"
-    at = np.array([float(each) for each in best.label.removeprefix("landing at ").split(", ")])
-    assert np.linalg.norm(at - middle) < 0.02  # places that are tried lie 2 cm apart
-
-    near = {"x_m": at[0], "y_m": at[1], "reach_m": 0.08, "lands": 1.0}
-    keys = ("strength", "x_m", "y_m", "reach_m")
-    model = with_effect(fitted.parameters, places.name, {"strength": 0.5, **near})
-    found = maximise(drawn, model, free=[(places.name, key) for key in keys])
-    values = found.parameters.effects[places.name]
-    assert math.hypot(values["x_m"] - middle[0], values["y_m"] - middle[1]) < 0.01
-    assert values["reach_m"] == pytest.approx(reach_m, abs=0.01)
+    case = SimpleNamespace(
+        listed=(), generic=(), scene=drawn, question=SimpleNamespace(n_workers=2)
+    )
+    values = in_the_model(case, screen, best)[0].values
+    assert values["lands"] == 1.0
+    assert math.hypot(values["x_m"] - middle[0], values["y_m"] - middle[1]) < 0.015
+    assert values["reach_m"] == pytest.approx(reach_m, abs=0.012)
     assert values["strength"] == pytest.approx(strength, abs=1.0)
 
 

@@ -68,21 +68,38 @@ def test_headings_may_be_likelier_that_end_at_a_place(ask, strength):
     asked = ask("place-preference", {"strength": strength, **place}, X=0.4, Y=0.5, DT_S=0.5)
     ratio = asked.factor(0.0, speed=0.08) / asked.factor(math.pi, speed=0.08)
     assert ratio == pytest.approx(math.exp(strength / (1 + (0.06 / 0.08) ** 8)), rel=0.02)
-    # A step along its edge keeps the distance; one of no length is nowhere else.
-    assert asked.factor(0.0, speed=0.0) == asked.factor(2.0, speed=0.0)
+    # Headings of a step that cannot reach it are alike, and none is rejected.
+    far = ask("place-preference", {"strength": strength, **place}, X=0.0, Y=0.5, DT_S=0.5)
+    assert far.factor(0.0, speed=0.08) == pytest.approx(1.0, abs=1e-4)
+    assert asked.factor(0.0, speed=0.0) == asked.factor(2.0, speed=0.0) == 1.0
+
+
+@pytest.mark.parametrize("turning", [0.0, 1.0, 2.0])
+def test_where_headings_end_there_none_is_drawn_or_turned(ask, turning):
+    """One strength does one thing."""
+    place = {"x_m": 0.5, "y_m": 0.6, "strength": 1.0, "drawn": 1.0, "turning": turning}
+    other, lands = (
+        ask("place-preference", place | {"lands": on}, X=0.4, Y=0.5, HX=1.0) for on in (0.0, 1.0)
+    )
+    asked = [
+        (each.component()[0], each.rotation(), each.whole_rotation()) for each in (other, lands)
+    ]
+    assert any(asked[0])
+    assert not any(asked[1])
 
 
 def test_fish_stay_where_headings_are_likelier_to_end(swim):
-    """Share of time within 8 cm of a place: twice as much, and no more drawn from afar."""
+    """Of those within 8 cm of a place fewer leave it in a step, or more."""
 
-    def shares(strength):
+    def leaving(strength):
         place = {"x_m": 0.25, "y_m": 0.77, "reach_m": 0.08, "lands": 1.0}
         xy, _ = swim("place-preference", {"strength": strength, **place})
-        away = np.linalg.norm(xy - (0.25, 0.77), axis=-1)
-        return (away < 0.08).mean()
+        there = np.linalg.norm(xy - (0.25, 0.77), axis=-1) < 0.08
+        assert there.sum() > 100
+        return 1 - there[1:][there[:-1]].mean()
 
-    assert shares(1.5) > 1.5 * shares(0.0)
-    assert shares(-1.5) < shares(0.0) / 1.5
+    assert leaving(1.5) < 0.8 * leaving(0.0)
+    assert leaving(-1.5) > 1.25 * leaving(0.0)
 
 
 def test_just_after_another_left_a_fish_heads_for_the_way_out(ask):

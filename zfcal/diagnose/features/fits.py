@@ -161,6 +161,7 @@ class Fits:
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=n, common=common,
             n_common=n_common, without_noise=not self.law.noise_m > 0,
+            forms=getattr(feature, "forms", ()),
         )  # fmt: skip
 
     def _common(self, over: Single) -> tuple[Floats, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from zfcal.arrays import Floats
@@ -35,6 +36,8 @@ class Gain:
         Strengths of that.
     apart
         What it was without that, which has the chance.
+    forms
+        Shapes of the effect in a model that say the same.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Gain:
     common: Floats | None = None
     n_common: int = 0
     apart: Gain | None = None
+    forms: tuple[Mapping[str, float], ...] = ()
 
     @property
     def key(self) -> tuple[str, str]:

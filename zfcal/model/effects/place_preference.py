@@ -17,14 +17,7 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter, Likeness
 from zfcal.model.effects.circumstances import by_circumstances
-from zfcal.model.effects.forms import (
-    RAD_PER_STRENGTH,
-    beyond,
-    of_base,
-    sine_to,
-    tilt,
-    turn_to,
-)
+from zfcal.model.effects.forms import RAD_PER_STRENGTH, beyond, of_base, sine_to, tilt, turn_to
 from zfcal.model.effects.weights import LEANING_OUT, aside_of, only
 from zfcal.model.features import Along, Component, Feature, Landing, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook
@@ -46,7 +39,7 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
     """
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    is_drawn = parameters[4] > 0.0 and not parameters[6] > 0.0
+    is_drawn = parameters[4] > 0.0 and not (parameters[6] > 0.0 or parameters[7] > 0.0)
     if not (away > 0.0 and is_drawn):
         return 0.0
     along = math.copysign(1.0, parameters[0]) / away
@@ -57,16 +50,16 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
 
 @hook(FACTOR)
 def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Weigh headings by the bearing of the place, or by whether they end within its reach.
-
-    Far from the place less, and at it not at all.
-    """
+    """Weigh headings by the bearing of the place, near it; or by whether they end in its reach."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
+    away = math.sqrt(dx * dx + dy * dy)
     if parameters[7] > 0.0:
         step_m = speed * state[DT_S * n + i]
         dx, dy = dx - step_m * ux, dy - step_m * uy
-        return tilt(parameters[0], 1.0 - beyond(math.sqrt(dx * dx + dy * dy), parameters[3]), 1.0)
-    away = math.sqrt(dx * dx + dy * dy)
+        # Over the largest value that this step can have: far from the place nothing is rejected.
+        best = abs(away - step_m) if parameters[0] > 0.0 else away + step_m
+        ended = beyond(math.sqrt(dx * dx + dy * dy), parameters[3])
+        return min(1.0, math.exp(parameters[0] * (beyond(best, parameters[3]) - ended)))
     if not away > 0.0 or (parameters[4] > 0.0 and not parameters[6] > 0.0):
         return 1.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
@@ -80,7 +73,7 @@ def rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-def]  #
     """Turn to the place by the sine of the angle to it; not along a wall."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not away > 0.0 or not of_base(parameters[6]):
+    if not away > 0.0 or not of_base(parameters[6]) or parameters[7] > 0.0:
         return 0.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     return RAD_PER_STRENGTH * parameters[0] * pull * turn_to(state, n, i, dx / away, dy / away)
@@ -91,7 +84,7 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
     """Turn all directions to the place, along walls too."""
     dx, dy = parameters[1] - state[X * n + i], parameters[2] - state[Y * n + i]
     away = math.sqrt(dx * dx + dy * dy)
-    if not away > 0.0 or not parameters[6] > 1.0:
+    if not away > 0.0 or not parameters[6] > 1.0 or parameters[7] > 0.0:
         return 0.0
     pull = away / (away + _AT_IT_M) / (1.0 + (away / parameters[3]) ** 4)
     return RAD_PER_STRENGTH * parameters[0] * pull * sine_to(state, n, i, dx / away, dy / away)
@@ -101,8 +94,11 @@ def _one_sided(xy_m: Floats, values: Mapping[str, float]) -> float:
     """Return how much one way the place pulls where fish were, from 0 to 1.
 
     The length of the mean of the unit vectors to the place, weighed by its pull (the mean
-    resultant length; Mardia and Jupp 2000, Directional Statistics, section 2.3).
+    resultant length; Mardia and Jupp 2000, Directional Statistics, section 2.3). One in which steps
+    end pulls no way.
     """
+    if values.get("lands", 0.0) > 0:
+        return 0.0
     dx, dy = values["x_m"] - xy_m[:, 0], values["y_m"] - xy_m[:, 1]
     away = np.maximum(np.hypot(dx, dy), 1e-9)
     pull = 1.0 / (1.0 + (away / values["reach_m"]) ** 4)
@@ -132,8 +128,8 @@ _CLOSELY = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 _KAPPA = 3.0
 
-_SHELTER_M, _SHELTERS = 0.08, 36
-"""Reach of a place in which headings end, as it is first asked for, and how many places are."""
+_SHELTERS_M = (0.04, 0.06, 0.09, 0.14)
+"""Reaches of a place in which headings end, as it is first asked for."""
 
 
 _Asked: TypeAlias = tuple[Floats, shapely.Polygon | None]
@@ -233,6 +229,10 @@ def _at_spot(spot: Floats) -> Landing:
         away_m=lambda _seen, _rows, xy_m: lengths(xy_m - spot),
         knots_m=_SPOT_M,
         along=Along(cue="distance to the place (m)", knots=_SPOT_M[:-1]),
+        forms=tuple(
+            {"x_m": float(spot[0]), "y_m": float(spot[1]), "reach_m": reach_m, "lands": 1.0}
+            for reach_m in _SHELTERS_M
+        ),
     )
 
 
@@ -327,7 +327,8 @@ EFFECT = Effect(
             low=-4.0,
             high=4.0,
             default=1.0,
-            says="Log of the preference for headings toward the place; the weight of those drawn.",
+            says="Log of the preference for headings toward the place, or for those that end "
+            "there; the weight of those drawn.",
         ),
         EffectParameter(
             name="x_m", low=-100.0, high=100.0, default=0.0, says="The place's x, in metres."
@@ -340,7 +341,7 @@ EFFECT = Effect(
             low=0.03,
             high=2.0,
             default=0.3,
-            says="Distance at which half of the pull is left, in metres.",
+            says="Distance at which half of the pull, or of the preference, is left, in metres.",
         ),
         EffectParameter(
             name="drawn",
@@ -371,7 +372,8 @@ EFFECT = Effect(
             low=0.0,
             high=1.0,
             default=0.0,
-            says="1: headings that end within reach of the place are likelier, as at a shelter.",
+            says="1: headings that end within reach of the place are likelier, as at a shelter; "
+            "nothing draws fish there, and none turn or lean.",
         ),
     ),
     probe=0.01,
@@ -382,19 +384,13 @@ EFFECT = Effect(
     harmonics=1,
     not_harmonic="lands",
     shapes=lambda arena: tuple({"x_m": x, "y_m": y} for x, y in places(arena)),
-    further_shapes=lambda arena: (
-        *(
-            {"x_m": x, "y_m": y, **form}
-            for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
-            for x, y in places(arena)
-        ),
-        *(
-            {"x_m": x, "y_m": y, "lands": 1.0, "reach_m": _SHELTER_M}
-            for x, y in places(arena, _SHELTERS)
-        ),
+    further_shapes=lambda arena: tuple(
+        {"x_m": x, "y_m": y, **form}
+        for form in ({"drawn": 1.0}, {"turning": 1.0}, {"turning": 2.0})
+        for x, y in places(arena)
     ),
     fixed=("drawn", "turning", "lands"),
-    idle=lambda values: () if values["drawn"] > 0 and not values["turning"] > 0 else ("kappa",),
+    idle=lambda at: ("kappa",) if at["turning"] or at["lands"] or not at["drawn"] else (),
     needs={"component": ("drawn",), "rotation": ("turning",), "whole_rotation": ("turning",)},
     other_forms=("generic:heading:place",),
     # A place with a reach of its own bends to a drift of any form.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -211,6 +211,8 @@ class Landing:
         What its weights go by.
     over
         As of a `Component`; it need not be a part of this one.
+    forms
+        Shapes of the effect in a model that say the same, such as the place that it is about.
     """
 
     label: str
@@ -218,6 +220,7 @@ class Landing:
     knots_m: tuple[float, ...]
     along: Along | None = None
     over: Landing | None = None
+    forms: tuple[Mapping[str, float], ...] = ()
 
 
 Choosable: TypeAlias = Component | Tilt | Turned | Leaving | Landing
