@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from zfcal.diagnose import beyond as asking
-from zfcal.diagnose import steadiness
 from zfcal.diagnose.beyond import Unfeatured
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.null import theory
@@ -147,8 +146,8 @@ def test_a_listed_one_without_features_is_there_all_the_time(at_walls, monkeypat
     screened = tuple(dataclasses.replace(best, p=1e-9) for best in at_walls.screened)
     own = dataclasses.replace(at_walls, screened=screened)
     for steady, pulsed, n in ((True, False, 1), (False, False, 0), (True, True, 0)):
-        monkeypatch.setattr(steadiness, "is_steady", lambda *_, told=steady: told)
-        monkeypatch.setattr(steadiness, "has_pulses", lambda *_, told=pulsed: told)
+        monkeypatch.setattr(asking, "is_steady", lambda *_, told=steady: told)
+        monkeypatch.setattr(asking, "has_pulses", lambda *_, told=pulsed: told)
         found = own.listed_one(own.case.screen, on_speed=False)
         assert [best.score.candidate.name for best in found] == ["turning-bias"] * n
 
@@ -156,8 +155,8 @@ def test_a_listed_one_without_features_is_there_all_the_time(at_walls, monkeypat
 def test_where_features_cannot_be_asked_all_effects_are_without(at_walls, monkeypatch):
     """Speeds of tracks in short pieces, say."""
     monkeypatch.setattr(Unfeatured, "_added", lambda _self, _screen, ranked, _least: ranked)
-    monkeypatch.setattr(steadiness, "is_steady", lambda *_: True)
-    monkeypatch.setattr(steadiness, "has_pulses", lambda *_: False)
+    monkeypatch.setattr(asking, "is_steady", lambda *_: True)
+    monkeypatch.setattr(asking, "has_pulses", lambda *_: False)
     screened = tuple(dataclasses.replace(best, p=1e-9) for best in at_walls.screened)
     own = dataclasses.replace(at_walls, screened=screened)
     names = {

@@ -20,7 +20,7 @@ from zfcal.diagnose.naming import SURE, Choice, Refit, refit
 from zfcal.diagnose.null import from_replicates, run_null, theory
 from zfcal.diagnose.screening import Screen, ask_all
 from zfcal.diagnose.selection import IN_REACH, LEAST_NATS, LEVEL, Asked, Best, Step, best_of
-from zfcal.diagnose.steadiness import is_there_always
+from zfcal.diagnose.steadiness import MINUTES_S, has_pulses, is_steady
 from zfcal.model.effects import Effect
 
 _RIVALS = 3
@@ -94,7 +94,12 @@ class Unfeatured:
             asked = tuple(best_of(self.listed, ask_all(screen, left, self.case.question.n_workers)))
         names = {each.name for each in plain}
         stand = [best for best in asked if best.score.candidate.name in names and best.p < LEVEL]
-        lasting = [best for best in stand if is_there_always(best.score, screen.scene)]
+        lasting = [
+            best
+            for best in stand
+            if is_steady(best.score, screen.scene, MINUTES_S)
+            and not has_pulses(best.score, screen.scene)
+        ]
         return self._added(screen, lasting, least)
 
     def beyond(self, screen: Screen, *, on_speed: bool, least: float = 0.0) -> Step | None:

@@ -176,7 +176,7 @@ def further_forms(
     Parameters
     ----------
     effect
-        It.
+        The effect.
     scene
         Of the recording.
     also

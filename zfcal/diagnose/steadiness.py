@@ -122,19 +122,6 @@ def has_pulses(score: Score, scene: Scene) -> bool:
     return not _scores_of_one_strength(score.steps, phase * PHASES // 1)
 
 
-def is_there_always(score: Score, scene: Scene) -> bool:
-    """Return whether an effect is there in all minutes, and not in pulses, by its scores.
-
-    Parameters
-    ----------
-    score
-        Of the effect in the model without it.
-    scene
-        Whose steps the score is of.
-    """
-    return is_steady(score, scene, MINUTES_S) and not has_pulses(score, scene)
-
-
 def judged_by(score: Score, scene: Scene) -> Moves:
     """Return the steps that an effect's score is of: all moves, or those with a turn.
 
