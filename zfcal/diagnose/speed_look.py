@@ -174,7 +174,8 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        gains = pace_gains(self.paces, self._asked(self.beside))
+        n_workers = self.case.question.n_workers
+        gains = pace_gains(self.paces, self._asked(self.beside), n_workers=n_workers)
         said = answer(gains, self._noise(self.beside), level=level_of(self.number))
         if said.told is None:
             return said

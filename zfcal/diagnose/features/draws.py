@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
-from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
@@ -83,14 +82,15 @@ class Steps:
     alpha: Floats
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Draw:
     """What the fish saw, and the directions of the base law, of one draw of where all were.
 
     Parameters
     ----------
-    seen
-        By the fish of the steps; directions turned so that the heading taken is the measured one.
+    sees
+        What works out what was seen. It is asked once, and then let go with all that it holds: the
+        law alone needs nothing of it.
     base : ndarray, shape (step, mode, 2)
         Directions of the base law; the second is zero where there is one.
     toward, angle_sr : ndarray, shape (step, source, 2) and (step, source)
@@ -99,11 +99,16 @@ class Draw:
         Angle by which its effects turn all directions; empty for none.
     """
 
-    seen: Seen
+    sees: list[Callable[[], Seen]]
     base: Floats
     toward: Floats
     angle_sr: Floats
     whole_rad: Floats
+
+    @cached_property
+    def seen(self) -> Seen:
+        """By the fish of the steps; directions turned so that the heading taken is as measured."""
+        return self.sees.pop()()
 
     def as_drawn(self, ways: Floats) -> Floats:
         """Return where a component is drawn to that is about some directions that were seen.
@@ -132,8 +137,9 @@ def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
         Source of the orders.
     """
     samples, _, agents = scene.states.shape
-    latin = LatinHypercube(samples * agents * 2, rng=random)
-    return np.asarray(ndtri(latin.random(n))).reshape(n, samples, agents, 2)
+    parts = np.broadcast_to(np.arange(n)[:, None], (n, samples * agents * 2))
+    chances = (random.permuted(parts, axis=0) + random.random(parts.shape)) / n
+    return np.asarray(ndtri(chances)).reshape(n, samples, agents, 2)
 
 
 def drawn(steps: Steps, errors_m: Floats) -> Draw:
@@ -182,10 +188,6 @@ def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
         step = after[:, [X, Y]] - own[:, [X, Y]]
         back = np.arctan2(turns.taken[:, 1], turns.taken[:, 0]) - np.arctan2(step[:, 1], step[:, 0])
         heading = own[:, [HX, HY]]
-    columns = states.shape[2]
-    each = [[j for j in range(columns) if j != i] for i in range(columns)]
-    others = np.array(each, dtype=np.int64)[who]
-    seen = _seen(steps, states, (own, heading), others)
     along = own[:, [TAU_X, TAU_Y]] if states is not scene.states else turns.along_wall
     modes = np.stack([along, -along], axis=1)
     single = np.stack([heading, np.zeros_like(heading)], axis=1)
@@ -195,23 +197,29 @@ def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
         base = turned_by(base, np.arctan2(spin[:, 1], spin[:, 0])[:, None])
     toward, angle = view.toward[steps.rows], view.angle_sr[steps.rows]
     whole = view.whole_rad[steps.rows] if len(view.whole_rad) else view.whole_rad
-    if not back.any():
-        return Draw(seen=seen, base=base, toward=toward, angle_sr=angle, whole_rad=whole)
+    is_turned = bool(back.any())
     return Draw(
-        seen=_turned_back(seen, back),
-        base=turned_by(base, back[:, None]),
-        toward=turned_by(toward, back[:, None]),
+        sees=[partial(_seen, steps, states, heading, back if is_turned else None)],
+        base=turned_by(base, back[:, None]) if is_turned else base,
+        toward=turned_by(toward, back[:, None]) if is_turned else toward,
         angle_sr=angle,
         whole_rad=whole,
     )
 
 
-def _seen(
-    steps: Steps, states: Floats, who: tuple[Floats, Floats], others: NDArray[np.int64]
-) -> Seen:
-    """Return what was seen, from the own states and headings and the others' columns."""
-    turns, (own, heading) = steps.turns, who
+def _seen(steps: Steps, states: Floats, heading: Floats, back: Floats | None) -> Seen:
+    """Return what was seen, from all states and the own headings, turned back by some angles."""
+    made = _seen_as_drawn(steps, states, heading)
+    return made if back is None else _turned_back(made, back)
+
+
+def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
+    """Return that with directions as they were drawn."""
+    turns = steps.turns
     at, before = turns.at, np.maximum(turns.at - 1, 0)
+    own, columns = states[at, :, turns.who], states.shape[2]
+    each = [[j for j in range(columns) if j != i] for i in range(columns)]
+    others = np.array(each, dtype=np.int64)[turns.who]
     rows = np.arange(len(at))[:, None]
 
     def theirs(row: int, when: NDArray[np.int64]) -> Floats:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -205,6 +206,10 @@ class Paces:
         _, bent, n = self._bent
         return _normal_gain(self.scores, self._left) + bent, self._also.shape[1] + n
 
+    def prepare(self) -> None:
+        """Work out what all features need, before they are asked side by side."""
+        _ = (self.swum, self._spreads, self._factor)
+
     def gain(self, name: str, feature: PaceFeature) -> Gain:
         """Return what a feature of an effect adds."""
         made, n = self._gained(feature)
@@ -265,21 +270,33 @@ class Paces:
         return np.asarray(self.screen.model_factor[self.rows])
 
 
-def pace_gains(paces: Paces, effects: Sequence[Effect]) -> list[Gain]:
+def pace_gains(paces: Paces, effects: Sequence[Effect], *, n_workers: int = 1) -> list[Gain]:
     """Return what features of effects add to the law of speeds; those without are left out.
 
     Tracks of a few moves have no past to speak of: regressed on what is left of it beside a mean
     of their own, speeds would seem to swing (Nickell 1981, Econometrica 49: 1417-1426). Where a
     tenth of all moves have one speed there is no law of ranks.
+
+    Parameters
+    ----------
+    paces
+        Fits.
+    effects
+        Those that are asked.
+    n_workers
+        Threads; the numbers do not depend on them.
     """
     if not paces.has_law:
         return []
-    found = [
-        paces.gain(effect.name, feature)
+    asked = [
+        (effect.name, feature)
         for effect in effects
         for feature in effect.paces
         if paces.looks_back(feature)
     ]
+    paces.prepare()
+    with ThreadPoolExecutor(max(1, n_workers)) as pool:
+        found = list(pool.map(lambda pair: paces.gain(*pair), asked))
     return [gain for gain in found if gain.n_strengths]
 
 

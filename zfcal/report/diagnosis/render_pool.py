@@ -23,6 +23,9 @@ from zfcal.report.options import Printing
 _HANDS = 2
 """One for the PNGs, one for the page."""
 
+_NICE = 10
+"""By so much these processes stand back where there are more of them than cores."""
+
 
 class RenderPool:
     """Draws pages of findings; a context, at whose end its processes are gone.
@@ -126,6 +129,8 @@ def _interrupts_held_back() -> Iterator[None]:
 def _get_ready() -> None:
     """Load what drawing needs, and end with the process that one draws for."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):  # What is computed meanwhile takes as long as all this, and longer.
+        os.nice(_NICE)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     importlib.import_module("zfcal.report.diagnosis.drawing")
 
