@@ -13,9 +13,9 @@ from zfcal.diagnose.candidates import candidate_of
 from zfcal.diagnose.case import open_case
 from zfcal.diagnose.diagnose import diagnose
 from zfcal.diagnose.features.false_gains import ByNoise
-from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.gains import Gain, idle_of
 from zfcal.diagnose.features.law import Law
-from zfcal.diagnose.features.naming import Hidden, Told
+from zfcal.diagnose.features.naming import Hidden, Told, tried
 from zfcal.diagnose.findings import Verdict
 from zfcal.diagnose.heading_look import _noise_of, heading_look
 from zfcal.diagnose.looks import Found, clearest_first, level_of, outdoes
@@ -28,6 +28,7 @@ from zfcal.model.extended import maximise
 from zfcal.model.kernels.curves import BY_NEAREST
 
 NOTHING = Found()
+IDLE = frozenset({("turning-bias", "offset")})
 
 
 def no_guess(guess=None):
@@ -285,6 +286,7 @@ def looked(monkeypatch):
         return answers.pop(0) if answers else Found()
 
     monkeypatch.setattr(looking, "further", further)
+    monkeypatch.setattr(looking._Looks, "still_idle", IDLE)
     return calls, answers
 
 
@@ -372,7 +374,7 @@ def test_likely_noise_is_held_against_none(question):
         looks = looking._Looks(case=noisy, screen=case.screen, beside=())
         assert [law.noise_m for law in looks.laws] == levels
         # Of exact positions the exact law is likelier: then nothing is gained over the noisy one.
-        gains = looks.gains([find_effect("turning-bias")], ())
+        gains = looks.gains([find_effect("turning-bias")], (), frozenset())
         assert {gain.without_noise for gain in gains} == {is_likely}
         kinds = {kind for _, kind in (gain.key for gain in gains)}
         assert {"offset", "leaning", "along the wall"} <= kinds
@@ -420,6 +422,7 @@ def test_further_effects_are_looked_for_beside_what_is_there(question, looked):
         ["reaction-delay", "turning-bias"],
     ]
     assert [looks.without_noise for looks, *_ in calls] == [False, True, True]
+    assert [looks.idle for looks, *_ in calls] == [frozenset(), IDLE, IDLE]
     assert [nats for *_, nats in calls] == [0.0, 400.0, 400.0]
 
 
@@ -491,16 +494,27 @@ def test_a_name_that_no_form_bears_out_leads_all_others(monkeypatch):
     """However silent these are beside it: a name by chance leads by next to nothing."""
     monkeypatch.setattr(looking, "tell", lambda *_args, **_how: None)
     quiet = SimpleNamespace(
-        _asked=[], beside=(), number=0, gains=lambda *_: [], _noise=lambda _beside: None
-    )
+        _asked=[], beside=(), number=0, still_idle=IDLE, gains=lambda *_: [],
+        _noise=lambda _beside: None,
+    )  # fmt: skip
     told = Told(gain=gain("alignment", np.full(400, 0.1)), p=0.0, ties=(), lead=1.9)
     assert not looking._Looks.explains(quiet, told)
     assert looking._Looks.explains(quiet, dataclasses.replace(told, lead=2.1))
 
 
 @pytest.mark.slow
-def test_a_second_effect_is_named_beside_the_first(question):
-    """Of two, each in a form of ours, features name both; a tie needs something to say."""
+def test_a_second_effect_is_named_beside_the_first(question, monkeypatch):
+    """Of two, each in a form of ours, features name both; a tie needs something to say.
+
+    What promised nothing at first is left out of later looks, and counts as tried there.
+    """
+    looks, of = [], looking.gains_of
+
+    def noted(law, **how):
+        looks.append((how["idle"], of(law, **how)))
+        return looks[-1][1]
+
+    monkeypatch.setattr(looking, "gains_of", noted)
     both = {
         "directional-drift": {"strength": 0.07, "direction_rad": 2.0, "drawn": 1.0},
         "wall-persistence": {"strength": 0.5},
@@ -508,6 +522,14 @@ def test_a_second_effect_is_named_beside_the_first(question):
     now = asked(open_case(question(both)), NOTHING)
     assert {each.choice.best.name for each in now.steps} == set(both)
     assert all(not each.choice.ties for each in now.steps)
+    (nothing_idle, first), (idle, second), *_ = looks
+    assert not nothing_idle
+    assert idle == idle_of(first)
+    assert len(idle) > len({gain.key for gain in first}) / 2
+    names = {gain.name for gain in second}
+    asked_before = [gain for gain in first if gain.name in names]
+    assert tried(second) == tried(asked_before)
+    assert idle_of(second) >= idle_of(asked_before)
 
 
 def test_what_is_named_in_the_end_is_not_hidden():

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.adding import further
@@ -20,7 +20,7 @@ from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.curves import curve_of
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
-from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.gains import Gain, idle_of
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
 from zfcal.diagnose.findings import FeatureCurve
@@ -66,7 +66,7 @@ def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
     """
     given = [each.effect for each in in_model(case.screen.fitted.parameters)]
     known = [effect for effect in given if not effect.on_speed]
-    found = before
+    found, idle = before, frozenset[tuple[str, str]]()
     while True:
         named = [step.choice.best for step in found.steps[len(before.steps) :]]
         if len(named) >= MOST_EFFECTS:
@@ -78,11 +78,13 @@ def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
             beside=(*known, *there),
             without_noise=found.without_noise,
             number=len(named),
+            idle=idle,
         )
         added = further(looks, unfeatured, named, found.nats)
         found = found.and_further(added)
         if not added.steps:
             return found
+        idle = looks.still_idle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,6 +104,9 @@ class _Looks:
         Whether what seemed to be noise is explained.
     number
         How many looks there were before.
+    idle
+        Features that promised nothing in the first of them. They count as tried, and are not looked
+        at again: what an effect adds to a model hardly ever makes them promise something.
     """
 
     case: Case
@@ -109,6 +114,7 @@ class _Looks:
     beside: tuple[Effect, ...]
     without_noise: bool = False
     number: int = 0
+    idle: frozenset[tuple[str, str]] = frozenset()
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:
@@ -122,18 +128,21 @@ class _Looks:
         levels = (noise_m, 0.0) if noise_m and self.case.noise_is_likely else (noise_m,)
         return tuple(_law(self.case, self.screen, level) for level in levels)
 
-    def gains(self, effects: Sequence[Effect], beside: Sequence[Effect]) -> list[Gain]:
-        """Return what features of effects gain."""
-        n_workers = self.case.question.n_workers
+    def gains(
+        self, effects: Sequence[Effect], beside: Sequence[Effect], idle: frozenset[tuple[str, str]]
+    ) -> list[Gain]:
+        """Return what features of effects gain, but for those that are known to promise nothing."""
+        ask = partial(
+            gains_of, effects=effects, beside=beside, idle=idle,
+            n_workers=self.case.question.n_workers,
+        )  # fmt: skip
         noisy, *exact = self.laws
         if not exact:
-            return gains_of(noisy, effects, beside=beside, n_workers=n_workers)
+            return ask(noisy)
         nulls = [self._null(noisy, beside), fits_beside(exact[0], beside).null_log_p]
         if nulls[1].sum() > nulls[0].sum():  # What is there explains what noise had seemed to.
-            return gains_of(exact[0], effects, beside=beside, n_workers=n_workers)
-        found = gains_of(noisy, effects, beside=beside, n_workers=n_workers)
-        found += gains_of(exact[0], effects, beside=beside, beyond=nulls[0], n_workers=n_workers)
-        return found
+            return ask(exact[0])
+        return ask(noisy) + ask(exact[0], beyond=nulls[0])
 
     @staticmethod
     def _null(noisy: Law, beside: Sequence[Effect]) -> Floats:
@@ -210,11 +219,21 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        gains = self.gains(self._asked, self.beside)
-        said = answer(gains, self._noise(self.beside), level=level_of(self.number))
+        said, _ = self._said
         if said.told is None:
             return said
         return dataclasses.replace(said, told=without_idle_ties(said.told, self._stands))
+
+    @cached_property
+    def _said(self) -> tuple[Answer, frozenset[tuple[str, str]]]:
+        gains = self.gains(self._asked, self.beside, self.idle)
+        noise = self._noise(self.beside)
+        return answer(gains, noise, level=level_of(self.number)), idle_of(gains)
+
+    @property
+    def still_idle(self) -> frozenset[tuple[str, str]]:
+        """Features that promise nothing, now or in a look before."""
+        return self._said[1]
 
     def explains(self, told: Told) -> bool:
         """Return whether, with a name's features there, no other name gains more than chance.
@@ -226,7 +245,7 @@ class _Looks:
             return False
         others = [effect for effect in self._asked if effect.name != told.gain.name]
         beside = (*self.beside, find_effect(told.gain.name))
-        return tell(self.gains(others, beside), self._noise(beside)) is None
+        return tell(self.gains(others, beside, self.still_idle), self._noise(beside)) is None
 
     @cached_property
     def _asked(self) -> list[Effect]:
@@ -236,7 +255,8 @@ class _Looks:
     def _stands(self, effect: Effect, beside: Effect) -> bool:
         """Return whether features of an effect gain more than chance beside those of another."""
         both = (*self.beside, beside)
-        return tell(self.gains([effect], both), self._noise(both)) is not None
+        gains = self.gains([effect], both, self.still_idle)
+        return tell(gains, self._noise(both)) is not None
 
     def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
         """Return what tells how much of a gain beside some effects noise of positions makes."""

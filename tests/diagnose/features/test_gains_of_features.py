@@ -12,8 +12,9 @@ from scipy.stats import chi2, ncx2
 from zfcal.diagnose.features.asking import fits_beside, gains_of, kind_of
 from zfcal.diagnose.features.climbing import climb, climb_within
 from zfcal.diagnose.features.false_gains import ByNoise
+from zfcal.diagnose.features.first_look import FirstLook
 from zfcal.diagnose.features.fits import Fits
-from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.gains import Gain, idle_of
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import answer, best_by_name, tell, tried
 from zfcal.model.effects import all_effects, find_effect
@@ -101,10 +102,34 @@ def test_what_promises_less_than_it_costs_is_not_fitted(nothing, monkeypatch):
             assert (float(one.log_p.sum()), one.p) == (0.0, 1.0)
         else:
             np.testing.assert_array_equal(one.log_p, other.log_p)
-    label = min(idle)
-    (alone,) = gains_of(nothing.law, [effect], kinds={(effect.name, label)})
-    assert fitted[-1] == label
-    assert alone.log_p.any()
+    before = len(fitted)
+    asked = gains_of(nothing.law, [effect], kinds={(effect.name, label) for label in idle})
+    assert set(fitted[before:]) == idle
+    # Some may be at their best where they have no strength.
+    assert any(each.log_p.any() for each in asked)
+
+
+def test_what_is_idle_counts_as_tried_and_is_not_looked_at(nothing, monkeypatch):
+    """By any law: what is worth a fit by one of them is looked at again by both."""
+    effect, looked, nats = find_effect("turning-memory"), [], FirstLook.nats
+
+    def noted(look, feature):
+        looked.append(feature)
+        return nats(look, feature)
+
+    monkeypatch.setattr(FirstLook, "nats", noted)
+    every = gains_of(nothing.law, [effect])
+    n, idle = len(looked), idle_of(every)
+    fitted = {gain.key for gain in every} - idle
+    assert fitted
+    assert len(idle) > 5
+    again = gains_of(nothing.law, [effect], idle=idle)
+    assert len(looked) - n < n / 2
+    assert tried(again) == tried(every)
+    one, other = ({gain.key: gain.n_tried * gain.p for gain in of} for of in (every, again))
+    assert one == other
+    some = [replace(gain, is_idle=gain.is_idle and gain is not every[0]) for gain in every]
+    assert idle_of([*every, *some]) == idle - {every[0].key}
 
 
 def test_what_is_not_fitted_has_to_make_up_for_another_law(nothing):

@@ -42,6 +42,7 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     kinds: Collection[tuple[str, str]] | None = None,
     beside: Sequence[Effect] = (),
     beyond: Floats | None = None,
+    idle: Collection[tuple[str, str]] = (),
     n_workers: int = 1,
 ) -> list[Gain]:
     """Return what features of effects add to a law.
@@ -59,6 +60,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         Effects that are there: whatever form they have, what they explain is not asked.
     beyond : ndarray, shape (step,), optional
         Log densities that are to be gained over, in place of the law's own.
+    idle
+        Names and kinds of those that count as tried and are not looked at: see `idle_of`.
     n_workers
         Threads; the numbers do not depend on them.
     """
@@ -70,8 +73,10 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         (effect.name, feature)
         for effect in effects
         for feature in _askable(law, effect)
-        if kinds is None or (effect.name, kind_of(feature)) in kinds
+        if kinds is None or _key(effect.name, feature) in kinds
     ]
+    nothing = [_nothing(fits, *pair) for pair in asked if _key(*pair) in idle]
+    asked = [pair for pair in asked if _key(*pair) not in idle]
     fits.prepare([feature for _, feature in asked])
     fit_all = kinds is not None
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
@@ -82,7 +87,7 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         if any(isinstance(feature, Landing) and gain in hopeful for feature, gain in some):
             some = _off_walls(fits, asked, some, fit_all=fit_all)
             hopeful = _hopeful([gain for _, gain in some])
-        return list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
+        return nothing + list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
 
 
 def _off_walls(
@@ -241,6 +246,19 @@ def kind_of(feature: Feature) -> str:
     return feature.kind if isinstance(feature, OneOf) else feature.label
 
 
+def _key(name: str, feature: Feature) -> tuple[str, str]:
+    """Return the key that gains of a feature have."""
+    return name, kind_of(feature)
+
+
+def _nothing(fits: Fits, name: str, feature: Feature) -> Gain:
+    """Return that a feature adds nothing; it counts as one that was asked for."""
+    made = fits.nothing(name, _one(feature))
+    if isinstance(feature, OneOf):
+        return replace(made, n_tried=feature.n_tried, kind=feature.kind)
+    return made
+
+
 def _gains(
     fits: Fits, name: str, feature: Feature, *, fit_all: bool = False
 ) -> list[tuple[Single, Gain]]:
@@ -250,9 +268,7 @@ def _gains(
         return [(feature, of(name, feature))]
     chosen = fits.most_promising(feature)
     if not chosen:
-        # It counts as one that was asked for.
-        nothing = fits.nothing(name, _one(feature))
-        return [(_one(feature), replace(nothing, n_tried=feature.n_tried, kind=feature.kind))]
+        return [(_one(feature), _nothing(fits, name, feature))]
     return [
         (each, replace(fits.gain(name, each), n_tried=feature.n_tried, kind=feature.kind))
         for each in chosen

@@ -127,7 +127,7 @@ class Fits:
         features
             These.
         """
-        _ = (self.law.own_parameters, self.law.cells)
+        _ = (self.law.own_parameters, self.law.cells, [draw.seen for draw in self.law.draws])
         _ = (self._null, self._untilted, self.first_look.prepared, self.landings.prepared)
         if any(isinstance(each, OneOf) and has_many(each) for each in features):
             _ = self._few.prepared
@@ -190,7 +190,7 @@ class Fits:
             made = self.null_log_p - self.beyond
         return Gain(
             name=name, label=feature.label, log_p=made, n_strengths=1,
-            without_noise=not self.law.noise_m > 0,
+            without_noise=not self.law.noise_m > 0, is_idle=True,
         )  # fmt: skip
 
     def fit(self, feature: Single) -> Fit:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from zfcal.arrays import Floats
@@ -38,6 +38,8 @@ class Gain:
         What it was without that, which has the chance.
     forms
         Shapes of the effect in a model that say the same.
+    is_idle
+        Whether it promised nothing, and was not fitted.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Gain:
     n_common: int = 0
     apart: Gain | None = None
     forms: tuple[Mapping[str, float], ...] = ()
+    is_idle: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -81,3 +84,11 @@ class Gain:
             self, log_p=self.log_p + self.common, n_strengths=self.n_strengths + self.n_common,
             common=None, n_common=0, apart=self,
         )  # fmt: skip
+
+
+def idle_of(gains: Iterable[Gain]) -> frozenset[tuple[str, str]]:
+    """Return the keys of features none of which was worth a fit, by any law."""
+    idle: dict[tuple[str, str], bool] = {}
+    for gain in gains:
+        idle[gain.key] = idle.get(gain.key, True) and gain.is_idle
+    return frozenset(key for key, is_idle in idle.items() if is_idle)
