@@ -102,7 +102,7 @@ def test_nothing_is_named_where_nothing_is_missing(question):
 
 def gain(name, values):
     """Return a gain of one strength at each step."""
-    return Gain(name=name, label="x", log_p=values, n_strengths=1)
+    return Gain(name=name, label="x", log_p=np.asarray(values), n_strengths=1)
 
 
 @pytest.fixture(scope="module")
@@ -343,6 +343,30 @@ def test_a_name_without_a_form_of_ours_is_unexplained(question, monkeypatch):
     monkeypatch.setattr(looking, "BY_ITSELF", math.inf)
     monkeypatch.setattr(looking._Looks, "explains", lambda *_: False)
     assert diagnose(own, lambda *_: None).verdict is Verdict.UNEXPLAINED
+
+
+@pytest.mark.parametrize(
+    ("stands", "says", "ties"),
+    [
+        ({"wall-persistence": True, "speed-turn-coupling": True}, "wall-persistence", 1),
+        ({"wall-persistence": True, "speed-turn-coupling": False}, "wall-persistence", 0),
+        ({"wall-persistence": False, "speed-turn-coupling": True}, "speed-turn-coupling", 0),
+        ({"wall-persistence": False, "speed-turn-coupling": False}, "wall-persistence", 1),
+    ],
+)
+@pytest.mark.parametrize("nats", [30.0, 5.0])
+def test_a_name_that_leaves_nothing_of_another_one_explains_it(stands, says, ties, nats):
+    """Of which it leaves something; if it gains a share of it that counts."""
+    most, less = gain("wall-persistence", np.full(9, 5.0)), gain("speed-turn-coupling", [nats + 1])
+    other = Told(gain=less, p=0.001, ties=(), lead=0.0)
+    is_tie = nats > 10
+    told = Told(gain=most, p=0.0, ties=(less,) * is_tie, lead=1.5, others=(other,))
+    found = common.explained(told, lambda effect, _beside: stands[effect.name])
+    if is_tie:
+        assert (found.gain.name, len(found.ties)) == (says, ties)
+        assert found.lead == (0.0 if says == "speed-turn-coupling" else 1.5)
+    else:
+        assert found.gain is most
 
 
 def test_looks_share_a_level():

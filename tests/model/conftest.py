@@ -74,6 +74,11 @@ def make_natural():
     return natural_of
 
 
+def _lags(soon, half):
+    """Return directions by how late they are; those of whole steps are any others."""
+    return {SOON: soon, 0.5: half, 1: -soon, 2: -half, 3: soon[::-1]}
+
+
 @pytest.fixture
 def seen():
     """Return what six steps of fish saw of two fish and a robot, all at random."""
@@ -90,7 +95,7 @@ def seen():
     return Seen(
         attention=rng.uniform(0.1, 2.0, (n, others)),
         toward=ways(n, others),
-        shortly_ago_toward=dict(zip((SOON, 0.5), ways(2, n, others), strict=True)).__getitem__,
+        shortly_ago_toward=_lags(*ways(2, n, others)).__getitem__,
         ago_toward=ago.__getitem__,
         then_toward=then.__getitem__,
         sight_ago={1.0: ways(n, others), 2.0: ways(n, others)}.__getitem__,

@@ -372,6 +372,10 @@ def test_near_ones_are_felt_at_once_or_late_as_well(arena, seen):
     np.testing.assert_array_equal(felt[:, ::2], late[:, ::2])
     np.testing.assert_array_equal(late, seen.ago_toward(2))
     assert (felt[:, 1] != late[:, 1]).any()
+    for steps in (1, 2, 3):
+        then = labelled("reaction-delay", f"{steps} steps, by where they were", arena)
+        np.testing.assert_array_equal(then.toward(seen), seen.shortly_ago_toward(steps))
+        assert then.instead is True
     soon = labelled("reaction-delay", "a tenth of a step, near ones too", arena)
     np.testing.assert_array_equal(getattr(seen, soon.toward), seen.ago_toward(0.1))
     by_bearing = labelled("reaction-delay", "a tenth of a step, near ones too, by bearing", arena)
@@ -910,6 +914,29 @@ def test_fish_lean_to_the_mean_heading_within_reach_or_off_the_walls(arena, seen
     off = labelled("alignment", "leaning, the mean within 0.25 m, off the walls", arena)
     expected = np.where(seen.follows_walls[:, None], 0.0, mean)
     np.testing.assert_array_equal(off.vectors(seen)[:, 0], expected)
+
+
+def test_fish_lean_to_those_in_sight_who_agree(arena, seen):
+    """Two at least, by the length of their mean heading: 0.7, 0.85 and 1; who is unseen is none."""
+    angle = np.array([[0.0, 0.0, 2.0], [0.0, math.acos(0.7) * 2, 3.0], [0.0, 3.0, 0.0]] * 2)
+    heading = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    see = np.tile([True, True, False], (len(angle), 1))
+    see[3:, 1] = False
+    now = dataclasses.replace(
+        seen, heading=heading, in_sight=see, distance_m=np.full(angle.shape, 0.1)
+    )
+    vectors = labelled("alignment", "leaning, those seen within 0.25 m who agree", arena).vectors
+    found, half = vectors(now), math.acos(0.7)
+    np.testing.assert_allclose(found[0], [[0, 0], [0, 0], [1, 0]], atol=1e-12)
+    np.testing.assert_allclose(
+        found[1], [[math.cos(half), math.sin(half)], [0, 0], [0, 0]], atol=1e-9
+    )
+    assert not found[2:].any()
+    assert not vectors(dataclasses.replace(now, distance_m=np.full(angle.shape, 0.26))).any()
+    mean = labelled("alignment", "leaning, the mean within 0.25 m, in sight", arena).vectors(now)
+    np.testing.assert_allclose(mean[3:, 0], [[1.0, 0.0]] * 3, atol=1e-12)
+    every = labelled("alignment", "leaning, the mean within 0.25 m", arena).vectors(now)
+    assert (np.abs(every[3:, 0] - [1.0, 0.0]).max(axis=1) > 0.1).all()
 
 
 def test_slow_steps_may_be_scattered(arena, seen):

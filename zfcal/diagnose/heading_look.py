@@ -29,6 +29,7 @@ from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
     as_step,
+    explained,
     gains_by_itself,
     is_other_form,
     level_of,
@@ -37,7 +38,6 @@ from zfcal.diagnose.looks import (
     not_yet_there,
     on_headings,
     outdoes,
-    without_idle_ties,
 )
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
@@ -222,7 +222,7 @@ class _Looks:
         said, _ = self._said
         if said.told is None:
             return said
-        return dataclasses.replace(said, told=without_idle_ties(said.told, self._stands))
+        return dataclasses.replace(said, told=explained(said.told, self._stands))
 
     @cached_property
     def _said(self) -> tuple[Answer, frozenset[tuple[str, str]]]:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.scores import Score
 from zfcal.diagnose.screening import Screen, ask_all
-from zfcal.diagnose.selection import IN_REACH, LEVEL, Best, Step
+from zfcal.diagnose.selection import IN_REACH, LEAST_SHARE, LEVEL, Best, Step
 from zfcal.diagnose.sides import feigned
 from zfcal.diagnose.steadiness import Of
 from zfcal.model.effects import Effect, find_effect
@@ -133,21 +134,32 @@ def not_yet_there(case: Case, beside: Sequence[Effect]) -> list[Effect]:
     return [find_effect(name) for name in sorted({each.name for each in case.listed} - known)]
 
 
-def without_idle_ties(told: Told, stands: Callable[[Effect, Effect], bool]) -> Told:
-    """Return a name without those ties that have nothing to say beside it.
+def explained(told: Told, stands: Callable[[Effect, Effect], bool]) -> Told:
+    """Return the name that explains what features show, without ties that say nothing beside it.
+
+    The best feature of a name is not all that it has: what fish do in the open and along walls are
+    two features of one name, and the best of another may gain more than either. So where the
+    features of a name, all together, leave nothing of the one that gains most, and that one leaves
+    something of them, it is that name.
 
     Parameters
     ----------
     told
-        A name and its ties.
+        The name that gains most, its ties, and others.
     stands
         Whether features of one effect gain more than chance beside those of another.
     """
-    kept, own = [], find_effect(told.gain.name)
-    for tie in told.ties:
-        other = find_effect(tie.name)
-        if stands(other, own) or not stands(own, other):
-            kept.append(tie)
+
+    @cache
+    def has_more(name: str, beside: str) -> bool:
+        return stands(find_effect(name), find_effect(beside))
+
+    own, least = told.gain.name, LEAST_SHARE * told.gain.nats
+    for other in told.others:
+        name = other.gain.name
+        if other.gain.nats > least and not has_more(own, name) and has_more(name, own):
+            return other
+    kept = [tie for tie in told.ties if has_more(tie.name, own) or not has_more(own, tie.name)]
     return dataclasses.replace(told, ties=tuple(kept))
 
 

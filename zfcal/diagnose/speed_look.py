@@ -23,13 +23,13 @@ from zfcal.diagnose.looks import (
     BY_ITSELF,
     Found,
     as_step,
+    explained,
     gains_by_itself,
     is_other_form,
     level_of,
     noise_of_features,
     not_yet_there,
     outdoes,
-    without_idle_ties,
 )
 from zfcal.diagnose.naming import SURE
 from zfcal.diagnose.screening import Screen
@@ -179,7 +179,7 @@ class _Looks:
         said = answer(gains, self._noise(self.beside), level=level_of(self.number))
         if said.told is None:
             return said
-        return dataclasses.replace(said, told=without_idle_ties(said.told, self._stands))
+        return dataclasses.replace(said, told=explained(said.told, self._stands))
 
     def _explains(self, told: Told) -> bool:
         """Return whether a name leads, and no other one gains more than chance beside it."""

@@ -19,6 +19,7 @@ from zfcal.model.effects.weights import attended, evenly, precision_of_attention
 from zfcal.model.extended import maximise, with_effect
 from zfcal.model.features import LAGS, SOON, Component, Sharper, Tilt, Turned
 from zfcal.model.histories import ago_heading, recent_turn, straight
+from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
 
 
@@ -393,6 +394,28 @@ def test_errors_of_draws_are_those_of_a_latin_hypercube(screen):
     np.testing.assert_array_equal(parts, np.repeat(np.arange(8)[:, None], parts.shape[1], axis=1))
     assert (errors**2).mean() == pytest.approx(1.0, abs=0.01)
     assert abs((errors[..., 0] * errors[..., 1]).mean()) < 0.01
+
+
+@pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 2.25])
+def test_others_draw_to_where_they_were_and_away_from_who_was_too_near(base, steps):
+    """By whole steps, and in a straight line between these."""
+    scene, fitted = base
+    law = Law(scene=scene, fitted=fitted)
+    seen, at, who = law.draws[0].seen, law.turns.at, law.turns.who
+    own, (whole, share) = scene.states[at, :, who], (int(steps), steps % 1)
+    found, columns = seen.shortly_ago_toward(steps), range(scene.states.shape[2])
+    n_near = 0
+    for s in range(0, len(at), 7):
+        others = [j for j in columns if j != who[s]]
+        now, before = (
+            scene.states[max(at[s] - k, 0)][np.ix_([X, Y], others)].T for k in (whole, whole + 1)
+        )
+        away = (1 - share) * now + share * before - own[s, [X, Y]]
+        far = np.hypot(*away.T)
+        n_near += (far < REPULSION_M).sum()
+        expected = np.where(far < REPULSION_M, -1.0, 1.0)[:, None] * away / far[:, None]
+        np.testing.assert_allclose(found[s], expected, atol=1e-9)
+    assert n_near > 0
 
 
 def test_headings_of_steps_before_are_known_up_to_a_gap(base):

@@ -44,6 +44,9 @@ def test_nothing_is_gained_where_nothing_is_missing(nothing):
     assert tell(found) is None
     assert {each.name for each in found} == {each.name for each in ALL if each.paces}
     assert -15 < best_by_name(found)[0].nats < 5
+    for one, other in zip(found, pace_gains(nothing, ALL, n_workers=3), strict=True):
+        assert (one.key, one.n_strengths) == (other.key, other.n_strengths)
+        np.testing.assert_array_equal(one.log_p, other.log_p)
 
 
 def test_scores_are_standard_normal_in_each_field(nothing):

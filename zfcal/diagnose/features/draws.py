@@ -216,7 +216,7 @@ def _seen(steps: Steps, states: Floats, heading: Floats, back: Floats | None) ->
 def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
     """Return that with directions as they were drawn."""
     turns = steps.turns
-    at, before = turns.at, np.maximum(turns.at - 1, 0)
+    at = turns.at
     own, columns = states[at, :, turns.who], states.shape[2]
     each = [[j for j in range(columns) if j != i] for i in range(columns)]
     others = np.array(each, dtype=np.int64)[turns.who]
@@ -237,13 +237,23 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
     kept = cache if states is steps.scene.states else _as_it_is
     here = theirs(ZONE, at) > 0
     now_x, now_y = theirs(X, at), theirs(Y, at)
-    then_x, then_y = theirs(X, before), theirs(Y, before)
     bearing, distance = to(now_x, now_y)
     present = here[..., None]
 
-    def shortly_ago(share: float) -> Floats:
-        """Return where the base law draws to, by where all were some of a step before."""
-        x, y = (1 - share) * now_x + share * then_x, (1 - share) * now_y + share * then_y
+    def there(steps: int) -> tuple[Floats, Floats]:
+        when = np.maximum(at - steps, 0)[:, None]
+        return places[when, X, others], places[when, Y, others]
+
+    def shortly_ago(steps: float) -> Floats:
+        """Return where the base law draws to, by where all were some steps before."""
+        whole = int(steps)
+        x, y = there(whole)
+        if steps > whole:
+            before_x, before_y = there(whole + 1)
+            x, y = (
+                (whole + 1 - steps) * now + (steps - whole) * before
+                for now, before in ((x, before_x), (y, before_y))
+            )
         way, away_m = to(x, y)
         way = np.where(away_m < REPULSION_M, -1.0, 1.0)[..., None] * way
         return np.asarray(np.where(present & np.isfinite(way), way, 0.0))

@@ -33,12 +33,15 @@ class Told:
         Of names that cannot be told from it, the best first.
     lead
         By how many standard errors it gains more than any other name; infinite without one.
+    others
+        Names that gain more than chance as well, the best first; it leads none of these.
     """
 
     gain: Gain
     p: float
     ties: tuple[Gain, ...]
     lead: float = math.inf
+    others: tuple[Told, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +138,9 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
     lead = min(
         (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
-    told = Told(gain=first, p=min(1.0, first.p * n_tried[first.name]), ties=ties, lead=lead)
+    p = {gain.name: min(1.0, gain.p * n_tried[gain.name]) for gain in best}
+    rest = tuple(Told(gain=gain, p=p[gain.name], ties=(), lead=0.0) for gain in best[1:])
+    told = Told(gain=first, p=p[first.name], ties=ties, lead=lead, others=rest)
     return Answer(told=told, hidden=hidden)
 
 

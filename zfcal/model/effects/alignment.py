@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from zfcal.model.effects.forms import (
     tilt,
 )
 from zfcal.model.effects.weights import (
+    agreed_heading,
     aside_of,
     attended,
     both_senses,
@@ -27,6 +30,7 @@ from zfcal.model.effects.weights import (
     halfway,
     mean_heading,
     seen_and_nearest,
+    summed,
     to_one_sense,
     turning_as_a_whole,
 )
@@ -39,11 +43,13 @@ from zfcal.model.kernels.state import FOLLOWS, HX, HY, ZONE
 _USUAL_SR = 0.01
 """Solid angle of a neighbour at about 0.1 m."""
 
-_NEAR_M = 0.15
-_REACHES_M = (0.08, 0.25, 0.4)
+_NEAR_M, _REACHES_M = 0.15, (0.08, 0.25, 0.4)
 _FOREMOST_M = (0.08, 0.15, 0.4)
-_PER_WEIGHT = 0.03
-_WAY_PER_WEIGHT = 0.01
+_PER_WEIGHT, _WAY_PER_WEIGHT = 0.03, 0.01
+_USUAL_M_S = 0.05
+_OFF_WALLS, _IN_SIGHT = ", off the walls", ", in sight"
+_AHEAD_RAD = (0.0, 0.8, 1.6, math.pi)
+_AHEAD_M = (0.0, 0.05, 0.15, 0.4)
 
 
 @inlined
@@ -120,8 +126,7 @@ def factor(state, sight, n, i, parameters, ux, uy, speed, landing):  # type: ign
     x, y, near = near_heading(state, n, i, parameters[6])
     if not near > 0.0:
         return 1.0
-    most = math.sqrt(x * x + y * y) / near
-    return tilt(leaning * parameters[0], (x * ux + y * uy) / near, most)
+    return tilt(leaning * parameters[0], (x * ux + y * uy) / near, math.sqrt(x * x + y * y) / near)
 
 
 @inlined
@@ -166,15 +171,12 @@ def _late(states: Floats, dt_s: float, _random: np.random.Generator) -> Floats:
 
 
 _KNOTS_M = (0.0, 0.025, 0.05, 0.1, 0.2, 0.4, 1.0)
-_COMPANY_M = 0.15
 _BY_DISTANCE = Along(
     cue="distance to the other (m)", knots=_KNOTS_M[:-1], besides=("the nearest, wherever it is",)
 )
 _TO_FOREMOST = Along(cue="distance to the one most ahead (m)", knots=_KNOTS_M[:-1])
-_AND_AS_SEEN = Along(
-    cue=_BY_DISTANCE.cue,
-    knots=_BY_DISTANCE.knots,
-    besides=(*_BY_DISTANCE.besides, "each, by the attention that it gets"),
+_AND_AS_SEEN = replace(
+    _BY_DISTANCE, besides=(*_BY_DISTANCE.besides, "each, by the attention that it gets")
 )
 
 
@@ -188,44 +190,35 @@ def _of_all(seen: Seen) -> Floats:
     return np.concatenate([_near_and_far(seen), attended(evenly)(seen)], axis=2)
 
 
-def _summed(seen: Seen) -> Floats:
-    return np.asarray(np.einsum("sjb,sjd->sbd", _near_and_far(seen), seen.heading))
-
-
-_AHEAD_RAD = (0.0, 0.8, 1.6, math.pi)
-_USUAL_M_S = 0.05
-_AHEAD_M = (0.0, 0.05, 0.15, 0.4)
-
-
 def _by_bearing(seen: Seen) -> Floats:
     """Return the sums of the headings of others, by how far aside and how far away they are."""
     near = hats_where(seen.here, seen.distance_m, _AHEAD_M)[..., :-1]
     weights = near[..., None] * hats(seen.off_axis_rad, _AHEAD_RAD)[..., None, :]
-    flat = weights.reshape(*near.shape[:2], -1)
-    return np.asarray(np.einsum("sjb,sjd->sbd", flat, seen.heading))
+    return summed(weights.reshape(*near.shape[:2], -1), seen.heading)
 
 
 def _their_course(seen: Seen) -> Floats:
     """Return the sums of the others' mean velocities over two seconds, by distance and if seen."""
     near = hats_where(seen.here, seen.distance_m, _AHEAD_M)[..., :-1]
     weights = np.concatenate([near, seen.in_sight[..., None]], axis=2) / _USUAL_M_S
-    return np.asarray(np.einsum("sjb,sjd->sbd", weights, seen.course))
+    return summed(weights, seen.course)
 
 
 def _of_foremost(seen: Seen) -> Floats:
     return hats_where(seen.here, seen.distance_m, _KNOTS_M)[..., :-1] * seen.foremost
 
 
-def _leaning_to_foremost(seen: Seen) -> Floats:
-    return np.asarray(np.einsum("sjb,sjd->sbd", _of_foremost(seen), seen.heading))
-
-
-def _leaning_to_mean(reach_m: float, *, off_walls: bool) -> Tilt:
+def _leaning_to_mean(reach_m: float, where: str = "") -> Tilt:
     def vectors(seen: Seen) -> Floats:
-        return mean_heading(seen, reach_m) * ~(seen.follows_walls & off_walls)[:, None, None]
+        toward = mean_heading(seen, reach_m, in_sight=where == _IN_SIGHT)
+        return toward * ~(seen.follows_walls & (where == _OFF_WALLS))[:, None, None]
 
-    label = f"leaning, the mean within {reach_m:g} m{', off the walls' * off_walls}"
-    return Tilt(label=label, vectors=vectors, low=0.0)
+    return Tilt(label=f"leaning, the mean within {reach_m:g} m{where}", vectors=vectors, low=0.0)
+
+
+def _leaning_to_agreed(reach_m: float) -> Tilt:
+    label = f"leaning, those seen within {reach_m:g} m who agree"
+    return Tilt(label=label, vectors=partial(agreed_heading, reach_m=reach_m), low=0.0)
 
 
 _SEEN_M = (0.2, 9.0)
@@ -248,7 +241,7 @@ def _along(reach_m: float) -> Component:
 
 def _toward_mean(seen: Seen) -> Floats:
     """Return the sine of the angle from the own heading to the others' mean one."""
-    return aside_of(seen, mean_heading(seen, _COMPANY_M), along_walls=True)
+    return aside_of(seen, mean_heading(seen, _NEAR_M), along_walls=True)
 
 
 def _toward_nearest(seen: Seen) -> Floats:
@@ -262,20 +255,27 @@ _AS_SEEN = Component(label="drawn, as seen", toward="heading", weights=attended(
 _TURNING = Turned(label="turning", by=_toward_mean, neighbours=False, low=0.0)
 
 _FEATURES: tuple[Feature, ...] = (
-    Component(
-        label="drawn, widely", toward="heading", weights=_of_all, kappa=3.0, along=_AND_AS_SEEN
+    *(
+        Component(label=label, toward="heading", weights=_of_all, kappa=kappa, along=_AND_AS_SEEN)
+        for label, kappa in (("drawn, widely", 3.0), ("drawn", 9.0))
     ),
-    Component(label="drawn", toward="heading", weights=_of_all, kappa=9.0, along=_AND_AS_SEEN),
     _AS_SEEN,
     by_circumstances(_AS_SEEN, of_each=True),
-    Tilt(label="leaning", vectors=_summed, low=0.0, along=_BY_DISTANCE),
+    Tilt(
+        label="leaning", vectors=lambda seen: summed(_near_and_far(seen), seen.heading), low=0.0,
+        along=_BY_DISTANCE,
+    ),
     OneOf(kind="leaning, the mean", features=tuple(
-        _leaning_to_mean(reach_m, off_walls=off_walls)
-        for reach_m in (0.08, _COMPANY_M, 0.25, 0.4) for off_walls in (False, True)
+        _leaning_to_mean(reach_m, where)
+        for reach_m in (0.08, _NEAR_M, 0.25, 0.4) for where in ("", _OFF_WALLS, _IN_SIGHT)
     )),
+    OneOf(kind="leaning, those who agree", features=tuple(map(_leaning_to_agreed, _REACHES_M))),
     Tilt(label="leaning, by bearing", vectors=_by_bearing, low=0.0),
     Tilt(label="leaning, their course", vectors=_their_course, low=0.0),
-    Tilt(label="leaning, the foremost", vectors=_leaning_to_foremost, low=0.0, along=_TO_FOREMOST),
+    Tilt(
+        label="leaning, the foremost", low=0.0, along=_TO_FOREMOST,
+        vectors=lambda seen: summed(_of_foremost(seen), seen.heading),
+    ),
     Component(
         label="drawn, the foremost", toward="heading", weights=_of_foremost, kappa=9.0,
         along=_TO_FOREMOST,
@@ -287,7 +287,8 @@ _FEATURES: tuple[Feature, ...] = (
     ),
     _TURNING,
     by_circumstances(_TURNING),
-    by_circumstances(_leaning_to_mean(_COMPANY_M, off_walls=False)),
+    by_circumstances(_leaning_to_mean(_NEAR_M)),
+    by_circumstances(_leaning_to_agreed(0.25)),
     *turning_as_a_whole(_toward_mean, low=0.0),
     Turned(label="turning as the nearest", by=_toward_nearest, neighbours=True, low=0.0),
 )  # fmt: skip

@@ -31,6 +31,7 @@ from zfcal.model.effects.weights import (
     halfway,
     only,
     seen_and_nearest,
+    summed,
     turning_as_a_whole,
 )
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
@@ -235,11 +236,11 @@ def _turning_to_nearest(seen: Seen) -> Floats:
 
 
 def _leaning_to_nearest(seen: Seen) -> Floats:
-    return np.asarray(np.einsum("sjb,sjd->sbd", _of_nearest(seen), seen.bearing))
+    return summed(_of_nearest(seen), seen.bearing)
 
 
 def _leaning_to_each(seen: Seen) -> Floats:
-    return np.asarray(np.einsum("sjb,sjd->sbd", _of_each(seen), seen.bearing))
+    return summed(_of_each(seen), seen.bearing)
 
 
 _TO_MIDDLE = Along(cue="distance to the middle of the others (m)", knots=_KNOTS_M)

@@ -10,7 +10,12 @@ from zfcal.arrays import Floats
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
-from zfcal.model.effects.weights import ATTENTION, factor_on_attention, precision_of_attention
+from zfcal.model.effects.weights import (
+    ATTENTION,
+    factor_on_attention,
+    precision_of_attention,
+    summed,
+)
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Weights
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
@@ -168,7 +173,7 @@ def _within(reach_m: float) -> Weights:
 
 
 def _leaning_within(reach_m: float) -> Weights:
-    return lambda seen: np.einsum("sjb,sjd->sbd", _within(reach_m)(seen), seen.bearing)
+    return lambda seen: summed(_within(reach_m)(seen), seen.bearing)
 
 
 _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
@@ -181,12 +186,12 @@ def _near(seen: Seen) -> Floats:
 
 
 def _leaning_to_each_near(seen: Seen) -> Floats:
-    return np.einsum("sjb,sjd->sbd", _near(seen), seen.bearing)
+    return summed(_near(seen), seen.bearing)
 
 
 def _leaning_to_the_fast(seen: Seen) -> Floats:
     """Return the bearings of those near by their speeds, shape (step, speed, 2)."""
-    return np.einsum("sjb,sjd->sbd", _attention(seen) * _near(seen), seen.bearing)
+    return summed(_attention(seen) * _near(seen), seen.bearing)
 
 
 _FEATURES: tuple[Feature, ...] = (

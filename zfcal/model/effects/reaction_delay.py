@@ -46,6 +46,15 @@ def _of_all_ago(steps: float) -> Component:
     )
 
 
+def _away_ago(steps: int) -> Component:
+    """Return the same, away from who was too near then, wherever that one is now."""
+    return _late(
+        f"{steps} steps, by where they were",
+        lambda seen: seen.shortly_ago_toward(steps),
+        lambda seen: seen.attention,
+    )
+
+
 def _if_far(seen: Seen, steps: int) -> Floats:
     """Return where others were, and of near ones where they are, shape (step, other, 2)."""
     return np.where(seen.too_near[..., None], seen.toward, seen.ago_toward(steps))
@@ -174,6 +183,7 @@ _FEATURES: tuple[Feature, ...] = (
     _in_sight("two steps", 2.0),
     *map(_ago, LAGS),
     *map(_of_all_ago, _QUICK),
+    *map(_away_ago, (1, 2, 3)),
     _ALL_SOON,
     by_circumstances(_ALL_SOON, of_each=True),
     *map(_then, LAGS),

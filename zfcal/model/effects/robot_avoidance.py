@@ -33,6 +33,7 @@ from zfcal.model.effects.weights import (
     factor_on_attention,
     precision_of_attention,
     rooms_of,
+    summed,
     turning_as_a_whole,
 )
 from zfcal.model.features import (
@@ -173,7 +174,7 @@ def _seen_robots(seen: Seen) -> Floats:
 
 
 def _leaning(seen: Seen) -> Floats:
-    return np.asarray(np.einsum("sjb,sjd->sbd", _robots(seen), seen.bearing))
+    return summed(_robots(seen), seen.bearing)
 
 
 def _to_robots(seen: Seen) -> Floats:

@@ -13,9 +13,13 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import in_tank, lengths
 from zfcal.model.effects.circumstances import each_fish, each_under
 from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Turned, Weights
+from zfcal.model.kernels.hats import hats
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
+
+_AGREEMENTS = (0.5, 0.7, 0.85, 1.0)
+"""Lengths of the mean of headings, from any to all alike."""
 
 
 def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:
@@ -122,11 +126,40 @@ def halfway(seen: Seen, toward: Floats) -> Floats:
     return np.asarray(np.divide(between, length, out=np.zeros_like(between), where=known))
 
 
-def mean_heading(seen: Seen, reach_m: float) -> Floats:
-    """Return the unit vector of the mean heading of those within reach, shape (step, 1, 2)."""
-    is_near = (seen.distance_m < reach_m).astype(np.float64)
-    total = np.einsum("sjd,sj->sd", seen.heading, is_near)
+def mean_heading(seen: Seen, reach_m: float, *, in_sight: bool = False) -> Floats:
+    """Return the unit vector of the mean heading of those within reach, shape (step, 1, 2).
+
+    Of those in sight alone, if asked for.
+    """
+    total, _ = _total_heading(seen, (seen.distance_m < reach_m) & (seen.in_sight | (not in_sight)))
     return np.asarray((total / np.maximum(lengths(total), 1e-9)[:, None])[:, None])
+
+
+def _total_heading(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Return the sum of the headings of some, and how many there are."""
+    weights = (counts & seen.here).astype(np.float64)
+    return np.einsum("sjd,sj->sd", seen.heading, weights), weights.sum(axis=1)
+
+
+def agreed_heading(seen: Seen, reach_m: float) -> Floats:
+    """Return that vector of two or more in sight, by how far they agree, shape (step, 3, 2).
+
+    By the length of their mean: what several hold to in common is followed more than their mean is.
+    """
+    total, n = _total_heading(seen, seen.in_sight & (seen.distance_m < reach_m))
+    by = hats(lengths(total) / np.maximum(n, 1.0), _AGREEMENTS)[:, 1:] * (n > 1)[:, None]
+    return np.asarray(by[..., None] * mean_heading(seen, reach_m, in_sight=True))
+
+
+def summed(weights: Floats, ways: Floats) -> Floats:
+    """Return sums of directions of others, shape (step, weight, 2).
+
+    Parameters
+    ----------
+    weights : ndarray, shape (step, other, weight)
+    ways : ndarray, shape (step, other, 2)
+    """
+    return np.asarray(np.einsum("sjb,sjd->sbd", weights, ways))
 
 
 def seen_and_nearest(seen: Seen) -> Floats:

@@ -32,8 +32,8 @@ class Seen:
     toward : ndarray, shape (step, other, 2)
         Where the base law draws to, away from who is too near. Zeros for who is not there.
     shortly_ago_toward
-        Of a share of a step: where the base law draws to, away from who is too near, by where the
-        others were that much of a step before, shape (step, other, 2).
+        Of a number of steps, or a share of one: where the base law draws to, away from who is too
+        near, by where the others were so much before, shape (step, other, 2).
     sight_ago, attention_ago
         Of a number of steps: ``toward`` and ``attention`` of whom the fish would have seen, had all
         others been where they were so many steps before, shape (step, other, 2) and (step, other).
