@@ -77,7 +77,8 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
     told = said.told
     named = None
     if told is not None and told.gain.nats >= least:
-        named = look.borne_out(told, guess)
+        named = look.borne_out(told.cause, guess) if told.cause else None
+        named = named or look.borne_out(told, guess)
     added = chosen(told, named, plain, guess, look.of)
     if added is None:
         return Found(suspicious=told is not None and look.may_doubt, hidden=said.hidden)

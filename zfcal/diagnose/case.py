@@ -153,7 +153,7 @@ def open_case(question: Question) -> Case:
 
 
 def _with_likely_noise(question: Question, scene: Scene, fitted: Fitted) -> Question:
-    noise_m = likely_noise_m(scene, fitted, seed=question.seed, n_workers=question.n_workers)
+    noise_m = likely_noise_m(scene, fitted, seed=question.seed)
     return dataclasses.replace(question, noise_m=noise_m, noise_source="the law of headings")
 
 

@@ -20,13 +20,14 @@ from zfcal.diagnose.case import Case, can_suspect, has_noise, noise_of
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.curves import curve_of
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
-from zfcal.diagnose.features.gains import Gain, idle_of
+from zfcal.diagnose.features.gains import Gain, Idle, idle_of
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
 from zfcal.diagnose.findings import FeatureCurve
 from zfcal.diagnose.heldout import heading_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
+    Beside,
     Found,
     as_step,
     explained,
@@ -66,7 +67,7 @@ def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
     """
     given = [each.effect for each in in_model(case.screen.fitted.parameters)]
     known = [effect for effect in given if not effect.on_speed]
-    found, idle = before, frozenset[tuple[str, str]]()
+    found, idle = before, frozenset[Idle]()
     while True:
         named = [step.choice.best for step in found.steps[len(before.steps) :]]
         if len(named) >= MOST_EFFECTS:
@@ -84,7 +85,7 @@ def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
         found = found.and_further(added)
         if not added.steps:
             return found
-        idle = looks.still_idle
+        idle = idle if named else looks.promising_nothing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,8 +106,8 @@ class _Looks:
     number
         How many looks there were before.
     idle
-        Features that promised nothing in the first of them. They count as tried, and are not looked
-        at again: what an effect adds to a model hardly ever makes them promise something.
+        Features that promised nothing in the first one. They count as tried, and are not looked at
+        again: what an effect adds to a model hardly ever makes them promise something.
     """
 
     case: Case
@@ -114,7 +115,7 @@ class _Looks:
     beside: tuple[Effect, ...]
     without_noise: bool = False
     number: int = 0
-    idle: frozenset[tuple[str, str]] = frozenset()
+    idle: frozenset[Idle] = frozenset()
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:
@@ -129,7 +130,7 @@ class _Looks:
         return tuple(_law(self.case, self.screen, level) for level in levels)
 
     def gains(
-        self, effects: Sequence[Effect], beside: Sequence[Effect], idle: frozenset[tuple[str, str]]
+        self, effects: Sequence[Effect], beside: Sequence[Effect], idle: frozenset[Idle]
     ) -> list[Gain]:
         """Return what features of effects gain, but for those that are known to promise nothing."""
         ask = partial(
@@ -222,17 +223,17 @@ class _Looks:
         said, _ = self._said
         if said.told is None:
             return said
-        return dataclasses.replace(said, told=explained(said.told, self._stands))
+        return dataclasses.replace(said, told=explained(said.told, self._beside))
 
     @cached_property
-    def _said(self) -> tuple[Answer, frozenset[tuple[str, str]]]:
+    def _said(self) -> tuple[Answer, frozenset[Idle]]:
         gains = self.gains(self._asked, self.beside, self.idle)
         noise = self._noise(self.beside)
         return answer(gains, noise, level=level_of(self.number)), idle_of(gains)
 
     @property
-    def still_idle(self) -> frozenset[tuple[str, str]]:
-        """Features that promise nothing, now or in a look before."""
+    def promising_nothing(self) -> frozenset[Idle]:
+        """Features that were not worth a fit."""
         return self._said[1]
 
     def explains(self, told: Told) -> bool:
@@ -245,18 +246,23 @@ class _Looks:
             return False
         others = [effect for effect in self._asked if effect.name != told.gain.name]
         beside = (*self.beside, find_effect(told.gain.name))
-        return tell(self.gains(others, beside, self.still_idle), self._noise(beside)) is None
+        return tell(self.gains(others, beside, self.idle), self._noise(beside)) is None
 
     @cached_property
     def _asked(self) -> list[Effect]:
         """Effects that are looked for."""
         return not_yet_there(self.case, self.beside)
 
-    def _stands(self, effect: Effect, beside: Effect) -> bool:
-        """Return whether features of an effect gain more than chance beside those of another."""
-        both = (*self.beside, beside)
-        gains = self.gains([effect], both, self.still_idle)
-        return tell(gains, self._noise(both)) is not None
+    def _stands(self, effect: Effect, other: Effect) -> bool:
+        return self._beside(effect, other).stands
+
+    def _beside(self, effect: Effect, other: Effect) -> Beside:
+        """Return what features of an effect gain beside those of another."""
+        both = (*self.beside, other)
+        gains = self.gains([effect], both, self.idle)
+        told = tell(gains, self._noise(both))
+        nats = max((gain.nats for gain in gains), default=0.0)
+        return Beside(nats=nats, stands=told is not None)
 
     def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
         """Return what tells how much of a gain beside some effects noise of positions makes."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from zfcal.diagnose.candidates import Candidate, both_sides, curved, further_for
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise, by_noise
 from zfcal.diagnose.features.gains import Gain
-from zfcal.diagnose.features.naming import Hidden, Told
+from zfcal.diagnose.features.naming import Hidden, Told, lead_over
 from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.scores import Score
@@ -104,7 +105,8 @@ def clearest_first(steps: Sequence[Step]) -> list[int]:
 
 def is_other_form(guess: Step | None, told: Told) -> bool:
     """Return whether what is beyond the list says in another form what features name."""
-    names = [gain.name for gain in (told.gain, *told.ties)]
+    said = (told, told.cause) if told.cause else (told,)
+    names = [gain.name for each in said for gain in (each.gain, *each.ties)]
     forms = {form for name in names for form in find_effect(name).other_forms}
     return guess is not None and guess.choice.best.name in forms
 
@@ -134,33 +136,50 @@ def not_yet_there(case: Case, beside: Sequence[Effect]) -> list[Effect]:
     return [find_effect(name) for name in sorted({each.name for each in case.listed} - known)]
 
 
-def explained(told: Told, stands: Callable[[Effect, Effect], bool]) -> Told:
-    """Return the name that explains what features show, without ties that say nothing beside it.
+class Beside(NamedTuple):
+    """What the best feature of a name gains beside another one, and whether by more than chance."""
+
+    nats: float
+    stands: bool
+
+
+def explained(told: Told, ask: Callable[[Effect, Effect], Beside]) -> Told:
+    """Return a name with what explains it, and without ties that say nothing beside it.
 
     The best feature of a name is not all that it has: what fish do in the open and along walls are
     two features of one name, and the best of another may gain more than either. So where the
-    features of a name, all together, leave nothing of the one that gains most, and that one leaves
-    something of them, it is that name.
+    features of a name, all together, leave next to nothing of the one that gains most, and that one
+    leaves something of them, it is that name.
 
     Parameters
     ----------
     told
         The name that gains most, its ties, and others.
-    stands
-        Whether features of one effect gain more than chance beside those of another.
+    ask
+        What features of one effect gain beside those of another.
     """
 
     @cache
-    def has_more(name: str, beside: str) -> bool:
-        return stands(find_effect(name), find_effect(beside))
+    def beside(name: str, other: str) -> Beside:
+        return ask(find_effect(name), find_effect(other))
 
-    own, least = told.gain.name, LEAST_SHARE * told.gain.nats
+    def is_rival(name: str, other: str) -> bool:
+        return beside(name, other).stands or not beside(other, name).stands
+
+    own, least, cause = told.gain.name, LEAST_SHARE * told.gain.nats, None
     for other in told.others:
         name = other.gain.name
-        if other.gain.nats > least and not has_more(own, name) and has_more(name, own):
-            return other
-    kept = [tie for tie in told.ties if has_more(tie.name, own) or not has_more(own, tie.name)]
-    return dataclasses.replace(told, ties=tuple(kept))
+        if cause is None and other.gain.nats > least:
+            left = beside(own, name)
+            is_nothing = not left.stands and left.nats < least
+            cause = other if is_nothing and beside(name, own).stands else None
+    if cause is not None:
+        near = [each.gain for each in told.others if lead_over(cause.gain, each.gain) <= SURE]
+        name = cause.gain.name
+        ties = [each for each in near if each.name != name and is_rival(each.name, name)]
+        cause = dataclasses.replace(cause, ties=tuple(ties))
+    kept = [tie for tie in told.ties if is_rival(tie.name, own)]
+    return dataclasses.replace(told, ties=tuple(kept), cause=cause)
 
 
 def noise_of_features(

@@ -21,6 +21,7 @@ from zfcal.diagnose.features.naming import Answer, Noise, Told, answer, tell
 from zfcal.diagnose.features.paces import Paces, pace_gains
 from zfcal.diagnose.looks import (
     BY_ITSELF,
+    Beside,
     Found,
     as_step,
     explained,
@@ -179,25 +180,27 @@ class _Looks:
         said = answer(gains, self._noise(self.beside), level=level_of(self.number))
         if said.told is None:
             return said
-        return dataclasses.replace(said, told=explained(said.told, self._stands))
+        return dataclasses.replace(said, told=explained(said.told, self._beside))
 
     def _explains(self, told: Told) -> bool:
         """Return whether a name leads, and no other one gains more than chance beside it."""
         if not told.lead > SURE:
             return False
         own = find_effect(told.gain.name)
-        return not self._stand(self._asked((*self.beside, own)), own)
+        return not self._gained(self._asked((*self.beside, own)), own).stands
 
     def _asked(self, beside: Sequence[Effect]) -> list[Effect]:
         return [each for each in not_yet_there(self.case, beside) if each.name not in self.without]
 
-    def _stands(self, effect: Effect, beside: Effect) -> bool:
-        return self._stand([effect], beside)
+    def _beside(self, effect: Effect, other: Effect) -> Beside:
+        return self._gained([effect], other)
 
-    def _stand(self, effects: Sequence[Effect], beside: Effect) -> bool:
-        """Return whether features of any effect gain more than chance beside those of another."""
-        gains = pace_gains(self.paces.and_beside(beside), effects)
-        return tell(gains, self._noise((*self.beside, beside))) is not None
+    def _gained(self, effects: Sequence[Effect], other: Effect) -> Beside:
+        """Return what features of some effects gain beside those of another."""
+        gains = pace_gains(self.paces.and_beside(other), effects)
+        told = tell(gains, self._noise((*self.beside, other)))
+        nats = max((gain.nats for gain in gains), default=0.0)
+        return Beside(nats=nats, stands=told is not None)
 
     def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
         """Return what tells how much of a gain beside some effects noise of positions makes."""

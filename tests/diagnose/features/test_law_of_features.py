@@ -21,6 +21,7 @@ from zfcal.model.features import LAGS, SOON, Component, Sharper, Tilt, Turned
 from zfcal.model.histories import ago_heading, recent_turn, straight
 from zfcal.model.kernels.perception import REPULSION_M
 from zfcal.model.kernels.state import HX, HY, PAST_HX, PAST_HY, STATES, TAU_X, TAU_Y, ZONE, X, Y
+from zfcal.model.scene import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -396,26 +397,37 @@ def test_errors_of_draws_are_those_of_a_latin_hypercube(screen):
     assert abs((errors[..., 0] * errors[..., 1]).mean()) < 0.01
 
 
+@pytest.fixture(scope="module", params=[False, True], ids=["all there", "some come and go"])
+def crowd(request, record, tank, fish):
+    """Return the law of fish of which some may not be there all the time, and whether they are."""
+    samples = record(5)
+    xy_m = samples.xy_m.copy()
+    if request.param:
+        xy_m[:50, 1] = xy_m[100:120, 2] = np.nan
+    scene = make_scene(dataclasses.replace(samples, xy_m=xy_m), tank)
+    return Law(scene=scene, fitted=maximise(scene, fish, rounds=0)), request.param
+
+
 @pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 2.25])
-def test_others_draw_to_where_they_were_and_away_from_who_was_too_near(base, steps):
-    """By whole steps, and in a straight line between these."""
-    scene, fitted = base
-    law = Law(scene=scene, fitted=fitted)
-    seen, at, who = law.draws[0].seen, law.turns.at, law.turns.who
-    own, (whole, share) = scene.states[at, :, who], (int(steps), steps % 1)
-    found, columns = seen.shortly_ago_toward(steps), range(scene.states.shape[2])
-    n_near = 0
-    for s in range(0, len(at), 7):
-        others = [j for j in columns if j != who[s]]
-        now, before = (
-            scene.states[max(at[s] - k, 0)][np.ix_([X, Y], others)].T for k in (whole, whole + 1)
-        )
-        away = (1 - share) * now + share * before - own[s, [X, Y]]
+def test_others_draw_to_where_they_were_and_away_from_who_was_too_near(crowd, steps):
+    """By whole steps, and in a straight line between these; to where one is who was not there."""
+    law, comes = crowd
+    whole, share = int(steps), steps % 1
+    seen, at, who, states = law.draws[0].seen, law.turns.at, law.turns.who, law.scene.states
+    found, n_near, n_away = seen.shortly_ago_toward(steps), 0, 0
+    for s in range(0, 2000, 3):
+        others = [j for j in range(states.shape[2]) if j != who[s]]
+        ends = [states[max(at[s] - k, 0)][:, others] for k in (whole, whole + (share > 0))]
+        away = ((1 - share) * ends[0] + share * ends[1])[[X, Y]].T - states[at[s], [X, Y], who[s]]
         far = np.hypot(*away.T)
-        n_near += (far < REPULSION_M).sum()
+        there = (ends[0][ZONE] > 0) & (ends[1][ZONE] > 0) & seen.here[s]
+        n_near += (far[there] < REPULSION_M).sum()
+        n_away += (seen.here[s] & ~there).sum()
         expected = np.where(far < REPULSION_M, -1.0, 1.0)[:, None] * away / far[:, None]
-        np.testing.assert_allclose(found[s], expected, atol=1e-9)
+        np.testing.assert_allclose(found[s, there], expected[there], atol=1e-9)
+        np.testing.assert_array_equal(found[s, ~there], seen.toward[s, ~there])
     assert n_near > 0
+    assert bool(n_away) is comes
 
 
 def test_headings_of_steps_before_are_known_up_to_a_gap(base):

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.fits import Fits
-from zfcal.diagnose.features.gains import Gain
+from zfcal.diagnose.features.gains import Gain, Idle
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import best_by_name, tried
@@ -42,7 +42,7 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     kinds: Collection[tuple[str, str]] | None = None,
     beside: Sequence[Effect] = (),
     beyond: Floats | None = None,
-    idle: Collection[tuple[str, str]] = (),
+    idle: Collection[Idle] = (),
     n_workers: int = 1,
 ) -> list[Gain]:
     """Return what features of effects add to a law.
@@ -61,7 +61,7 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
     beyond : ndarray, shape (step,), optional
         Log densities that are to be gained over, in place of the law's own.
     idle
-        Names and kinds of those that count as tried and are not looked at: see `idle_of`.
+        Those that count as tried and are not looked at: see `idle_of`.
     n_workers
         Threads; the numbers do not depend on them.
     """
@@ -75,18 +75,20 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         for feature in _askable(law, effect)
         if kinds is None or _key(effect.name, feature) in kinds
     ]
-    nothing = [_nothing(fits, *pair) for pair in asked if _key(*pair) in idle]
-    asked = [pair for pair in asked if _key(*pair) not in idle]
+    is_exact = not law.noise_m > 0
+    left_out = [pair for pair in asked if (*_key(*pair), is_exact) in idle]
+    nothing = [_nothing(fits, *pair) for pair in left_out]
+    asked = [pair for pair in asked if pair not in left_out]
     fits.prepare([feature for _, feature in asked])
     fit_all = kinds is not None
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
         found = list(pool.map(lambda pair: _gains(fits, *pair, fit_all=fit_all), asked))
         # One fish has nobody to follow: then a feature of who is who has no strength at all.
         some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
-        hopeful = _hopeful([gain for _, gain in some])
+        hopeful = _hopeful([*nothing, *(gain for _, gain in some)])
         if any(isinstance(feature, Landing) and gain in hopeful for feature, gain in some):
             some = _off_walls(fits, asked, some, fit_all=fit_all)
-            hopeful = _hopeful([gain for _, gain in some])
+            hopeful = _hopeful([*nothing, *(gain for _, gain in some)])
         return nothing + list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
 
 

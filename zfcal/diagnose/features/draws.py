@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,15 +85,33 @@ class Steps:
     alpha: Floats
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@final
+class Sight:
+    """What was seen, worked out by whoever asks first; what it was made from is let go then."""
+
+    def __init__(self, make: Callable[[], Seen]) -> None:
+        self._make: Callable[[], Seen] | None = make
+        self._made: list[Seen] = []
+        self._lock = threading.Lock()
+
+    @property
+    def seen(self) -> Seen:
+        """By the fish of some steps."""
+        with self._lock:
+            if self._make is not None:
+                self._made.append(self._make())
+                self._make = None
+            return self._made[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Draw:
     """What the fish saw, and the directions of the base law, of one draw of where all were.
 
     Parameters
     ----------
-    sees
-        What works out what was seen. It is asked once, and then let go with all that it holds: the
-        law alone needs nothing of it.
+    sight
+        Works out what was seen when that is asked for: the law alone needs nothing of it.
     base : ndarray, shape (step, mode, 2)
         Directions of the base law; the second is zero where there is one.
     toward, angle_sr : ndarray, shape (step, source, 2) and (step, source)
@@ -99,16 +120,16 @@ class Draw:
         Angle by which its effects turn all directions; empty for none.
     """
 
-    sees: list[Callable[[], Seen]]
+    sight: Sight
     base: Floats
     toward: Floats
     angle_sr: Floats
     whole_rad: Floats
 
-    @cached_property
+    @property
     def seen(self) -> Seen:
         """By the fish of the steps; directions turned so that the heading taken is as measured."""
-        return self.sees.pop()()
+        return self.sight.seen
 
     def as_drawn(self, ways: Floats) -> Floats:
         """Return where a component is drawn to that is about some directions that were seen.
@@ -199,7 +220,7 @@ def draw_of(steps: Steps, states: Floats, view: View) -> Draw:
     whole = view.whole_rad[steps.rows] if len(view.whole_rad) else view.whole_rad
     is_turned = bool(back.any())
     return Draw(
-        sees=[partial(_seen, steps, states, heading, back if is_turned else None)],
+        sight=Sight(partial(_seen, steps, states, heading, back if is_turned else None)),
         base=turned_by(base, back[:, None]) if is_turned else base,
         toward=turned_by(toward, back[:, None]) if is_turned else toward,
         angle_sr=angle,
@@ -240,27 +261,30 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
     bearing, distance = to(now_x, now_y)
     present = here[..., None]
 
-    def there(steps: int) -> tuple[Floats, Floats]:
-        when = np.maximum(at - steps, 0)[:, None]
-        return places[when, X, others], places[when, Y, others]
-
-    def shortly_ago(steps: float) -> Floats:
-        """Return where the base law draws to, by where all were some steps before."""
-        whole = int(steps)
-        x, y = there(whole)
-        if steps > whole:
-            before_x, before_y = there(whole + 1)
-            x, y = (
-                (whole + 1 - steps) * now + (steps - whole) * before
-                for now, before in ((x, before_x), (y, before_y))
-            )
-        way, away_m = to(x, y)
-        way = np.where(away_m < REPULSION_M, -1.0, 1.0)[..., None] * way
-        return np.asarray(np.where(present & np.isfinite(way), way, 0.0))
-
     packed = pack([without_effects(steps.parameters)], steps.scene.arena)
     cos_fov = float(packed.cos_fov[0])
     toward, angle = perceive(states, at, turns.who, 0.0, cos_fov, False)
+    now_toward = toward[rows, others]
+
+    def there(ago: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """Return where others were so many samples before, and whether they were in the tank."""
+        when = np.maximum(at - ago, 0)[:, None]
+        return places[when, X, others], places[when, Y, others], places[when, ZONE, others] > 0
+
+    def shortly_ago(ago: float) -> Floats:
+        """Return where the base law draws to, by where all were some steps before.
+
+        By where they are, for those that were not in the tank then.
+        """
+        share, whole = math.modf(ago)
+        x, y, was = there(int(whole))
+        if share > 0:
+            more_x, more_y, was_more = there(int(whole) + 1)
+            x, y = (1 - share) * x + share * more_x, (1 - share) * y + share * more_y
+            was &= was_more
+        way, away_m = to(x, y)
+        way = np.where(away_m < REPULSION_M, -1.0, 1.0)[..., None] * way
+        return np.where((present & was[..., None]), way, now_toward)
 
     def sight_ago(ago: float) -> Floats:
         return np.asarray(perceive(places, at, turns.who, ago, cos_fov, False)[0][rows, others])
@@ -289,7 +313,7 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
     since_s = own[:, TIME, None] - theirs(LEFT_AT_S, at)
     return Seen(
         attention=steps.alpha[:, None] * angle[rows, others],
-        toward=toward[rows, others],
+        toward=now_toward,
         shortly_ago_toward=kept(shortly_ago),
         sight_ago=kept(sight_ago),
         attention_ago=cache(attention_ago),  # It is asked most, and is half as large.

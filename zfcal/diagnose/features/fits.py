@@ -127,7 +127,7 @@ class Fits:
         features
             These.
         """
-        _ = (self.law.own_parameters, self.law.cells, [draw.seen for draw in self.law.draws])
+        _ = (self.law.own_parameters, self.law.cells)
         _ = (self._null, self._untilted, self.first_look.prepared, self.landings.prepared)
         if any(isinstance(each, OneOf) and has_many(each) for each in features):
             _ = self._few.prepared

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise
@@ -86,9 +87,10 @@ class Gain:
         )  # fmt: skip
 
 
-def idle_of(gains: Iterable[Gain]) -> frozenset[tuple[str, str]]:
-    """Return the keys of features none of which was worth a fit, by any law."""
-    idle: dict[tuple[str, str], bool] = {}
-    for gain in gains:
-        idle[gain.key] = idle.get(gain.key, True) and gain.is_idle
-    return frozenset(key for key, is_idle in idle.items() if is_idle)
+Idle: TypeAlias = tuple[str, str, bool]
+"""Key of a feature, and whether it is asked by the law of exact positions."""
+
+
+def idle_of(gains: Iterable[Gain]) -> frozenset[Idle]:
+    """Return which features were not worth a fit, by which law."""
+    return frozenset((*gain.key, gain.without_noise) for gain in gains if gain.is_idle)

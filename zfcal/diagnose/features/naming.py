@@ -32,9 +32,12 @@ class Told:
     ties
         Of names that cannot be told from it, the best first.
     lead
-        By how many standard errors it gains more than any other name; infinite without one.
+        By how many standard errors it gains more than any other name; infinite without one, 0 of a
+        name that is not the best.
     others
-        Names that gain more than chance as well, the best first; it leads none of these.
+        Names that gain more than chance as well, the best first.
+    cause
+        The one of these that explains it: see `explained`.
     """
 
     gain: Gain
@@ -42,6 +45,7 @@ class Told:
     ties: tuple[Gain, ...]
     lead: float = math.inf
     others: tuple[Told, ...] = ()
+    cause: Told | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,9 +138,9 @@ def answer(gains: Sequence[Gain], noise: Noise | None = None, *, level: float = 
         return Answer(told=None, hidden=hidden)
     first, *others = best
     others += [gain for gain in lost if gain.nats > first.nats]
-    ties = tuple(gain for gain in others if _lead(first, gain) <= SURE)
+    ties = tuple(gain for gain in others if lead_over(first, gain) <= SURE)
     lead = min(
-        (_lead(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
+        (lead_over(first, g) for g in best_by_name(gains) if g.name != first.name), default=math.inf
     )
     p = {gain.name: min(1.0, gain.p * n_tried[gain.name]) for gain in best}
     rest = tuple(Told(gain=gain, p=p[gain.name], ties=(), lead=0.0) for gain in best[1:])
@@ -184,7 +188,7 @@ def tried(gains: Sequence[Gain]) -> dict[str, int]:
     return {name: n * len(n_kinds) for name, n in n_kinds.items()}
 
 
-def _lead(one: Gain, other: Gain) -> float:
+def lead_over(one: Gain, other: Gain) -> float:
     """Return by how many standard errors a feature gains more than another one."""
     by = one.log_p - other.log_p
     error = float(by.std()) * math.sqrt(len(by))

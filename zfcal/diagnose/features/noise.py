@@ -12,13 +12,10 @@ Philosophical Transactions of the Royal Society A 210: 307-357).
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import DRAWS, Law
-from zfcal.diagnose.together import together
 from zfcal.model.fitted import Fitted
 from zfcal.model.scene import Scene
 
@@ -29,7 +26,7 @@ _STEPS = 9000
 """So many steps tell by how much positions err."""
 
 
-def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0, n_workers: int = 1) -> float:
+def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0) -> float:
     """Return the standard deviation of positions per coordinate that is likeliest.
 
     Parameters
@@ -38,8 +35,6 @@ def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0, n_workers: in
         The recording, and the model at its maximum likelihood there.
     seed
         Of the draws.
-    n_workers
-        Threads; the number does not depend on them.
 
     Returns
     -------
@@ -56,12 +51,7 @@ def likely_noise_m(scene: Scene, fitted: Fitted, *, seed: int = 0, n_workers: in
 
     found = [log_likelihood(0.0, 1)]
     for noise_m in _TRIED_M:
-        all_, half = together(
-            partial(log_likelihood, noise_m, DRAWS),
-            partial(log_likelihood, noise_m, DRAWS // 2),
-            n_workers=n_workers,
-        )
-        found.append(2 * all_ - half)
+        found.append(2 * log_likelihood(noise_m, DRAWS) - log_likelihood(noise_m, DRAWS // 2))
         if found[-1] < found[-2]:
             break
     k = int(np.argmax(found)) - 1

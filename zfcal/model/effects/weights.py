@@ -19,7 +19,7 @@ _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
 
 _AGREEMENTS = (0.5, 0.7, 0.85, 1.0)
-"""Lengths of the mean of headings, from any to all alike."""
+"""Lengths of the mean of headings from which several count as agreeing, up to all alike."""
 
 
 def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:
