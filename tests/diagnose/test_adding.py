@@ -1,5 +1,6 @@
 """Of all that a law may lack one effect is added."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -49,7 +50,9 @@ def added(tank, monkeypatch):
             ask=lambda: Answer(told=told, hidden=(LATE,)),
             screen=SimpleNamespace(scene=SimpleNamespace(arena=tank)), on_speed=False,
             has_features=True, may_doubt=may_doubt, of=None, not_left_over=lambda guess: guess,
-            borne_out=lambda _told, _guess: step("alignment") if borne_out else None,
+            borne_out=lambda told, _guess: (
+                step(told.gain.name) if borne_out in {True, told.gain.name} else None
+            ),
         )  # fmt: skip
         unfeatured = SimpleNamespace(beyond=said("guess", guess), listed_one=said("plain", plain))
         made = further(look, unfeatured, [step(n, 100.0).choice.best for n in named], nats)
@@ -74,6 +77,20 @@ def test_what_nothing_bears_out_is_suspicious(added):
     assert (names, made.suspicious, made.hidden) == ([], True, (LATE,))
     assert not added(borne_out=False, may_doubt=False)[1].suspicious
     assert added(named=["turning-bias"], nats=400.0)[0] == []
+
+
+def test_what_explains_a_name_is_asked_first(added):
+    """Where nothing bears it out the name is asked itself; what it gains counts either way."""
+    few = Gain(name="group-cohesion", label="x", log_p=np.full(400, 0.03), n_strengths=1)
+    told = replace(ONE, cause=Told(gain=few, p=0.0, ties=(), lead=0.0))
+    for borne_out, expected in (
+        (True, ["group-cohesion"]), ("group-cohesion", ["group-cohesion"]),
+        ("alignment", ["alignment"]), (False, []),
+    ):  # fmt: skip
+        names, made, _ = added(told=told, borne_out=borne_out, named=["turning-bias"], nats=100.0)
+        assert names == expected
+        assert made.nats == (pytest.approx(39.0) if expected else 0.0)
+        assert made.suspicious is (not expected)
 
 
 def test_further_effects_gain_a_share_of_the_clearest(added):

@@ -2,13 +2,15 @@
 
 import dataclasses
 import math
+import threading
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from scipy.special import i0e, ndtr
 
-from zfcal.diagnose.features.draws import Steps, _turned_back, draw_of, errors_of
+from zfcal.diagnose.features.draws import Sight, Steps, _turned_back, draw_of, errors_of
 from zfcal.diagnose.features.kernels import attractions, bells, bells_on_cells, tilted
 from zfcal.diagnose.features.landings import leaned
 from zfcal.diagnose.features.law import DRAWS, Law
@@ -384,6 +386,29 @@ def test_a_factor_is_taken_in_and_what_was_seen_is_kept(base):
     by_hand = law.log_here + (leaning * law.turns.taken).sum(axis=1)
     by_hand += leaving * (law.turns.landing == law.between)
     np.testing.assert_allclose(once.log_here, by_hand)
+
+
+def test_what_was_seen_is_worked_out_once_whoever_asks():
+    """By many at the same time; what failed is tried again."""
+    made, begun = [], threading.Barrier(4)
+
+    def make():
+        made.append(len(made))
+        if len(made) == 1:
+            raise MemoryError
+        return made[-1]
+
+    sight = Sight(make)
+    with pytest.raises(MemoryError):
+        _ = sight.seen
+
+    def ask(_number):
+        begun.wait(timeout=9)
+        return sight.seen
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(ask, range(4))) == [1] * 4
+    assert made == [0, 1]
 
 
 def test_errors_of_draws_are_those_of_a_latin_hypercube(screen):
