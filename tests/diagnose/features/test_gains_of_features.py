@@ -109,6 +109,7 @@ def test_what_promises_less_than_it_costs_is_not_fitted(nothing, monkeypatch):
     assert any(each.log_p.any() for each in asked)
 
 
+@pytest.mark.slow
 def test_what_is_idle_counts_as_tried_and_is_not_looked_at(nothing, monkeypatch):
     """By the law by which it was idle alone."""
     effect, looked, nats = find_effect("turning-memory"), [], FirstLook.nats
@@ -127,9 +128,11 @@ def test_what_is_idle_counts_as_tried_and_is_not_looked_at(nothing, monkeypatch)
     assert tried(again) == tried(every)
     one, other = ({gain.key: gain.n_tried * gain.p for gain in of} for of in (every, again))
     assert one == other
-    n = len(looked)
-    gains_of(nothing.law, [effect], idle={(*key[:2], False) for key in idle})
-    assert len(looked) - n > 5
+    noisy = replace(nothing.law, noise_m=1e-9, n_draws=1, every=10)
+    for law, other in ((nothing.law, {(*key[:2], False) for key in idle}), (noisy, idle)):
+        n = len(looked)
+        gains_of(law, [effect], idle=other)
+        assert len(looked) - n > 20
 
 
 def test_what_is_not_fitted_has_to_make_up_for_another_law(nothing):
