@@ -76,9 +76,8 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         if kinds is None or _key(effect.name, feature) in kinds
     ]
     is_exact = not law.noise_m > 0
-    left_out = [pair for pair in asked if (*_key(*pair), is_exact) in idle]
-    nothing = [_nothing(fits, *pair) for pair in left_out]
-    asked = [pair for pair in asked if pair not in left_out]
+    nothing = [_nothing(fits, *pair) for pair in asked if (*_key(*pair), is_exact) in idle]
+    asked = [pair for pair in asked if (*_key(*pair), is_exact) not in idle]
     fits.prepare([feature for _, feature in asked])
     fit_all = kinds is not None
     with ThreadPoolExecutor(max(1, n_workers)) as pool:

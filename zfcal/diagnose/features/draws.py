@@ -284,7 +284,7 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
             was &= was_more
         way, away_m = to(x, y)
         way = np.where(away_m < REPULSION_M, -1.0, 1.0)[..., None] * way
-        return np.where((present & was[..., None]), way, now_toward)
+        return np.where(present & was[..., None], way, now_toward)
 
     def sight_ago(ago: float) -> Floats:
         return np.asarray(perceive(places, at, turns.who, ago, cos_fov, False)[0][rows, others])
