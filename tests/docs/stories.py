@@ -74,6 +74,9 @@ class Story:
         What is written shorter, old and new; each must occur.
     recording
         Of `shared_data`, if it goes on one.
+    most_apart
+        By how much decimals may differ from those of the page: the last digits of a search depend
+        on the processor.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Story:
     before: str = ""
     changes: tuple[tuple[str, str], ...] = ()
     recording: str | None = None
+    most_apart: float = 0.03
 
 
 def samples(folder, repository):
@@ -267,7 +271,12 @@ STORIES = (
         parts=(("docs/tutorials/real-fish.md", None),),
         recording="zebrafish5-tracks/gt_2019-10-15.csv.gz",
     ),
-    Story(name="virtual-rig", parts=(("docs/tutorials/virtual-rig.md", None),)),
+    Story(
+        name="virtual-rig",
+        parts=(("docs/tutorials/virtual-rig.md", None),),
+        # The robot moves by what was found, and is found again: S was 0.870 and 0.827.
+        most_apart=0.15,
+    ),
     Story(
         name="bright",
         parts=(("docs/how-to/bright-fish.md", None),),
