@@ -15,7 +15,8 @@ from zfcal.view.process import Page
 
 MINUTES = 30
 FPS = 15
-MOST_SHARE = 0.05
+MOST_RATIO = 5.0
+"""As often as writing them; 2.6 as measured."""
 LEAST_HZ = 5
 MEASURED_S = 12
 
@@ -50,10 +51,11 @@ def five(made, n):
 
 
 @pytest.mark.slow
-def test_ten_updates_a_second_take_less_than_a_twentieth_of_a_core(half_hour, made):
-    """Measured as processor time, which others at work do not add to."""
+def test_to_follow_a_trial_costs_as_little_as_to_write_it(half_hour, made):
+    """Processor time beside that of the writer, in one run: a slow computer slows down both."""
     start_s = 60 * (MINUTES - 1)
     over = threading.Event()
+    written_s = []
 
     def grow():
         n, began_s = 0, time.monotonic()
@@ -63,6 +65,7 @@ def test_ten_updates_a_second_take_less_than_a_twentieth_of_a_core(half_hour, ma
                 writer.add(five(made, start_s * FPS + n))
                 drive.add(made["target"](start_s + n / FPS, 0.5, 0.5))
                 drive.flush()
+                written_s.append(time.thread_time())
                 n += 1
                 time.sleep(max(0.0, began_s + n / FPS - time.monotonic()))
         drive.close()
@@ -88,6 +91,10 @@ def test_ten_updates_a_second_take_less_than_a_twentieth_of_a_core(half_hour, ma
             over.set()
             growing.join()
     hz, share = n_updates / MEASURED_S, spent_s / MEASURED_S
-    print(f"\n{hz:.1f} updates a second, {100 * share:.1f} % of a core")  # noqa: T201 - for -s
-    assert share < MOST_SHARE
+    ratio = share / (FPS * written_s[-1] / len(written_s))
+    print(  # noqa: T201 - for -s
+        f"\n{hz:.1f} updates a second, {100 * share:.1f} % of a core,"
+        f" {ratio:.1f} times what writing takes"
+    )
+    assert ratio < MOST_RATIO
     assert hz >= LEAST_HZ
