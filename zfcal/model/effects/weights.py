@@ -131,14 +131,19 @@ def mean_heading(seen: Seen, reach_m: float, *, in_sight: bool = False) -> Float
 
     Of those in sight alone, if asked for.
     """
-    total, _ = _total_heading(seen, (seen.distance_m < reach_m) & (seen.in_sight | (not in_sight)))
-    return np.asarray((total / np.maximum(lengths(total), 1e-9)[:, None])[:, None])
+    total, _ = _total_heading(seen, reach_m, in_sight=in_sight)
+    return _unit(total)[:, None]
 
 
-def _total_heading(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return the sum of the headings of some, and how many there are."""
-    weights = (counts & seen.here).astype(np.float64)
+def _total_heading(seen: Seen, reach_m: float, *, in_sight: bool) -> tuple[Floats, Floats]:
+    """Return the sum of the headings of some, shape (step, 2), and how many there are, (step,)."""
+    counts = seen.here & (seen.distance_m < reach_m) & (seen.in_sight | (not in_sight))
+    weights = counts.astype(np.float64)
     return np.einsum("sjd,sj->sd", seen.heading, weights), weights.sum(axis=1)
+
+
+def _unit(total: Floats) -> Floats:
+    return np.asarray(total / np.maximum(lengths(total), 1e-9)[:, None])
 
 
 def agreed_heading(seen: Seen, reach_m: float) -> Floats:
@@ -146,9 +151,9 @@ def agreed_heading(seen: Seen, reach_m: float) -> Floats:
 
     By the length of their mean: what several hold to in common is followed more than their mean is.
     """
-    total, n = _total_heading(seen, seen.in_sight & (seen.distance_m < reach_m))
+    total, n = _total_heading(seen, reach_m, in_sight=True)
     by = hats(lengths(total) / np.maximum(n, 1.0), _AGREEMENTS)[:, 1:] * (n > 1)[:, None]
-    return np.asarray(by[..., None] * mean_heading(seen, reach_m, in_sight=True))
+    return np.asarray(by[..., None] * _unit(total)[:, None])
 
 
 def summed(weights: Floats, ways: Floats) -> Floats:
