@@ -105,7 +105,10 @@ def test_what_promises_less_than_it_costs_is_not_fitted(nothing, monkeypatch):
     before = len(fitted)
     asked = gains_of(nothing.law, [effect], kinds={(effect.name, label) for label in idle})
     assert set(fitted[before:]) == idle
-    # Some may be at their best where they have no strength.
+    fits_of_all = {each.label: each.log_p for each in every}
+    for each in asked:
+        np.testing.assert_array_equal(each.log_p, fits_of_all[each.label])
+    # Some may be at their best where they have no strength: which ones, goes by the processor.
     assert any(each.log_p.any() for each in asked)
 
 
