@@ -353,6 +353,16 @@ def shown(name, nats):
     return gain(name, np.full(9, (nats + 1) / 9) + 0.1 * np.sin(np.arange(9) + len(name)))
 
 
+def beside(nats):
+    """Return what tells the nats of names beside another; four are no more than chance."""
+
+    def ask(effects, other):
+        some = [nats(effect.name, other.name) for effect in effects]
+        return [common.Beside(each, each > 4) for each in some]
+
+    return ask
+
+
 def told_of(names):
     """Return the first of some names with their nats, and the others."""
     first, *others = (
@@ -367,6 +377,7 @@ def told_of(names):
         (14.0, {A: 2.0, B: 17.0}, B),
         (14.0, {A: 41.0, B: 4.4}, None),
         (14.0, {A: 2.0, B: -1.0}, None),
+        (14.0, {A: 6.0, B: 17.0}, None),  # Little, but more than chance.
         (5.0, {A: 2.0, B: 17.0}, None),  # It gains too little to count as a further one.
         (14.0, {A: -9.0, B: 17.0}, B),
     ],
@@ -374,9 +385,7 @@ def told_of(names):
 def test_a_name_that_leaves_next_to_nothing_of_another_one_explains_it(nats, left, cause):
     """And of which that one leaves something; what gains most stays known."""
     told = told_of({A: 43.0, B: nats})
-    found = common.explained(
-        told, lambda effect, _other: common.Beside(left[effect.name], left[effect.name] > 4)
-    )
+    found = common.explained(told, beside(lambda name, _other: left[name]))
     assert (found.gain, found.lead, found.ties) == (told.gain, 1.5, ())
     assert (found.cause.gain.name if found.cause else None) == cause
 
@@ -384,26 +393,42 @@ def test_a_name_that_leaves_next_to_nothing_of_another_one_explains_it(nats, lef
 def test_next_to_nothing_is_little_of_what_it_was():
     """A weak name may be no more than chance beside any that can do much."""
     told = told_of({A: 12.0, B: 11.0})
-    found = common.explained(
-        told, lambda effect, _other: common.Beside(3.0, stands=effect.name == B)
-    )
+    found = common.explained(told, beside(lambda name, _other: 5.0 if name == B else 3.0))
     assert found.cause is None
 
 
-@pytest.mark.parametrize("stands", [True, False])
-def test_what_explains_ties_with_names_that_gain_as_much(stands):
-    """Unless these have nothing to say beside it."""
+TIES = pytest.mark.parametrize(
+    ("left", "right", "is_tie"),
+    [(20.0, 20.0, True), (0.0, 20.0, False), (0.0, 0.0, True), (20.0, 0.0, True)],
+)
+
+
+@TIES
+def test_what_explains_ties_with_names_that_gain_as_much(left, right, is_tie):
+    """Unless these have nothing to say beside it, while it has beside them."""
     told = told_of({A: 43.0, C: 40.0, B: 30.0})
-    left = {(A, C): 20.0, (C, A): 20.0, (A, B): 1.0, (B, A): 20.0, (B, C): 20.0}
-    left[C, B] = 20.0 if stands else 0.0
-    found = common.explained(
-        told,
-        lambda effect, other: common.Beside(
-            left[effect.name, other.name], left[effect.name, other.name] > 4
-        ),
-    )
+    nats = {(A, C): 20.0, (C, A): 20.0, (A, B): 1.0, (B, A): 20.0, (C, B): left, (B, C): right}
+    found = common.explained(told, beside(lambda *names: nats[names]))
     assert found.cause.gain.name == B
-    assert [tie.name for tie in found.cause.ties] == [C] * stands
+    assert [tie.name for tie in found.cause.ties] == [C] * is_tie
+
+
+@TIES
+def test_a_tie_has_something_to_say_beside_what_gains_most(left, right, is_tie):
+    """Or neither of the two has: then they cannot be told apart."""
+    told = dataclasses.replace(told_of({A: 43.0}), ties=(shown(C, 40.0),))
+    nats = {(C, A): left, (A, C): right}
+    found = common.explained(told, beside(lambda *names: nats[names]))
+    assert [tie.name for tie in found.ties] == [C] * is_tie
+
+
+def test_each_name_stands_by_its_own_features():
+    """Of some that are asked at the same time, beside one more."""
+    gains = [shown(A, 30.0), shown(C, 1.0)]
+    effects = [find_effect(name) for name in (A, B, C)]
+    found = common.beside_of(effects, gains, None)
+    assert [each.stands for each in found] == [True, False, False]
+    assert [each.nats for each in found] == pytest.approx([30.0, 0.0, 1.0], abs=0.3)
 
 
 def test_looks_share_a_level():

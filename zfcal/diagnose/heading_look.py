@@ -30,6 +30,7 @@ from zfcal.diagnose.looks import (
     Beside,
     Found,
     as_step,
+    beside_of,
     explained,
     gains_by_itself,
     is_other_form,
@@ -254,15 +255,13 @@ class _Looks:
         return not_yet_there(self.case, self.beside)
 
     def _stands(self, effect: Effect, other: Effect) -> bool:
-        return self._beside(effect, other).stands
+        return self._beside([effect], other)[0].stands
 
-    def _beside(self, effect: Effect, other: Effect) -> Beside:
-        """Return what features of an effect gain beside those of another."""
+    def _beside(self, effects: Sequence[Effect], other: Effect) -> list[Beside]:
+        """Return what features of each of some effects gain beside those of another."""
         both = (*self.beside, other)
-        gains = self.gains([effect], both, self.idle)
-        told = tell(gains, self._noise(both))
-        nats = max((gain.nats for gain in gains), default=0.0)
-        return Beside(nats=nats, stands=told is not None)
+        gains = self.gains(effects, both, self.idle) if effects else []
+        return beside_of(effects, gains, self._noise(both))
 
     def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
         """Return what tells how much of a gain beside some effects noise of positions makes."""

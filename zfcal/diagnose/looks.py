@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from zfcal.diagnose.candidates import Candidate, both_sides, curved, further_for
 from zfcal.diagnose.case import QUICK_REPLICATES, Case
 from zfcal.diagnose.features.false_gains import NO_NOISE, ByNoise, by_noise
 from zfcal.diagnose.features.gains import Gain
-from zfcal.diagnose.features.naming import Hidden, Told, lead_over
+from zfcal.diagnose.features.naming import Hidden, Noise, Told, lead_over, tell
 from zfcal.diagnose.naming import SURE, Choice, Refit, by_sample, refit
 from zfcal.diagnose.null import run_null
 from zfcal.diagnose.scores import Score
@@ -143,7 +143,23 @@ class Beside(NamedTuple):
     stands: bool
 
 
-def explained(told: Told, ask: Callable[[Effect, Effect], Beside]) -> Told:
+Ask: TypeAlias = Callable[[Sequence[Effect], Effect], Sequence[Beside]]
+"""Tells what features of each of some effects gain beside those of another."""
+
+
+def beside_of(
+    effects: Sequence[Effect], gains: Sequence[Gain], noise: Noise | None
+) -> list[Beside]:
+    """Return what each of some effects gains, of the gains of all of them beside another one."""
+    made = []
+    for effect in effects:
+        own = [gain for gain in gains if gain.name == effect.name]
+        nats = max((gain.nats for gain in own), default=0.0)
+        made.append(Beside(nats=nats, stands=tell(own, noise) is not None))
+    return made
+
+
+def explained(told: Told, ask: Ask) -> Told:
     """Return a name with what explains it, and without ties that say nothing beside it.
 
     The best feature of a name is not all that it has: what fish do in the open and along walls are
@@ -156,30 +172,45 @@ def explained(told: Told, ask: Callable[[Effect, Effect], Beside]) -> Told:
     told
         The name that gains most, its ties, and others.
     ask
-        What features of one effect gain beside those of another.
+        Of all that may matter at the same time, beside the name that gains most; that one is asked
+        beside each that is left.
     """
+    own, least = find_effect(told.gain.name), LEAST_SHARE * told.gain.nats
+    clear = [each for each in told.others if each.gain.nats > least]
+    names = sorted({each.gain.name for each in clear} | {tie.name for tie in told.ties})
+    left = dict(zip(names, ask([find_effect(name) for name in names], own), strict=True))
 
     @cache
-    def beside(name: str, other: str) -> Beside:
-        return ask(find_effect(name), find_effect(other))
+    def own_beside(name: str) -> Beside:
+        return ask([own], find_effect(name))[0]
 
-    def is_rival(name: str, other: str) -> bool:
-        return beside(name, other).stands or not beside(other, name).stands
+    def explains(name: str) -> bool:
+        if not left[name].stands:
+            return False
+        own_left = own_beside(name)
+        return not own_left.stands and own_left.nats < least
 
-    own, least, cause = told.gain.name, LEAST_SHARE * told.gain.nats, None
-    for other in told.others:
-        name = other.gain.name
-        if cause is None and other.gain.nats > least:
-            left = beside(own, name)
-            is_nothing = not left.stands and left.nats < least
-            cause = other if is_nothing and beside(name, own).stands else None
+    kept = [tie for tie in told.ties if left[tie.name].stands or not own_beside(tie.name).stands]
+    cause = next((each for each in clear if explains(each.gain.name)), None)
     if cause is not None:
-        near = [each.gain for each in told.others if lead_over(cause.gain, each.gain) <= SURE]
-        name = cause.gain.name
-        ties = [each for each in near if each.name != name and is_rival(each.name, name)]
-        cause = dataclasses.replace(cause, ties=tuple(ties))
-    kept = [tie for tie in told.ties if is_rival(tie.name, own)]
+        cause = dataclasses.replace(cause, ties=_ties_of(cause, told.others, ask))
     return dataclasses.replace(told, ties=tuple(kept), cause=cause)
+
+
+def _ties_of(cause: Told, others: Sequence[Told], ask: Ask) -> tuple[Gain, ...]:
+    """Return which of some names tie with what explains the best one."""
+    own = find_effect(cause.gain.name)
+    near = [
+        each.gain
+        for each in others
+        if each is not cause and lead_over(cause.gain, each.gain) <= SURE
+    ]
+    asked = [find_effect(gain.name) for gain in near]
+    return tuple(
+        gain
+        for gain, effect, left in zip(near, asked, ask(asked, own), strict=True)
+        if left.stands or not ask([own], effect)[0].stands
+    )
 
 
 def noise_of_features(

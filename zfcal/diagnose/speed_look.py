@@ -24,6 +24,7 @@ from zfcal.diagnose.looks import (
     Beside,
     Found,
     as_step,
+    beside_of,
     explained,
     gains_by_itself,
     is_other_form,
@@ -187,20 +188,16 @@ class _Looks:
         if not told.lead > SURE:
             return False
         own = find_effect(told.gain.name)
-        return not self._gained(self._asked((*self.beside, own)), own).stands
+        gains = pace_gains(self.paces.and_beside(own), self._asked((*self.beside, own)))
+        return tell(gains, self._noise((*self.beside, own))) is None
 
     def _asked(self, beside: Sequence[Effect]) -> list[Effect]:
         return [each for each in not_yet_there(self.case, beside) if each.name not in self.without]
 
-    def _beside(self, effect: Effect, other: Effect) -> Beside:
-        return self._gained([effect], other)
-
-    def _gained(self, effects: Sequence[Effect], other: Effect) -> Beside:
-        """Return what features of some effects gain beside those of another."""
-        gains = pace_gains(self.paces.and_beside(other), effects)
-        told = tell(gains, self._noise((*self.beside, other)))
-        nats = max((gain.nats for gain in gains), default=0.0)
-        return Beside(nats=nats, stands=told is not None)
+    def _beside(self, effects: Sequence[Effect], other: Effect) -> list[Beside]:
+        """Return what features of each of some effects gain beside those of another."""
+        gains = pace_gains(self.paces.and_beside(other), effects) if effects else []
+        return beside_of(effects, gains, self._noise((*self.beside, other)))
 
     def _noise(self, beside: tuple[Effect, ...]) -> Noise | None:
         """Return what tells how much of a gain beside some effects noise of positions makes."""
