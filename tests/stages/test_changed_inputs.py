@@ -34,8 +34,8 @@ from zfcal.stages.events import LeftOut, Note, say_nothing
 from zfcal.stages.extend.extend import ExtendOptions, extend
 from zfcal.stages.import_ import Source, import_tracks
 from zfcal.stages.init import NewTrial, create_trial
+from zfcal.stages.making import settled
 from zfcal.stages.simulate import SimulateOptions, simulate
-from zfcal.stages.stage import settled
 from zfcal.stages.track.plan import TrackOptions
 from zfcal.stages.track.track import track
 from zfcal.stages.trial_context import Task

@@ -11,6 +11,7 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import InputError
 from zfcal.stages.events import Made, UpToDate
+from zfcal.stages.making import run
 from zfcal.stages.recording import (
     Recording,
     check_same_source,
@@ -22,7 +23,7 @@ from zfcal.stages.recording import (
     starts_of_recording,
     stretch_of,
 )
-from zfcal.stages.stage import OneThing, run
+from zfcal.stages.stage import OneThing
 from zfcal.stages.trial_context import Task
 from zfcal.tracks import Tracks, concatenate
 

@@ -14,7 +14,8 @@ from zfcal.artifacts.segments import segment_starts
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.errors import ChangedError, DamagedError, InputError, LockedError, TakenError
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Progress, UpToDate
-from zfcal.stages.stage import Draft, Item, OneThing, Output, Stage, run
+from zfcal.stages.making import run
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Stage
 from zfcal.stages.trial_context import Task
 
 DRY, FORCED = Task(dry_run=True), Task(force=True)

@@ -22,7 +22,7 @@ from zfcal.report.comparison.compare import (
 from zfcal.report.comparison.compare import compare as compare_trials
 from zfcal.report.comparison.table import missing_lines, statements
 from zfcal.stages.events import LeftOut, Made, Note, Planned, Tell, UpToDate
-from zfcal.stages.stage import settled
+from zfcal.stages.making import settled
 from zfcal.stages.trial_context import at_work
 
 Trials: TypeAlias = TrialPath | Iterable[TrialPath]

@@ -19,7 +19,7 @@ from zfcal.report.page import (
     write_report,
 )
 from zfcal.stages.events import LeftOut, Made, Planned, Tell, UpToDate
-from zfcal.stages.stage import settled
+from zfcal.stages.making import settled
 from zfcal.stages.trial_context import Task, at_work
 
 _TOGETHER = Path("report")

@@ -25,8 +25,8 @@ from zfcal.robot.fishbot import FishBot, Watchdog
 from zfcal.robot.port import SerialLine
 from zfcal.robot.virtual_process import VirtualProcess
 from zfcal.stages.events import Note, Result, Tell
+from zfcal.stages.making import settled
 from zfcal.stages.realtime import ahead_of_others, garbage_left_alone
-from zfcal.stages.stage import settled
 from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial
 
 NICENESS = -10

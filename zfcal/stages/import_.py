@@ -14,8 +14,9 @@ from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
 from zfcal.readers import Imported, ImportOptions, guess_format, import_foreign
 from zfcal.stages.events import Note, Tell
+from zfcal.stages.making import run
 from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_of_recording
-from zfcal.stages.stage import Item, OneThing, Run, run
+from zfcal.stages.stage import Item, OneThing, Run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
 

@@ -20,8 +20,9 @@ from zfcal.model.effects.genome import check_effects
 from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
+from zfcal.stages.making import run
 from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
-from zfcal.stages.stage import Item, OneThing, Run, run
+from zfcal.stages.stage import Item, OneThing, Run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
 

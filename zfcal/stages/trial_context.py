@@ -90,7 +90,7 @@ def at_work(root: Path, command: str, task: Task) -> Iterator[None]:
 def reason_to_make(path: Path, expected: Lineage, task: Task, tell: Tell) -> str | None:
     """Return why an artifact is to be made now; None if it is not, which is told.
 
-    For what does not go through `zfcal.stages.stage.run`.
+    For what does not go through `zfcal.stages.making.run`.
 
     Parameters
     ----------

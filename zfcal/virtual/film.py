@@ -32,9 +32,9 @@ from zfcal.errors import DamagedError, InputError
 from zfcal.stages.camera.cameras import calibration_of, read_camera, write_camera
 from zfcal.stages.camera.rig import BELOW, OVERHEAD
 from zfcal.stages.events import Made, Note, Planned, Progress, Tell
+from zfcal.stages.making import settled
 from zfcal.stages.recording import remove_surplus
 from zfcal.stages.segments import STEP_S
-from zfcal.stages.stage import settled
 from zfcal.stages.taken import unless_taken
 from zfcal.stages.trial_context import OpenTrial, Task, at_work, open_trial, reason_to_make
 from zfcal.tracks import Tracks, concatenate

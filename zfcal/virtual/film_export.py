@@ -24,7 +24,7 @@ from zfcal.cameras.frames import Image
 from zfcal.errors import DamagedError, InputError, StorageError
 from zfcal.stages.camera.rig import BELOW
 from zfcal.stages.events import Made, Planned, Progress, Tell, UpToDate
-from zfcal.stages.stage import settled
+from zfcal.stages.making import settled
 from zfcal.stages.trial_context import Task
 from zfcal.virtual.film import camera_names, frames_folder
 

@@ -28,8 +28,9 @@ from zfcal.errors import InputError
 from zfcal.stages.analyse.control import ControlGroup
 from zfcal.stages.analyse.scoring import SCORINGS, Window, scores_of
 from zfcal.stages.events import Event, LeftOut, Note, Result, Tell
+from zfcal.stages.making import run
 from zfcal.stages.segments import Pooled, Segments, readable, segment_hashes
-from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
+from zfcal.stages.stage import Draft, Item, Output, Run, Stage
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.stages.windows import starts_of, whole_segments, window_ends
 

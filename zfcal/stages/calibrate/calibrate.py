@@ -46,9 +46,10 @@ from zfcal.stages.calibrate.searching import (
 )
 from zfcal.stages.calibrate.way import as_before
 from zfcal.stages.events import LeftOut, Note, Progress, Tell, say_nothing
+from zfcal.stages.making import run
 from zfcal.stages.segments import guess_options, readable, segment_files
 from zfcal.stages.skipping import skipped_path, without_skipped
-from zfcal.stages.stage import Draft, Item, Output, Run, Stage, run
+from zfcal.stages.stage import Draft, Item, Output, Run, Stage
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.stages.windows import LENGTH_S
 

@@ -40,8 +40,9 @@ from zfcal.stages.calibrate.searching import (
 )
 from zfcal.stages.calibrate.telling import stretch_note
 from zfcal.stages.events import Event, Note, Result, Tell
+from zfcal.stages.making import run
 from zfcal.stages.segments import STEP_S, Segments, guess_options
-from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
 

@@ -17,7 +17,8 @@ from zfcal.cameras.handedness import ABOVE, BELOW, check_side
 from zfcal.errors import InputError
 from zfcal.stages.camera.cameras import SIDE_KEY, write_camera
 from zfcal.stages.events import Event, Made, Note, Result, Tell
-from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, make_alone, run
+from zfcal.stages.making import make_alone, run
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.trial_context import Task
 from zfcal.trial import CONFIG_NAME
 

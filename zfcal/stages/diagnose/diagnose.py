@@ -26,8 +26,9 @@ from zfcal.model.effects.genome import check_effects
 from zfcal.parameters import Parameters
 from zfcal.stages.diagnose.findings import FOLDER, Book, Draw, write_findings
 from zfcal.stages.events import Progress, Result, Tell
+from zfcal.stages.making import run
 from zfcal.stages.segments import guess_options
-from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.track_window import Stretch, read_stretch
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 

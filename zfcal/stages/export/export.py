@@ -13,7 +13,8 @@ from zfcal.stages.export.manifest import SCHEMA, Content, Place, exported
 from zfcal.stages.export.options import ExportOptions
 from zfcal.stages.export.tables import tables_item
 from zfcal.stages.export.tracks import tracks_item
-from zfcal.stages.stage import Item, OneThing, Run, run
+from zfcal.stages.making import run
+from zfcal.stages.stage import Item, OneThing, Run
 from zfcal.stages.trial_context import Task, open_trial
 from zfcal.writers import FORMATS, TABLES
 from zfcal.writers.layout import Topics, foxglove_layout

@@ -28,7 +28,8 @@ from zfcal.stages.diagnose.diagnose import Case, DiagnoseOptions, diagnose, open
 from zfcal.stages.diagnose.findings import FILE, FOLDER, Book, Draw
 from zfcal.stages.events import Made, Note, Result, Tell, say_nothing
 from zfcal.stages.extend.extension import Extension, extension_of
-from zfcal.stages.stage import Draft, Item, OneThing, Output, Run, run
+from zfcal.stages.making import run
+from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.track_window import read_stretch
 from zfcal.stages.trial_context import Task, at_work, open_trial
 

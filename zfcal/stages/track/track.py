@@ -12,8 +12,8 @@ from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.cameras.live import ArrivalClock
 from zfcal.stages.camera.sources import source_of
 from zfcal.stages.events import Planned, Tell, UpToDate
+from zfcal.stages.making import settled
 from zfcal.stages.recording import check_same_source, starts_between, stretch_of
-from zfcal.stages.stage import settled
 from zfcal.stages.track.following import Following
 from zfcal.stages.track.minutes import Origins, pose_files, poses_reason
 from zfcal.stages.track.plan import Plan, TrackOptions, plan_of
