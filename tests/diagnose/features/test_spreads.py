@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.special import ndtri
-from scipy.stats import norm, rankdata
 
-from zfcal.diagnose.features.spreads import _ABOUT, Spreads, _bell
+from zfcal.diagnose.features.spreads import Spreads
 from zfcal.diagnose.features.swum import normal_scores, scores_of_speeds
 
 N = 6000
@@ -128,16 +126,3 @@ def test_scores_of_speeds_are_those_of_their_ranks():
     edges = scores_of_speeds(np.array([[0.0], [9.0], [np.nan]]), speeds[:3], np.ones(3, int))
     assert edges[0, 0] < -1 < 1 < edges[1, 0]
     assert np.isnan(edges[2, 0])
-
-
-def test_ranks_and_the_normal_law_are_those_of_scipy():
-    """Equal speeds share their mean rank, within each group alone."""
-    rng = np.random.default_rng(8)
-    values, group = np.round(rng.random(400), 1), rng.integers(1, 4, 400)
-    found = normal_scores(values, group)
-    for number in np.unique(group):
-        rows = group == number
-        expected = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
-        np.testing.assert_allclose(found[rows], expected, atol=1e-12)
-    apart = np.linspace(-2, 2, 9)
-    np.testing.assert_allclose(_bell(apart), norm.pdf(apart, scale=_ABOUT), rtol=1e-12)

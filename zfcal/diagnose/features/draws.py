@@ -12,6 +12,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+from scipy.stats.qmc import LatinHypercube
 
 from zfcal.arrays import Floats
 from zfcal.model.directions import turned_by
@@ -158,9 +159,8 @@ def errors_of(n: int, scene: Scene, random: np.random.Generator) -> Floats:
         Source of the orders.
     """
     samples, _, agents = scene.states.shape
-    parts = np.broadcast_to(np.arange(n)[:, None], (n, samples * agents * 2))
-    chances = (random.permuted(parts, axis=0) + random.random(parts.shape)) / n
-    return np.asarray(ndtri(chances)).reshape(n, samples, agents, 2)
+    latin = LatinHypercube(samples * agents * 2, rng=random)
+    return np.asarray(ndtri(latin.random(n))).reshape(n, samples, agents, 2)
 
 
 def drawn(steps: Steps, errors_m: Floats) -> Draw:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc, chdtri
+from scipy.stats import ncx2
 
 from zfcal.arrays import Floats
 
@@ -48,8 +49,6 @@ class ByNoise:
         ratio = max((2 * nats - mean) / self.stretch + mean, 0.0)
         if not apart > 0:
             return float(chdtrc(n_strengths, ratio))
-        from scipy.stats import ncx2  # Slow to import, and exact positions need none of it.
-
         return float(ncx2.sf(ratio, n_strengths, apart))
 
     def most(self, n_strengths: int, chance: float) -> float:
@@ -57,8 +56,6 @@ class ByNoise:
         apart = 2 * self.more(n_strengths)
         mean = apart + n_strengths
         if apart > 0:
-            from scipy.stats import ncx2
-
             ratio = float(ncx2.isf(chance, n_strengths, apart))
         else:
             ratio = float(chdtri(n_strengths, chance))

@@ -8,7 +8,6 @@ Tibshirani 1996, Annals of Statistics 24: 2431-2461), or adds a component about 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from scipy.stats import norm
 
 from zfcal.arrays import Floats
 from zfcal.diagnose.features.climbing import climb_within
@@ -166,7 +166,7 @@ class Spreads:
         density = law / (_GRID[1] - _GRID[0])
         here = self._here(density)
         known = np.isfinite(about)
-        more = _bell(self.scores[:, None] - np.where(known, about, 0.0)) / here[:, None]
+        more = norm.pdf(self.scores[:, None], np.where(known, about, 0.0), _ABOUT) / here[:, None]
         columns = np.einsum("sj,sjb->sb", np.where(known, more - 1, 0.0), weights)
         is_asked = (columns != 0).any(axis=0)
         columns, weights = columns[:, is_asked], weights[..., is_asked]
@@ -180,7 +180,7 @@ class Spreads:
         shares = np.where(known, weights @ peak.x, 0.0)
         factors = np.ones_like(density) - shares.sum(axis=1)[:, None]
         for own, share in zip(about.T, shares.T, strict=True):
-            bell = _bell(_GRID - np.where(share > 0, own, 0.0)[:, None])
+            bell = norm.pdf(_GRID, np.where(share > 0, own, 0.0)[:, None], _ABOUT)
             factors += share[:, None] * bell / density
         factors = np.maximum(factors, _LEAST)
         log_more = np.log(factors)
@@ -196,8 +196,3 @@ class Spreads:
         """Return the law in which what a feature adds is there."""
         more = drawn.log_more if self.log_more is None else self.log_more + drawn.log_more
         return replace(self, log_more=more)
-
-
-def _bell(apart: Floats) -> Floats:
-    """Return the density of scores so far from the one that they are drawn about."""
-    return np.asarray(np.exp(-0.5 * (apart / _ABOUT) ** 2) / (math.sqrt(2 * math.pi) * _ABOUT))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+from scipy.stats import rankdata
 
 from zfcal.arrays import Floats
 from zfcal.model.features import AWAY_M
@@ -119,12 +120,11 @@ def scores_of_speeds(speeds: Floats, of: Floats, zone: NDArray[np.int64]) -> Flo
 
 
 def normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
-    """Return the normal scores of values within each group; equal ones share their mean rank."""
+    """Return the normal scores of values within each group."""
     made = np.zeros_like(values)
     for number in np.unique(group):
         rows = group == number
-        _, place, n = np.unique(values[rows], return_inverse=True, return_counts=True)
-        made[rows] = ndtri(((np.cumsum(n) - (n - 1) / 2) / (rows.sum() + 1))[place])
+        made[rows] = ndtri(rankdata(values[rows]) / (rows.sum() + 1))
     return made
 
 
