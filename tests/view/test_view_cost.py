@@ -15,7 +15,7 @@ from zfcal.view.process import Page
 
 MINUTES = 30
 FPS = 15
-MOST_RATIO = 5.0
+MOST_RATIO = 4.0
 """As often as writing them; 2.6 as measured."""
 LEAST_HZ = 5
 MEASURED_S = 12
