@@ -120,7 +120,7 @@ def scores_of_speeds(speeds: Floats, of: Floats, zone: NDArray[np.int64]) -> Flo
 
 
 def normal_scores(values: Floats, group: NDArray[np.int64]) -> Floats:
-    """Return the normal scores of values within each group."""
+    """Return the normal scores of values within each group; equal ones share their mean rank."""
     made = np.zeros_like(values)
     for number in np.unique(group):
         rows = group == number
