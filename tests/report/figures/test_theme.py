@@ -2,9 +2,11 @@
 
 import itertools
 import re
+from io import BytesIO
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 from zfcal.report.figures import theme
 
@@ -104,6 +106,31 @@ def test_zones_of_ones_own_take_what_colours_are_left():
 def test_two_shipped_names_of_one_colour_in_one_arena_are_told_apart():
     """`walls` and `middle` share a colour in different arenas, never in the same one."""
     assert len(set(theme.zone_colours(("walls", "middle", "inner")).values())) == 3
+
+
+class Counting(Line2D):
+    """A line that counts how often it is drawn."""
+
+    times = 0
+
+    def draw(self, renderer):
+        """Draw it, and count."""
+        self.times += 1
+        super().draw(renderer)
+
+
+def test_a_figure_is_laid_out_and_drawn_once():
+    """What stands beside the axes has room within the figure."""
+    line = Counting([0, 1], [0, 1])
+    with theme.style():
+        figure = theme.new_figure(2, 1)
+        axes = figure.subplots()
+        axes.add_line(line)
+        axes.set(xlabel="time", ylabel="speed")
+        theme.save(figure, BytesIO(), "png", said={})
+        names = [axis.label.get_window_extent() for axis in (axes.xaxis, axes.yaxis)]
+    assert line.times == 1
+    assert all(min(name.x0, name.y0) >= 0 for name in names)
 
 
 def draw(text="a"):

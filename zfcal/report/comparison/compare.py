@@ -170,5 +170,5 @@ def _svg_of(picture: Any) -> bytes:
 
     made = BytesIO()
     with theme.style():
-        compose(picture).savefig(made, format="svg", metadata={"Date": None})
+        theme.save(compose(picture), made, "svg", said={"Date": None})
     return made.getvalue()

@@ -66,7 +66,7 @@ def _save(
     figure: Figure, made: BytesIO, kind: str, metadata: dict[str, Any], *, on_paper: bool
 ) -> None:
     dpi = theme.PAPER_DPI if on_paper else theme.PNG_DPI
-    figure.savefig(made, format=kind, dpi=dpi, metadata=metadata)
+    theme.save(figure, made, kind, dpi=dpi, said=metadata)
 
 
 def _said_of(picture: Picture, kind: str) -> dict[str, Any]:

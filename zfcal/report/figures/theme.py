@@ -197,10 +197,39 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     width_in, height_in
         Size in inches.
     """
-    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07)
-    figure = Figure(figsize=(width_in, height_in), layout=layout)
+    figure = Figure(figsize=(width_in, height_in))
     FigureCanvasAgg(figure)
     return figure
+
+
+def save(
+    figure: Figure,
+    made: Path | BytesIO,
+    kind: str,
+    *,
+    dpi: float = PNG_DPI,
+    said: Mapping[str, Any],
+) -> None:
+    """Lay a figure out, and write it.
+
+    A figure that has an engine for its layout would be drawn once more, only to be laid out.
+
+    Parameters
+    ----------
+    figure
+        Made by `new_figure`.
+    made
+        Where it goes.
+    kind
+        ``png``, ``svg`` or ``pdf``.
+    dpi
+        Dots per inch, of what has dots.
+    said
+        What the file says of itself; None leaves out what Matplotlib would say.
+    """
+    figure.set_dpi(dpi)
+    ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07).execute(figure)
+    figure.savefig(made, format=kind, dpi=dpi, metadata=dict(said))
 
 
 def wrapped(name: str) -> str:
@@ -240,7 +269,7 @@ def letters_across(axes: Axes) -> int:
 
 def save_png(figure: Figure, path: Path | BytesIO) -> None:
     """Write the figure as a PNG that holds nothing of the day or the machine."""
-    figure.savefig(path, format="png", dpi=PNG_DPI, metadata={"Software": None})
+    save(figure, path, "png", said={"Software": None})
 
 
 def to_svg(figure: Figure, *, prefix: str, alt: str) -> str:
@@ -257,13 +286,9 @@ def to_svg(figure: Figure, *, prefix: str, alt: str) -> str:
         What the figure shows, for those who cannot see it.
     """
     buffer = BytesIO()
-    figure.savefig(
-        buffer,
-        format="svg",
-        dpi=PNG_DPI,
-        transparent=True,
-        metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
-    )
+    unsaid = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with mpl.rc_context({"savefig.transparent": True}):
+        save(figure, buffer, "svg", said=unsaid)
     text = buffer.getvalue().decode("utf-8")
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
