@@ -127,6 +127,12 @@ def forking():
 
 
 @pytest.fixture(scope="session")
+def serving():
+    """Return the module whose `Serving` runs commands for a shell, without their start."""
+    return _module("serving")
+
+
+@pytest.fixture(scope="session")
 def streaming():
     """Return the module whose `Camera` serves images over HTTP in real time."""
     return _module("streaming")

@@ -13,9 +13,7 @@ import pytest
 
 from zfcal.artifacts.tables import read_tracks
 
-WORDS = [sys.executable, str(Path(__file__).resolve().parents[1] / "brief.py")]
-QUICK = {"arena"}
-"""Stories of a few seconds."""
+BRIEFLY = Path(__file__).resolve().parents[1] / "briefly"
 
 
 def stories():
@@ -30,10 +28,7 @@ def stories():
 
 
 TOLD = stories()
-CASES = [
-    pytest.param(each, id=each.name, marks=[] if each.name in QUICK else [pytest.mark.slow])
-    for each in TOLD.STORIES
-]
+CASES = [pytest.param(each, id=each.name) for each in TOLD.STORIES]
 
 
 def needs(line):
@@ -77,15 +72,23 @@ def test_every_heading_of_a_story_has_commands(snippets, reading):
             assert runs, (page, heading)
 
 
+@pytest.fixture(scope="module")
+def brief(serving, tmp_path_factory):
+    """Return the words for a zfcal that is loaded, and whose rounds are brief."""
+    environment = {**os.environ, "PYTHONPATH": str(BRIEFLY)}
+    with serving.Serving(tmp_path_factory.mktemp("serving"), environment) as served:
+        yield served.words
+
+
 @pytest.fixture
-def shell(tmp_path):
+def shell(tmp_path, brief):
     """Return what runs a text in the folder of a story, as a reader's shell does."""
     folder, words = tmp_path / "here", tmp_path / "bin"
     folder.mkdir()
     words.mkdir()
 
     def run(text, *, is_brief):
-        own = WORDS if is_brief else [sys.executable, "-m", "zfcal_cli.main"]
+        own = brief if is_brief else [sys.executable, "-m", "zfcal_cli.main"]
         (words / "zfcal").write_text(f'#!/bin/sh\nexec {shlex.join(own)} "$@"\n', encoding="utf-8")
         (words / "zfcal").chmod(0o755)
         path = f"{words}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
