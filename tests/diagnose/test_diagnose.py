@@ -26,7 +26,7 @@ def question(tank, fish):
             "n_null": 5,
             "quick": True,
             "seed": 1,
-            "n_workers": 2,
+            "n_workers": 1,
         }
         return Question(samples=samples, arena=tank, model=fish, **{**known, **changes})
 
@@ -204,7 +204,7 @@ def test_the_model_keeps_the_effects_that_it_has(record, tank, fish):
     having = dataclasses.replace(fish, effects={"turning-bias": {"strength": 0.1}})
     question = Question(
         samples=record(23, BIAS, minutes=6.0), arena=tank, model=having, noise_m=0.0,
-        noise_source="known", n_null=5, quick=True, seed=1, n_workers=2,
+        noise_source="known", n_null=5, quick=True, seed=1, n_workers=1,
     )  # fmt: skip
     found = diagnose(question, lambda _stage, _done, _all: None)
     assert found.verdict is Verdict.NO_EFFECT

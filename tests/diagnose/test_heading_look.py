@@ -50,7 +50,7 @@ def question(tank, fish, record):
     def of(effects=None, seed=31, **changes):
         known = {"noise_m": 0.0, "noise_source": "known", "n_null": 5, "quick": True}
         return Question(
-            samples=record(seed, effects), arena=tank, model=fish, seed=1, n_workers=2,
+            samples=record(seed, effects, minutes=6.0), arena=tank, model=fish, seed=1, n_workers=1,
             **{**known, **changes},
         )  # fmt: skip
 

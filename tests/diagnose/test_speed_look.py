@@ -23,10 +23,10 @@ LIT = {"generic:speed:place": {"strength": 0.4, "x_m": 0.22, "y_m": 0.78, "reach
 def case(tank, fish, record):
     """Return the case of fish of which some effects are hidden."""
 
-    def of(effects=None, seed=31):
+    def of(effects=None, seed=31, minutes=6.0):
         question = Question(
-            samples=record(seed, effects), arena=tank, model=fish, noise_m=0.0,
-            noise_source="known", n_null=5, quick=True, seed=1, n_workers=2,
+            samples=record(seed, effects, minutes=minutes), arena=tank, model=fish, noise_m=0.0,
+            noise_source="known", n_null=5, quick=True, seed=1, n_workers=1,
         )  # fmt: skip
         return open_case(question)
 
@@ -65,7 +65,7 @@ def test_speeds_that_sag_and_recover_are_fatigue(case):
     """They are as fast at the end as at the beginning: the form goes by the time, as a curve."""
     ends = {"by": 1.0, "knot_1": 0.0, "knot_2": 300.0, "knot_3": 600.0}
     sag = {"per_hour": 0.0, "usual_at_s": 300.0, "more_1": 2.0, "more_3": -2.0}
-    (step,) = speed_look(case({"fatigue": ends | sag}), nothing()).steps
+    (step,) = speed_look(case({"fatigue": ends | sag}, minutes=10.0), nothing()).steps
     assert step.choice.best.name == "fatigue"
     values = step.choice.best.values
     assert values["by"] == BY_TIME

@@ -23,12 +23,12 @@ def said(*_words):
 
 @pytest.fixture(scope="module")
 def found():
-    """Return what is said of a quarter of an hour of fish of the second simulator."""
+    """Return what is said of minutes of fish of the second simulator."""
     tank = load_arena("two-rooms", Path())
     fish = natural(tuple((zone.name, zone.follows_walls) for zone in tank.zones), dt_s=0.2)
 
-    def of(effect, strength, seed):
-        asked = Scenario(effect=effect, strength=strength, seed=seed, minutes=15.0)
+    def of(effect, strength, seed, minutes=10.0):
+        asked = Scenario(effect=effect, strength=strength, seed=seed, minutes=minutes)
         trial = make_trial(asked, oracle=False)
         xy = trial.samples_m
         samples = Samples(
@@ -40,7 +40,7 @@ def found():
             confidence=np.ones(xy.shape[:2], dtype=np.float32),
         )
         question = Question(
-            samples=samples, arena=tank, model=fish, seed=1, n_workers=2, noise_m=0.0,
+            samples=samples, arena=tank, model=fish, seed=1, n_workers=1, noise_m=0.0,
             noise_source="known", n_null=5, quick=True,
         )  # fmt: skip
         return diagnose(question, said)
@@ -49,17 +49,17 @@ def found():
 
 
 @pytest.mark.parametrize(
-    ("form", "strength"),
+    ("form", "strength", "minutes"),
     [
-        ("speed-turn-coupling/after-turn", 0.12),
-        ("burst-and-coast/rhythm", 0.13),
-        ("speed-matching/nearest", 0.13),
-        ("fatigue/uneven", 0.2),
+        ("speed-turn-coupling/after-turn", 0.12, 10.0),
+        ("burst-and-coast/rhythm", 0.13, 10.0),
+        ("speed-matching/nearest", 0.13, 10.0),
+        ("fatigue/uneven", 0.2, 15.0),
     ],
 )
-def test_a_form_that_is_not_ours_is_named_once(found, form, strength):
+def test_a_form_that_is_not_ours_is_named_once(found, form, strength, minutes):
     """Slower after wide turns, swinging speeds, the pace of the nearest, two fish that tire."""
-    told = found(form, strength, 3)
+    told = found(form, strength, 3, minutes)
     assert told.verdict is Verdict.NAMED
     assert [each.name for each in told.effects] == [form.split("/")[0]]
     assert find_effect(form.split("/")[0]).paces
