@@ -43,18 +43,12 @@ COMMANDS = (
 )
 
 
-def run_all(place):
-    """Run every stage by its command in an empty folder."""
-    program = Path(sys.executable).with_name("zfcal")
+def run_all(run):
+    """Run every stage by its command, given what runs one in an empty folder."""
     with tempfile.TemporaryDirectory() as kernels:
         # Compiled by these very commands: kernels that tests have compiled differ in last digits.
-        own = {**os.environ, "NUMBA_CACHE_DIR": kernels}
         for words in COMMANDS:
-            line = [program, *map(str, words), "--quiet"]
-            done = subprocess.run(
-                line, cwd=place, env=own, capture_output=True, text=True, check=False
-            )
-            assert done.returncode == 0, f"zfcal {words[0]}: {done.stderr}"
+            run("zfcal", *words, "--quiet", NUMBA_CACHE_DIR=kernels)
 
 
 def digests_of(place):
@@ -136,11 +130,14 @@ def processor():
 
 
 @pytest.mark.slow
-def test_a_small_trial_gives_the_numbers_that_it_gave(tmp_path):
-    """Import, track, analyse, calibrate, drive, diagnose, extend and report."""
+def test_a_small_trial_gives_the_numbers_that_it_gave(installed):
+    """Import, track, analyse, calibrate, drive, diagnose, extend and report, from the wheel."""
     known = json.loads(KNOWN.read_text())
-    run_all(tmp_path)
-    found = digests_of(tmp_path)
+    run_all(installed.run)
+    found = digests_of(installed.place)
+    assert "<svg" in (installed.place / "trial" / "report" / "index.html").read_text()
+    installed.run("zfcal", "check", "trial")
+    assert "man1/zfcal.1" in installed.run("zfcal", "--man", "man1")
     assert sorted(found) == sorted(known["artifacts"])
     for name, (wanted, now) in ((n, (known["artifacts"][n], found[n])) for n in found):
         assert now["origin"] == wanted["origin"], name
@@ -155,8 +152,18 @@ def test_digits_beyond_the_ninth_do_not_count_and_the_eighth_does():
     assert rounded({"a": [1.0000001]}) != {"a": [1.0]}
 
 
+def here(place):
+    """Return what runs a command of this environment in a folder."""
+
+    def run(program, *words, **environment):
+        line = [Path(sys.executable).with_name(program), *map(str, words)]
+        subprocess.run(line, cwd=place, env={**os.environ, **environment}, check=True)
+
+    return run
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        run_all(Path(folder))
+        run_all(here(folder))
         document = {"processor": processor(), "artifacts": digests_of(Path(folder))}
     KNOWN.write_text(json.dumps(document, indent=1, sort_keys=True) + "\n")
