@@ -133,6 +133,14 @@ def serving():
 
 
 @pytest.fixture(scope="session")
+def briefly():
+    """Return an environment in which each process of Python has brief rounds (`brief.py`)."""
+    here = str(REPOSITORY / "tests" / "briefly")
+    found = [here, os.environ.get("PYTHONPATH")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, found))}
+
+
+@pytest.fixture(scope="session")
 def streaming():
     """Return the module whose `Camera` serves images over HTTP in real time."""
     return _module("streaming")

@@ -1,17 +1,17 @@
-"""zfcal for a shell, in forks of one process that has loaded it, so that no command has a start.
+"""zfcal for a shell, in forks of one process that has loaded it: no command has to load it first.
 
-``python serving.py SOCKET`` serves until its standard input ends. ``python -ISs serving.py SOCKET
-WORD...`` has a command run there with its own folder, environment and streams, and leaves with the
-exit code. `Serving` is who starts the former and says how to call the latter; who asks imports
-little.
+``python serving.py serve SOCKET`` serves until its standard input ends. ``python -I -S serving.py
+ask SOCKET WORD...`` has a command run there with its own folder, environment and streams, and
+leaves with its exit code. `Serving` starts the former and says how to call the latter.
+
+An import that a command forgot is not noticed here: it was loaded for another one.
 """
 
-import contextlib
 import json
 import os
+import select
 import signal
 import socket
-import subprocess
 import sys
 
 LOADED = (
@@ -26,25 +26,29 @@ LOADED = (
     "zfcal.stages.extend.extend",
     "zfcal.stages.import_",
 )
-MOST = 1 << 20
-"""Bytes of an order: words, folder and environment."""
+"""What commands import only when they run."""
+
+MOST = 1 << 17
+"""Bytes of an order: the words and the environment."""
 
 
 class Serving:
-    """Serves a shell in a folder; leaving its block ends it.
+    """Serves a shell; leaving its block ends it.
 
     Parameters
     ----------
     place
-        A folder for the socket.
+        A folder for the socket; its name has some 90 letters at most.
     environment
-        Of the process, and of what its commands start.
+        Of the process. A command has that of who asks, and what only this one has.
     """
 
     def __init__(self, place, environment):
+        import subprocess
+
         self._socket = place / "zfcal.socket"
         self._process = subprocess.Popen(
-            [sys.executable, __file__, self._socket],
+            [sys.executable, __file__, "serve", self._socket],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
@@ -54,7 +58,7 @@ class Serving:
     @property
     def words(self):
         """What stands in a shell for ``zfcal``."""
-        return [sys.executable, "-ISs", __file__, str(self._socket)]
+        return [sys.executable, "-I", "-S", __file__, "ask", str(self._socket)]
 
     def __enter__(self):
         return self
@@ -67,51 +71,51 @@ class Serving:
 
 def ask(path, words):
     """Have a command run; return its exit code."""
-    order = json.dumps({"words": words, "env": dict(os.environ)})
+    order = json.dumps({"words": words, "environment": dict(os.environ)}).encode()
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as line:
-        line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST)
         line.connect(path)
-        socket.send_fds(line, [order.encode()], [0, 1, 2, os.open(".", os.O_RDONLY)])
-        said = line.recv(16)
-    # Nothing is said where the command was killed.
-    return int(said) if said else 128 + signal.SIGKILL
+        socket.send_fds(line, [order], [0, 1, 2, os.open(".", os.O_RDONLY)])
+        return int(line.recv(16))
 
 
-def carry_out(line):
-    """Run the command that a line asks for in this process, which is its own, and end it."""
-    from zfcal_cli.main import main
+def mind(line):
+    """Run the command that a line asks for, say how it ended, and end it where nobody listens.
 
-    said, (*streams, folder), _, _ = socket.recv_fds(line, MOST, 4)
-    order = json.loads(said)
+    This process returns as the command; the one that minds it ends here.
+    """
+    said, streams, _, _ = socket.recv_fds(line, MOST, 4)
+    command = os.fork()
+    if command == 0:
+        line.close()
+        become(json.loads(said), streams)
+        return
+    for each in streams:
+        os.close(each)
+    ended = os.pidfd_open(command)
+    if ended not in select.select([line, ended], [], [])[0]:
+        os.kill(command, signal.SIGTERM)
+    code = os.waitstatus_to_exitcode(os.waitpid(command, 0)[1])
+    try:
+        line.send(str(code if code >= 0 else 128 - code).encode())
+    finally:
+        os._exit(0)
+
+
+def become(order, streams):
+    """Let this process have the words, the environment, the streams and the folder of who asks."""
+    *streams, folder = streams
     for stream, given in enumerate(streams):
         os.dup2(given, stream)
         os.close(given)
     os.fchdir(folder)
     os.close(folder)
-    os.environ.clear()
-    os.environ.update(order["env"])
+    os.environ.update(order["environment"])
     sys.argv = ["zfcal", *order["words"]]
-    code = 1
-    try:
-        main()
-    except SystemExit as end:
-        code = end.code or 0
-    finally:
-        # A reader may have gone.
-        with contextlib.suppress(OSError):
-            sys.stdout.flush()
-        # What was begun beside the command ends with it, as at the end of a process.
-        from multiprocessing.util import _exit_function
-
-        _exit_function()
-        line.send(str(code).encode())
-        os._exit(code)
 
 
 def serve(path):
-    """Fork for each command, until standard input ends."""
+    """Load zfcal and fork for each command, until standard input ends; return in a fork alone."""
     import gc
-    import select
     from importlib import import_module
 
     for name in LOADED:
@@ -129,13 +133,19 @@ def serve(path):
             process = os.fork()
             if process == 0:
                 door.close()
-                carry_out(line)
+                mind(line)
+                return True
             line.close()
             running.add(process)
             running -= {each for each in running if os.waitpid(each, os.WNOHANG)[0]}
+    return False
 
 
 if __name__ == "__main__":
-    if sys.argv[2:]:
-        sys.exit(ask(sys.argv[1], sys.argv[2:]))
-    serve(sys.argv[1])
+    what, where, *typed = sys.argv[1:]
+    if what == "ask":
+        sys.exit(ask(where, typed))
+    if serve(where):
+        from zfcal_cli.main import main
+
+        main()

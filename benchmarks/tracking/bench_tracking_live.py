@@ -267,7 +267,7 @@ def main() -> None:
     made.add_argument("--seconds", type=int, default=60, help="How much film is drawn and sent.")
     made.add_argument("--busy", type=int, default=0, help="Cores that other work keeps busy.")
     options = made.parse_args()
-    seconds = 10 if options.tiny else options.seconds
+    seconds = 15 if options.tiny else options.seconds
     found: dict[str, Any] = {"machine": machine(), "load_before": load(), "busy": options.busy}
     with tempfile.TemporaryDirectory() as folder:
         drawn = draw(Path(folder), seconds)

@@ -2,14 +2,11 @@
 
 import importlib
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-BRIEFLY = Path(__file__).resolve().parents[1] / "briefly"
 
 
 @pytest.fixture(scope="module")
@@ -22,13 +19,12 @@ def script(repository):
 
 
 @pytest.fixture
-def command(repository):
+def command(repository, briefly):
     """Return what runs a script as its command and gives what it says; its rounds are brief."""
-    brief = {**os.environ, "PYTHONPATH": str(BRIEFLY)}
 
     def run(path, *words):
         line = [sys.executable, repository / "benchmarks" / path, *words]
-        done = subprocess.run(line, capture_output=True, text=True, check=False, env=brief)
+        done = subprocess.run(line, capture_output=True, text=True, check=False, env=briefly)
         assert done.returncode == 0, done.stderr
         return done
 

@@ -45,14 +45,13 @@ def asked(case, before, guess=None):
 
 @pytest.fixture(scope="module")
 def question(tank, fish, record):
-    """Return what asks of ten minutes of fish."""
+    """Return what asks of some minutes of fish."""
 
-    def of(effects=None, seed=31, **changes):
+    def of(effects=None, seed=31, minutes=6.0, **changes):
         known = {"noise_m": 0.0, "noise_source": "known", "n_null": 5, "quick": True}
-        return Question(
-            samples=record(seed, effects, minutes=6.0), arena=tank, model=fish, seed=1, n_workers=1,
-            **{**known, **changes},
-        )  # fmt: skip
+        samples = record(seed, effects, minutes=minutes)
+        asked = {"samples": samples, "arena": tank, "model": fish, "seed": 1, "n_workers": 1}
+        return Question(**{**asked, **known, **changes})
 
     return of
 
@@ -96,7 +95,7 @@ def test_what_features_name_goes_into_the_model_in_our_nearest_form(drawn):
 @pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_missing(question):
     """Nor where the model has the effect already."""
-    case = open_case(question())
+    case = open_case(question(minutes=10.0))
     assert asked(case, NOTHING).steps == ()
 
 
@@ -270,7 +269,7 @@ def test_a_place_that_all_fish_have_on_one_side_is_a_direction(question):
 @pytest.mark.slow
 def test_noise_alone_gains_something(question):
     """Of a response that is a little late, on replicates with half a millimetre of noise."""
-    case = open_case(question(noise_m=5e-4))
+    case = open_case(question(minutes=10.0, noise_m=5e-4))
     late = Gain(name="reaction-delay", label="a tenth of a step", log_p=np.zeros(3), n_strengths=1)
     (own,) = _noise_of(case, [late], ())
     assert 0 < own.more(1) < 20
@@ -568,7 +567,7 @@ def test_a_form_is_held_against_noise_where_positions_err(
 @pytest.mark.slow
 def test_noise_alone_makes_a_form_gain(question):
     """A response a tenth of a step late, by the law of measured positions; handedness hardly."""
-    case = open_case(question(noise_m=5e-4))
+    case = open_case(question(minutes=10.0, noise_m=5e-4))
     late = candidate_of("reaction-delay", {"delay_s": 0.02, "felt_m": 0.0, "whole": 1.0})
     form = SimpleNamespace(candidate=late, n_free=1)
     assert common.noise_of_form(case, form).more(1) > 10

@@ -49,7 +49,7 @@ def test_what_speeds_lack_is_named_one_after_the_other(case):
     assert {step.choice.best.name for step in steps} == set(both)
     assert steps[1].before is steps[0].choice.best.screen
     assert all(step.choice.ties == () for step in steps)
-    assert speed_look(case(), nothing()).steps == ()
+    assert speed_look(case(minutes=10.0), nothing()).steps == ()
 
 
 @pytest.mark.slow

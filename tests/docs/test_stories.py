@@ -13,8 +13,6 @@ import pytest
 
 from zfcal.artifacts.tables import read_tracks
 
-BRIEFLY = Path(__file__).resolve().parents[1] / "briefly"
-
 
 def stories():
     """Return the module of stories, as parameters are needed before there are fixtures."""
@@ -73,10 +71,9 @@ def test_every_heading_of_a_story_has_commands(snippets, reading):
 
 
 @pytest.fixture(scope="module")
-def brief(serving, tmp_path_factory):
+def brief(serving, briefly, tmp_path_factory):
     """Return the words for a zfcal that is loaded, and whose rounds are brief."""
-    environment = {**os.environ, "PYTHONPATH": str(BRIEFLY)}
-    with serving.Serving(tmp_path_factory.mktemp("serving"), environment) as served:
+    with serving.Serving(tmp_path_factory.mktemp("serving"), briefly) as served:
         yield served.words
 
 

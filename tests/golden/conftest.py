@@ -56,20 +56,20 @@ class Installed:
     ----------
     folder
         The environment.
-    place
-        An empty folder to work in.
     """
 
     folder: Path
-    place: Path
 
-    def run(self, *words, **environment):
-        """Run a program of the environment; nothing leads it to the checkout."""
+    def run(self, place, *words, **environment):
+        """Run a program in a folder and return what it says; nothing leads it to the checkout.
+
+        Keywords are added to the shell's variables.
+        """
         env = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "VIRTUAL_ENV"}}
         words = [str(self.folder / "bin" / words[0]), *map(str, words[1:])]
         done = subprocess.run(
             words,
-            cwd=self.place,
+            cwd=place,
             env={**env, **environment},
             capture_output=True,
             text=True,
@@ -91,4 +91,4 @@ def installed(built, tmp_path_factory):
     (site,) = (folder / "lib").glob("python3*/site-packages")
     # The path files in there, and with them that of the checkout, are not read.
     (site / "locked.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
-    return Installed(folder, tmp_path_factory.mktemp("empty"))
+    return Installed(folder)

@@ -43,12 +43,12 @@ COMMANDS = (
 )
 
 
-def run_all(run):
-    """Run every stage by its command, given what runs one in an empty folder."""
+def run_all(run, place):
+    """Run every stage by its command in an empty folder, given what runs one there."""
     with tempfile.TemporaryDirectory() as kernels:
         # Compiled by these very commands: kernels that tests have compiled differ in last digits.
         for words in COMMANDS:
-            run("zfcal", *words, "--quiet", NUMBA_CACHE_DIR=kernels)
+            run(place, "zfcal", *words, "--quiet", NUMBA_CACHE_DIR=kernels)
 
 
 def digests_of(place):
@@ -130,14 +130,14 @@ def processor():
 
 
 @pytest.mark.slow
-def test_a_small_trial_gives_the_numbers_that_it_gave(installed):
+def test_a_small_trial_gives_the_numbers_that_it_gave(installed, tmp_path):
     """Import, track, analyse, calibrate, drive, diagnose, extend and report, from the wheel."""
     known = json.loads(KNOWN.read_text())
-    run_all(installed.run)
-    found = digests_of(installed.place)
-    assert "<svg" in (installed.place / "trial" / "report" / "index.html").read_text()
-    installed.run("zfcal", "check", "trial")
-    assert "man1/zfcal.1" in installed.run("zfcal", "--man", "man1")
+    run_all(installed.run, tmp_path)
+    found = digests_of(tmp_path)
+    assert "<svg" in (tmp_path / "trial" / "report" / "index.html").read_text()
+    installed.run(tmp_path, "zfcal", "check", "trial")
+    assert "man1/zfcal.1" in installed.run(tmp_path, "zfcal", "--man", "man1")
     assert sorted(found) == sorted(known["artifacts"])
     for name, (wanted, now) in ((n, (known["artifacts"][n], found[n])) for n in found):
         assert now["origin"] == wanted["origin"], name
@@ -152,18 +152,14 @@ def test_digits_beyond_the_ninth_do_not_count_and_the_eighth_does():
     assert rounded({"a": [1.0000001]}) != {"a": [1.0]}
 
 
-def here(place):
-    """Return what runs a command of this environment in a folder."""
-
-    def run(program, *words, **environment):
-        line = [Path(sys.executable).with_name(program), *map(str, words)]
-        subprocess.run(line, cwd=place, env={**os.environ, **environment}, check=True)
-
-    return run
+def run_here(place, program, *words, **environment):
+    """Run a command of this environment in a folder."""
+    line = [Path(sys.executable).with_name(program), *map(str, words)]
+    subprocess.run(line, cwd=place, env={**os.environ, **environment}, check=True)
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        run_all(here(folder))
+        run_all(run_here, folder)
         document = {"processor": processor(), "artifacts": digests_of(Path(folder))}
     KNOWN.write_text(json.dumps(document, indent=1, sort_keys=True) + "\n")

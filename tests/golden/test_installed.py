@@ -37,17 +37,17 @@ def test_the_source_archive_makes_the_same_wheel(built):
     assert set(DATA) <= direct.keys()
 
 
-def test_the_installed_package_is_that_of_the_wheel(installed, repository):
+def test_the_installed_package_is_that_of_the_wheel(installed, repository, tmp_path):
     """Both roots and the data lie in the new environment; the version is that of the project."""
     program = (
         "import zfcal, zfcal_cli, zfcal.schemas, importlib.resources as r\n"
         "print(zfcal.__file__, zfcal_cli.__file__, zfcal.schemas.__file__, sep='\\n')\n"
         "print((r.files('zfcal') / 'py.typed').is_file())\n"
     )
-    *places, is_typed = installed.run("python", "-c", program).splitlines()
+    *places, is_typed = installed.run(tmp_path, "python", "-c", program).splitlines()
     assert all(place.startswith(str(installed.folder)) for place in places)
     assert is_typed == "True"
     project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
-    said = json.loads(installed.run("zfcal", "--version", "--json"))
+    said = json.loads(installed.run(tmp_path, "zfcal", "--version", "--json"))
     assert said["zfcal"] == project["version"]
     assert "numba" in said["libraries"]

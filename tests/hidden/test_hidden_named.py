@@ -23,11 +23,11 @@ def said(*_words):
 
 @pytest.fixture(scope="module")
 def found():
-    """Return what is said of minutes of fish of the second simulator."""
+    """Return what is said of fish of the second simulator: a quarter of an hour, or less."""
     tank = load_arena("two-rooms", Path())
     fish = natural(tuple((zone.name, zone.follows_walls) for zone in tank.zones), dt_s=0.2)
 
-    def of(effect, strength, seed, minutes=10.0):
+    def of(effect, strength, seed, minutes=15.0):
         asked = Scenario(effect=effect, strength=strength, seed=seed, minutes=minutes)
         trial = make_trial(asked, oracle=False)
         xy = trial.samples_m
@@ -81,7 +81,7 @@ def test_slow_turns_are_no_crowding(found):
 
 def test_a_sharp_range_has_the_listed_name(found):
     """Also where another form of what is beyond the list is nearer to it."""
-    told = found("interaction-range", "clear", 12)
+    told = found("interaction-range", "clear", 12, 10.0)
     assert [each.name for each in told.effects] == ["interaction-range"]
 
 

@@ -359,6 +359,7 @@ def covered_texts():
     def find(picture, width_mm=None):
         with theme.style(on_paper=width_mm is not None):
             figure = compose(picture, width_in=None if width_mm is None else width_mm / 25.4)
+            theme.lay_out(figure)
             figure.canvas.draw()
             renderer = figure.canvas.get_renderer()
             undrawn = {label for axes in figure.findobj(Axes) for label in _undrawn(axes)}

@@ -190,7 +190,7 @@ def style(*, on_paper: bool = False) -> Iterator[None]:
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure that no window manager knows of.
+    """Return an empty figure that no window manager knows of; `save` lays it out.
 
     Parameters
     ----------
@@ -212,8 +212,6 @@ def save(
 ) -> None:
     """Lay a figure out, and write it.
 
-    A figure that has an engine for its layout would be drawn once more, only to be laid out.
-
     Parameters
     ----------
     figure
@@ -225,11 +223,21 @@ def save(
     dpi
         Dots per inch, of what has dots.
     said
-        What the file says of itself; None leaves out what Matplotlib would say.
+        What the file says of itself; a name whose value is None leaves out what Matplotlib
+        would say.
     """
+    # As wide as the letters that are written.
     figure.set_dpi(dpi)
-    ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07).execute(figure)
+    lay_out(figure)
     figure.savefig(made, format=kind, dpi=dpi, metadata=dict(said))
+
+
+def lay_out(figure: Figure) -> None:
+    """Give all that stands beside the axes its room.
+
+    A figure that has an engine for its layout would be drawn once more, only to be laid out.
+    """
+    ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07).execute(figure)
 
 
 def wrapped(name: str) -> str:
