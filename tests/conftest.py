@@ -127,17 +127,19 @@ def forking():
 
 
 @pytest.fixture(scope="session")
-def serving():
-    """Return the module whose `Serving` runs commands for a shell, without their start."""
-    return _module("serving")
-
-
-@pytest.fixture(scope="session")
 def briefly():
     """Return an environment in which each process of Python has brief rounds (`brief.py`)."""
     here = str(REPOSITORY / "tests" / "briefly")
     found = [here, os.environ.get("PYTHONPATH")]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, found))}
+
+
+@pytest.fixture(scope="module")
+def brief_zfcal(briefly, tmp_path_factory):
+    """Return a shell's words for a zfcal that is loaded, and whose rounds are brief."""
+    place = tmp_path_factory.mktemp("serving")
+    with _module("serving").Serving(place, briefly) as served:
+        yield served.words
 
 
 @pytest.fixture(scope="session")

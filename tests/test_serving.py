@@ -10,19 +10,12 @@ import pytest
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def words(serving, briefly, tmp_path_factory):
-    """Return what stands for zfcal."""
-    with serving.Serving(tmp_path_factory.mktemp("serving"), briefly) as served:
-        yield served.words
-
-
 @pytest.fixture
-def shell(words, tmp_path):
+def shell(brief_zfcal, tmp_path):
     """Return what runs a line of a shell in an empty folder."""
 
     def run(line):
-        text = f'zfcal() {{ {shlex.join(words)} "$@"; }}; {line}'
+        text = f'zfcal() {{ {shlex.join(brief_zfcal)} "$@"; }}; {line}'
         return subprocess.run(
             ["bash", "-c", text],
             cwd=tmp_path,
@@ -54,10 +47,10 @@ def test_commands_read_what_comes_through_a_pipe(shell):
     assert "nothing to analyse" in shell("cat said").stdout
 
 
-def test_a_command_whose_caller_is_killed_ends(shell, words, tmp_path):
+def test_a_command_whose_caller_is_killed_ends(shell, brief_zfcal, tmp_path):
     """Nobody else has its output open: it would be read for ever."""
     shell("zfcal init trial --side-m 1 --fish 2 --fps 5")
-    line = [*words, "watch", "trial", "-v"]
+    line = [*brief_zfcal, "watch", "trial", "-v"]
     with subprocess.Popen(line, cwd=tmp_path, stderr=subprocess.PIPE) as caller:
         assert os.read(caller.stderr.fileno(), 1)
         caller.kill()

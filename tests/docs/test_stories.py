@@ -70,22 +70,15 @@ def test_every_heading_of_a_story_has_commands(snippets, reading):
             assert runs, (page, heading)
 
 
-@pytest.fixture(scope="module")
-def brief(serving, briefly, tmp_path_factory):
-    """Return the words for a zfcal that is loaded, and whose rounds are brief."""
-    with serving.Serving(tmp_path_factory.mktemp("serving"), briefly) as served:
-        yield served.words
-
-
 @pytest.fixture
-def shell(tmp_path, brief):
+def shell(tmp_path, brief_zfcal):
     """Return what runs a text in the folder of a story, as a reader's shell does."""
     folder, words = tmp_path / "here", tmp_path / "bin"
     folder.mkdir()
     words.mkdir()
 
     def run(text, *, is_brief):
-        own = brief if is_brief else [sys.executable, "-m", "zfcal_cli.main"]
+        own = brief_zfcal if is_brief else [sys.executable, "-m", "zfcal_cli.main"]
         (words / "zfcal").write_text(f'#!/bin/sh\nexec {shlex.join(own)} "$@"\n', encoding="utf-8")
         (words / "zfcal").chmod(0o755)
         path = f"{words}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
