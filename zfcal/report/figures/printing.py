@@ -17,7 +17,6 @@ from typing import Any
 from fontTools.subset import Options, Subsetter
 from fontTools.ttLib import TTFont
 from matplotlib import font_manager
-from matplotlib.figure import Figure
 
 from zfcal.report.figures import theme
 from zfcal.report.figures.panels import Picture, compose
@@ -58,15 +57,9 @@ def printed(picture: Picture, kind: str, *, width_mm: float | None = None) -> by
     with theme.style(on_paper=width_mm is not None):
         width_in = None if width_mm is None else width_mm / _MM_PER_IN
         figure = compose(picture, width_in=width_in)
-        _save(figure, made, kind, _said_of(picture, kind), on_paper=width_mm is not None)
+        dpi = theme.PNG_DPI if width_mm is None else theme.PAPER_DPI
+        theme.save(figure, made, kind, dpi=dpi, said=_said_of(picture, kind))
     return _with_fonts(made.getvalue()) if kind == "svg" else made.getvalue()
-
-
-def _save(
-    figure: Figure, made: BytesIO, kind: str, metadata: dict[str, Any], *, on_paper: bool
-) -> None:
-    dpi = theme.PAPER_DPI if on_paper else theme.PNG_DPI
-    theme.save(figure, made, kind, dpi=dpi, said=metadata)
 
 
 def _said_of(picture: Picture, kind: str) -> dict[str, Any]:

@@ -237,6 +237,7 @@ def lay_out(figure: Figure) -> None:
 
     A figure that has an engine for its layout would be drawn once more, only to be laid out.
     """
+    # In inches.
     ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.07).execute(figure)
 
 
