@@ -44,7 +44,7 @@ def test_commands_read_what_comes_through_a_pipe(shell):
     shell("zfcal init trial --side-m 1 --fish 2 --fps 5")
     found = shell("echo trial/tracks/000060.parquet | zfcal analyse - 2>&1 | tee said | wc -l")
     assert int(found.stdout) > 0
-    assert "nothing to analyse" in shell("cat said").stdout
+    assert "trial/tracks: 0 whole segments" in shell("cat said").stdout
 
 
 def test_a_command_whose_caller_is_killed_ends(shell, brief_zfcal, tmp_path):
