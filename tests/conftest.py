@@ -1,5 +1,6 @@
 """What all tests share: real recordings, how hypothesis runs, and what is compiled before."""
 
+import gc
 import importlib.util
 import math
 import os
@@ -69,6 +70,12 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if "hardware" in item.keywords:
             item.add_marker(skip)
+
+
+def pytest_collection_finish():
+    """Let what is loaded by now be no garbage: to look through it again takes time."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
