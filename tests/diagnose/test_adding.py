@@ -79,6 +79,14 @@ def test_what_nothing_bears_out_is_suspicious(added):
     assert added(named=["turning-bias"], nats=400.0)[0] == []
 
 
+def test_what_chance_may_do_once_in_a_thousand_is_not_suspicious(added):
+    """Though it is enough for a name that something bears out."""
+    for p, is_sure in ((0.0009, True), (0.0011, False)):
+        told = replace(ONE, p=p)
+        assert added(told=told, borne_out=False)[1].suspicious is is_sure
+        assert added(told=told)[0] == ["alignment"]
+
+
 def test_what_explains_a_name_is_asked_first(added):
     """Where nothing bears it out the name is asked itself; what it gains counts either way."""
     few = Gain(name="group-cohesion", label="x", log_p=np.full(400, 0.03), n_strengths=1)

@@ -160,7 +160,9 @@ def test_noise_poses_as_memory_in_theory_and_not_in_the_chain(record, chain_of, 
     chain = chain_of(noisy, noise_m=0.002)
     memory = candidate("turning-memory", forgets_wide=1.0)
     z = Screen(scene=make_scene(noisy, chain.arena), fitted=chain.fitted).ask(memory).z
-    rows = run_null(chain, lambda _n, screen: np.array([screen.ask(memory).z]), 6, n_workers=2)
+    rows = run_null(
+        chain, lambda _n, screen: np.array([screen.ask(memory).z]), range(6), n_workers=2
+    )
     null = from_replicates(np.array(rows))
 
     assert abs(z) > 5
@@ -173,7 +175,7 @@ def test_replicates_do_not_depend_on_workers(record, chain_of, candidate):
     chain, bias = chain_of(record(5, minutes=2.0)), candidate("turning-bias")
     told = []
     one, two = (
-        run_null(chain, lambda n, s: (n, s.ask(bias).z), 4, n_workers=w, done=told.append)
+        run_null(chain, lambda n, s: (n, s.ask(bias).z), range(4), n_workers=w, done=told.append)
         for w in (1, 2)
     )
     assert one == two

@@ -11,7 +11,7 @@ from zfcal.diagnose.features.naming import Answer, Told
 from zfcal.diagnose.looks import Found, is_other_form, outdoes
 from zfcal.diagnose.naming import SURE, Refit
 from zfcal.diagnose.screening import Screen
-from zfcal.diagnose.selection import GENERIC_SHARE, LEAST_SHARE, Step
+from zfcal.diagnose.selection import GENERIC_SHARE, LEAST_SHARE, UNNAMED_LEVEL, Step
 from zfcal.diagnose.steadiness import Of
 
 
@@ -81,7 +81,8 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
         named = named or look.borne_out(told, guess)
     added = chosen(told, named, plain, guess, look.of)
     if added is None:
-        return Found(suspicious=told is not None and look.may_doubt, hidden=said.hidden)
+        is_sure = told is not None and told.p < UNNAMED_LEVEL
+        return Found(suspicious=is_sure and look.may_doubt, hidden=said.hidden)
     if told is None or added is not named:
         return Found(steps=(added,), hidden=said.hidden)
     return Found(

@@ -136,7 +136,7 @@ class Unfeatured:
             return np.array([other.ask(each).z for each in held])
 
         n = QUICK_REPLICATES if question.quick else _REPLICATES
-        rows = run_null(case.chain, ask, n, n_workers=question.n_workers)
+        rows = run_null(case.chain, ask, range(n), n_workers=question.n_workers)
         family = Asked(candidates=case.generic, held=held, null=from_replicates(np.array(rows)))
         return best_of(family, [best.score for best in found])
 

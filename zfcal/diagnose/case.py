@@ -23,6 +23,7 @@ from zfcal.diagnose.null import Chain, Measurement, check_length
 from zfcal.diagnose.omnibus import Omnibus, statistics
 from zfcal.diagnose.question import Question
 from zfcal.diagnose.screening import Screen
+from zfcal.diagnose.selection import UNNAMED_LEVEL
 from zfcal.diagnose.sharpening import sharpened
 from zfcal.diagnose.standing import standing_of
 from zfcal.model.effects import Effect, find_effect, generic_effects
@@ -36,7 +37,6 @@ LEAST_STEPS = 200
 
 QUICK_REPLICATES = 6
 
-_UNEXPLAINED = 1e-3
 _ASSUMED_NOISE_M = 0.0
 
 _SHARP_M = 1e-4
@@ -98,7 +98,7 @@ def is_suspicious(question: Question, omnibus: Omnibus) -> bool:
 
     A quick answer has no replicates of the omnibus test, which cost more than all the rest of it.
     """
-    return can_suspect(question) and omnibus.p < _UNEXPLAINED
+    return can_suspect(question) and omnibus.p < UNNAMED_LEVEL
 
 
 def can_suspect(question: Question) -> bool:

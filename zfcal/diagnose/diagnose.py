@@ -165,7 +165,7 @@ def _null_rows(case: Case, asked: Sequence[Candidate], tell: Tell) -> list[_Row]
     return run_null(
         case.chain,
         ask,
-        n,
+        range(n),
         n_workers=question.n_workers,
         done=lambda done: tell("null replicates", done, n),
     )

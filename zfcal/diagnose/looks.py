@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple, TypeAlias
 
@@ -36,6 +35,16 @@ bears it out and something is left."""
 _FORMS = 6
 """Forms of an effect, the clearest ones, that are put into the model to see which gains most; those
 alone that are within reach of the clearest, if that one is clear at all."""
+
+
+_FIRST_REPLICATES = 2
+"""Replicates that are asked first: the others where these leave a gain in doubt."""
+
+_NO_DOUBT = 1e-9
+"""Chance of a gain beside what noise makes in which further replicates would change nothing."""
+
+_HARDLY = 0.05
+"""Share of a gain below which what noise makes of it matters little, even known roughly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -193,8 +202,8 @@ def explained(told: Told, ask: Ask) -> Told:
     kept = [tie for tie in told.ties if left[tie.name].stands or not own_beside(tie.name).stands]
     cause = next((each for each in clear if explains(each.gain.name)), None)
     if cause is not None:
-        cause = dataclasses.replace(cause, ties=_ties_of(cause, told.others, ask))
-    return dataclasses.replace(told, ties=tuple(kept), cause=cause)
+        cause = replace(cause, ties=_ties_of(cause, told.others, ask))
+    return replace(told, ties=tuple(kept), cause=cause)
 
 
 def _ties_of(cause: Told, others: Sequence[Told], ask: Ask) -> tuple[Gain, ...]:
@@ -236,10 +245,26 @@ def noise_of_features(
             most[gain.key] = max(most.get(gain.key, 0.0), float(gain.log_p.sum()))
         return [most.get(key, 0.0) for key in keys]
 
-    n_workers = case.question.n_workers
-    rows = run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers)
     n_strengths, n_tried = [gain.n_strengths for gain in clear], [gain.n_tried for gain in clear]
-    return by_noise(np.array(rows), n_strengths, n_tried)
+    rows: list[list[float]] = []
+    for numbers in (range(_FIRST_REPLICATES), range(_FIRST_REPLICATES, QUICK_REPLICATES)):
+        rows += run_null(case.chain, ask, numbers, n_workers=case.question.n_workers)
+        found = by_noise(np.array(rows), n_strengths, n_tried)
+        held = [replace(gain, noise=own) for gain, own in zip(clear, found, strict=True)]
+        if not any(_is_in_doubt(gain) for gain in held):
+            break
+    return found
+
+
+def _is_in_doubt(gain: Gain) -> bool:
+    """Return whether further replicates may tell more of a gain.
+
+    They do not of one that noise may well make, nor of one that it hardly makes a part of.
+    """
+    if gain.p > LEVEL:
+        return False
+    made = gain.noise.more(gain.n_strengths)
+    return gain.p > _NO_DOUBT or made > _HARDLY * float(gain.log_p.sum())
 
 
 def as_step(case: Case, screen: Screen, told: Told) -> Step | None:
@@ -316,7 +341,7 @@ def noise_of_form(case: Case, form: Refit) -> ByNoise:
         return [float(refit(settled, settled.ask(form.candidate)).gain.sum())]
 
     n_workers = case.question.n_workers
-    rows = run_null(case.chain, ask, QUICK_REPLICATES, n_workers=n_workers)
+    rows = run_null(case.chain, ask, range(QUICK_REPLICATES), n_workers=n_workers)
     return by_noise(np.array(rows), [form.n_free])[0]
 
 
@@ -347,7 +372,7 @@ def in_the_model(case: Case, screen: Screen, gain: Gain) -> tuple[Refit, Score]:
     # A curve that is worth it gains more than half a log of the samples for each parameter.
     least = 0.5 * len(MORE) * math.log(len(made[k].gain))
     if by is not None and gain.nats - made[k].nats > least:
-        bent = dataclasses.replace(tried[k], candidate=by)
+        bent = replace(tried[k], candidate=by)
         other = refit(screen, bent, n_workers=n_workers)
         if other.worth > made[k].worth:
             return other, bent

@@ -8,7 +8,7 @@ err in opposite directions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -279,7 +279,7 @@ class Chain:
 def run_null(
     chain: Chain,
     ask: Callable[[int, Screen], T],
-    n: int,
+    numbers: Sequence[int],
     *,
     n_workers: int,
     done: Callable[[int], None] = lambda _n: None,
@@ -292,8 +292,8 @@ def run_null(
         From the fitted model to scores.
     ask
         Of a replicate: its number and its screen.
-    n
-        How many.
+    numbers
+        Of the replicates: each is the same whenever it is asked.
     n_workers
         Replicates at the same time; the numbers do not depend on it.
     done
@@ -305,7 +305,7 @@ def run_null(
         return ask(number, chain.screen(number))
 
     with ThreadPoolExecutor(max(1, n_workers)) as pool:
-        for row in pool.map(work, range(n)):
+        for row in pool.map(work, numbers):
             rows.append(row)
             done(len(rows))
     return rows

@@ -24,6 +24,10 @@ from zfcal.diagnose.screening import Screen
 LEVEL = 0.02
 """Chance of a false alarm over the whole family."""
 
+UNNAMED_LEVEL = 0.001
+"""Chance of what has no name: of the omnibus test, and of features that nothing bears out. It helps
+nobody to a mechanism, so it is said where it is sure."""
+
 MOST_EFFECTS = 4
 
 IN_REACH = 0.5
