@@ -36,7 +36,11 @@ def added(tank, monkeypatch):
     def of(
         *, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, may_doubt=True
     ):  # fmt: skip
-        wanted = {}
+        wanted, of.explained = {}, None
+
+        def explain(unexplained):
+            of.explained = unexplained.gain.name
+            return told
 
         def said(kind, found):
             def of_kind(_screen, *, on_speed, least, **_how):
@@ -47,7 +51,8 @@ def added(tank, monkeypatch):
             return of_kind
 
         look = SimpleNamespace(
-            ask=lambda: Answer(told=told, hidden=(LATE,)),
+            ask=lambda: Answer(told=replace(told, cause=None) if told else None, hidden=(LATE,)),
+            explained=explain,
             screen=SimpleNamespace(scene=SimpleNamespace(arena=tank)), on_speed=False,
             has_features=True, may_doubt=may_doubt, of=None, not_left_over=lambda guess: guess,
             borne_out=lambda told, _guess: (
@@ -99,6 +104,18 @@ def test_what_explains_a_name_is_asked_first(added):
         assert names == expected
         assert made.nats == (pytest.approx(39.0) if expected else 0.0)
         assert made.suspicious is (not expected)
+
+
+def test_what_explains_a_name_is_not_asked_where_that_is_not_added(added):
+    """It gains too little beside another, or an effect beyond the list leads all features."""
+    added()
+    assert added.explained == "alignment"
+    added(named=["turning-bias"], nats=400.0)
+    assert added.explained is None
+    for guess, explained in (("wall", None), ("neighbour-heading", "alignment")):
+        names, _, _ = added(guess=step(f"generic:heading:{guess}", 90.0))
+        assert added.explained == explained
+        assert names == ([f"generic:heading:{guess}"] if explained is None else ["alignment"])
 
 
 def test_further_effects_gain_a_share_of_the_clearest(added):

@@ -41,6 +41,9 @@ class Look(Protocol):
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
 
+    def explained(self, told: Told) -> Told:
+        """Return a name with what explains it, and without ties that say nothing beside it."""
+
     def borne_out(self, told: Told, guess: Step | None) -> Step | None:
         """Return a name as an effect in the model; None where nothing bears it out."""
 
@@ -51,7 +54,9 @@ class Look(Protocol):
 def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: float = 0.0) -> Found:
     """Return what is added to a model: one effect, or none.
 
-    A further effect has to gain a share of what the clearest one does.
+    A further effect has to gain a share of what the clearest one does. What explains a name is
+    asked where that name may be added: not where it gains too little, nor where an effect beyond
+    the list leads it.
 
     Parameters
     ----------
@@ -77,6 +82,8 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
     told = said.told
     named = None
     if told is not None and told.gain.nats >= least:
+        if guess is None or not leads(guess, told, look.of):
+            told = look.explained(told)
         named = look.borne_out(told.cause, guess) if told.cause else None
         named = named or look.borne_out(told, guess)
     added = chosen(told, named, plain, guess, look.of)
@@ -116,6 +123,14 @@ def may_guess(there: Sequence[Refit], arena: Arena) -> bool:
     )  # fmt: skip
 
 
+def leads(guess: Step, said: Told, of: Of) -> bool:
+    """Return whether an effect beyond the list gains clearly more than features of any listed one.
+
+    It is no other form of what features name.
+    """
+    return not is_other_form(guess, said) and outdoes(guess, said.gain.log_p, said.gain.nats, of)
+
+
 def chosen(
     said: Told | None, named: Step | None, plain: Step | None, guess: Step | None, of: Of
 ) -> Step | None:
@@ -147,6 +162,5 @@ def chosen(
         return listed
     is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
     if said is not None:
-        is_ahead = is_ahead and not is_other_form(guess, said)
-        is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
+        is_ahead = is_ahead and leads(guess, said, of)
     return guess if is_ahead else listed

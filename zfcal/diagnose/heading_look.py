@@ -221,10 +221,11 @@ class _Looks:
 
     def ask(self) -> Answer:
         """Return which name it is, and which ones noise hides."""
-        said, _ = self._said
-        if said.told is None:
-            return said
-        return dataclasses.replace(said, told=explained(said.told, self._beside))
+        return self._said[0]
+
+    def explained(self, told: Told) -> Told:
+        """Return a name with what explains it, and without ties that say nothing beside it."""
+        return explained(told, self._beside)
 
     @cached_property
     def _said(self) -> tuple[Answer, frozenset[Idle]]:

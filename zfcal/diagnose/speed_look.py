@@ -178,10 +178,11 @@ class _Looks:
         """Return which name it is, and which ones noise hides."""
         n_workers = self.case.question.n_workers
         gains = pace_gains(self.paces, self._asked(self.beside), n_workers=n_workers)
-        said = answer(gains, self._noise(self.beside), level=level_of(self.number))
-        if said.told is None:
-            return said
-        return dataclasses.replace(said, told=explained(said.told, self._beside))
+        return answer(gains, self._noise(self.beside), level=level_of(self.number))
+
+    def explained(self, told: Told) -> Told:
+        """Return a name with what explains it, and without ties that say nothing beside it."""
+        return explained(told, self._beside)
 
     def _explains(self, told: Told) -> bool:
         """Return whether a name leads, and no other one gains more than chance beside it."""
