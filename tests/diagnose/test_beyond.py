@@ -179,6 +179,6 @@ def test_where_positions_err_replicates_are_asked_as_well(unfeatured, monkeypatc
     assert own.beyond(own.case.screen, on_speed=False) is not None
     chance = SimpleNamespace(ask=lambda _candidate: SimpleNamespace(z=-60.0))
     monkeypatch.setattr(
-        asking, "run_null", lambda _chain, ask, n, **_: [ask(k, chance) for k in range(n)]
+        asking, "run_null", lambda _chain, ask, some, **_: [ask(k, chance) for k in some]
     )
     assert own.beyond(own.case.screen, on_speed=False) is None
