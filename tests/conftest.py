@@ -73,7 +73,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Let what is loaded by now be no garbage: to look through it again takes time."""
+    """Do not search what is loaded by now for garbage again and again, which takes time."""
     gc.collect()
     gc.freeze()
 

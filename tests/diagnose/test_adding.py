@@ -31,15 +31,16 @@ def step(name, nats=20.0, ahead=9.0):
 @pytest.fixture
 def added(tank, monkeypatch):
     """Return what is added to a model, of what features, forms and scores say."""
-    monkeypatch.setattr(adding, "outdoes", lambda *_: True)
 
     def of(
-        *, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, may_doubt=True
+        *, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, may_doubt=True,
+        outdoes=True,
     ):  # fmt: skip
-        wanted, of.explained = {}, None
+        monkeypatch.setattr(adding, "outdoes", lambda *_: outdoes)
+        wanted, of.explained = {}, []
 
         def explain(unexplained):
-            of.explained = unexplained.gain.name
+            of.explained.append([each.gain.name for each in unexplained.others])
             return told
 
         def said(kind, found):
@@ -108,14 +109,51 @@ def test_what_explains_a_name_is_asked_first(added):
 
 def test_what_explains_a_name_is_not_asked_where_that_is_not_added(added):
     """It gains too little beside another, or an effect beyond the list leads all features."""
-    added()
-    assert added.explained == "alignment"
-    added(named=["turning-bias"], nats=400.0)
-    assert added.explained is None
-    for guess, explained in (("wall", None), ("neighbour-heading", "alignment")):
-        names, _, _ = added(guess=step(f"generic:heading:{guess}", 90.0))
-        assert added.explained == explained
-        assert names == ([f"generic:heading:{guess}"] if explained is None else ["alignment"])
+    wall, heading = (
+        step(f"generic:heading:{name}", 90.0) for name in ("wall", "neighbour-heading")
+    )
+    for how, times in (
+        ({}, 1), ({"named": ["turning-bias"], "nats": 400.0}, 0), ({"guess": wall}, 0),
+        ({"guess": wall, "outdoes": False}, 1), ({"guess": heading}, 1),
+    ):  # fmt: skip
+        names, _, _ = added(**how)
+        assert added.explained == [[]] * times
+        assert names == (
+            [] if "nats" in how else ["alignment"] if times else ["generic:heading:wall"]
+        )
+
+
+def test_what_explains_a_name_keeps_out_another_form_of_it(added):
+    """Such names alone are asked at first where an effect beyond the list leads all features."""
+    turns, alike = (
+        Told(gain=replace(ONE.gain, name=name), p=0.0, ties=(), lead=0.0)
+        for name in ("turning-bias", "alignment")
+    )
+    walls = replace(ONE, gain=replace(ONE.gain, name="wall-persistence"), others=(turns, alike))
+    guess = step("generic:heading:neighbour-heading", 90.0)
+    names, _, _ = added(told=replace(walls, cause=alike), guess=guess)
+    assert (names, added.explained) == (
+        ["alignment"],
+        [["alignment"], ["turning-bias", "alignment"]],
+    )
+    names, _, _ = added(told=walls, guess=guess)
+    assert (names, added.explained) == (["generic:heading:neighbour-heading"], [["alignment"]])
+
+
+def test_what_explains_a_name_is_asked_where_a_form_of_it_comes_near_the_guess(added):
+    """Its features do not."""
+    turns = Told(gain=replace(ONE.gain, name="turning-bias"), p=0.0, ties=(), lead=0.0)
+    told, guess = replace(ONE, cause=turns), step("generic:heading:wall", 90.0, ahead=1.9)
+    assert added(told=told, guess=guess)[0] == ["turning-bias"]
+
+
+def test_the_least_chance_of_all_names_counts_for_what_has_none(added):
+    """The one that gains most may have more strengths."""
+    other = Told(gain=replace(ONE.gain, name="crowding"), p=1e-9, ties=(), lead=0.0)
+    told = replace(ONE, p=0.005, others=(other,))
+    assert added(told=told, borne_out=False)[1].suspicious
+    told = replace(ONE, p=0.005, others=(replace(other, p=0.006),))
+    assert not added(told=told, borne_out=False)[1].suspicious
 
 
 def test_further_effects_gain_a_share_of_the_clearest(added):

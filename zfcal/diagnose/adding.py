@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from zfcal.arena import Arena
@@ -55,8 +56,8 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
     """Return what is added to a model: one effect, or none.
 
     A further effect has to gain a share of what the clearest one does. What explains a name is
-    asked where that name may be added: not where it gains too little, nor where an effect beyond
-    the list leads it.
+    asked where that name may be added, or keep out an effect beyond the list: not where that one
+    leads all features.
 
     Parameters
     ----------
@@ -79,16 +80,18 @@ def further(look: Look, unfeatured: Unfeatured, there: Sequence[Refit], nats: fl
         look.screen, on_speed=look.on_speed, least=least, has_features=look.has_features
     )
     said = look.ask()
-    told = said.told
-    named = None
-    if told is not None and told.gain.nats >= least:
-        if guess is None or not leads(guess, told, look.of):
-            told = look.explained(told)
-        named = look.borne_out(told.cause, guess) if told.cause else None
-        named = named or look.borne_out(told, guess)
+    told, may_be = said.told, said.told is not None and said.told.gain.nats >= least
+    if told is not None and (may_be or guess is not None):
+        told = _explained(look, told, guess)
+    named = _borne_out(look, told, guess) if told is not None and may_be else None
     added = chosen(told, named, plain, guess, look.of)
+    if told is not None and may_be and told is said.told and added is not guess:
+        # A form of what is told gains as much as what leads its features.
+        told = look.explained(told)
+        named = _borne_out(look, told, guess)
+        added = chosen(told, named, plain, guess, look.of)
     if added is None:
-        is_sure = told is not None and told.p < UNNAMED_LEVEL
+        is_sure = told is not None and _least_p(told) < UNNAMED_LEVEL
         return Found(suspicious=is_sure and look.may_doubt, hidden=said.hidden)
     if told is None or added is not named:
         return Found(steps=(added,), hidden=said.hidden)
@@ -123,12 +126,31 @@ def may_guess(there: Sequence[Refit], arena: Arena) -> bool:
     )  # fmt: skip
 
 
-def leads(guess: Step, said: Told, of: Of) -> bool:
-    """Return whether an effect beyond the list gains clearly more than features of any listed one.
+def _explained(look: Look, told: Told, guess: Step | None) -> Told:
+    """Return a name with what explains it; as it is where an effect beyond the list leads anyway.
 
-    It is no other form of what features name.
+    That gains clearly more than features of any listed one, and is no other form of the name, nor
+    of one that explains it.
     """
-    return not is_other_form(guess, said) and outdoes(guess, said.gain.log_p, said.gain.nats, of)
+    if guess is None or is_other_form(guess, told):
+        return look.explained(told)
+    if not outdoes(guess, told.gain.log_p, told.gain.nats, look.of):
+        return look.explained(told)
+    forms = tuple(each for each in told.others if is_other_form(guess, each))
+    if forms and look.explained(replace(told, others=forms, ties=())).cause is not None:
+        return look.explained(told)
+    return told
+
+
+def _borne_out(look: Look, told: Told, guess: Step | None) -> Step | None:
+    """Return what explains a name, or else that name, as an effect; None where nothing does."""
+    named = look.borne_out(told.cause, guess) if told.cause else None
+    return named or look.borne_out(told, guess)
+
+
+def _least_p(told: Told) -> float:
+    """Return the least chance of all names that gain more than that."""
+    return min(each.p for each in (told, *told.others))
 
 
 def chosen(
@@ -162,5 +184,6 @@ def chosen(
         return listed
     is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
     if said is not None:
-        is_ahead = is_ahead and leads(guess, said, of)
+        is_ahead = is_ahead and not is_other_form(guess, said)
+        is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
     return guess if is_ahead else listed

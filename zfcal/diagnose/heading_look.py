@@ -54,8 +54,8 @@ _KEPT = 2
 def heading_look(case: Case, before: Found, unfeatured: Unfeatured) -> Found:
     """Return what is missing once headings were asked for what their law lacks.
 
-    Where nothing is named though features gain more than chance, what is found is nothing that has
-    a name: see `Found.suspicious`.
+    Where nothing is named though features gain what chance hardly gives, what is found is nothing
+    that has a name: see `Found.suspicious`.
 
     Parameters
     ----------

@@ -38,13 +38,16 @@ alone that are within reach of the clearest, if that one is clear at all."""
 
 
 _FIRST_REPLICATES = 2
-"""Replicates that are asked first: the others where these leave a gain in doubt."""
+"""Replicates that are asked first: the others where these leave gains in doubt."""
 
 _NO_DOUBT = 1e-9
-"""Chance of a gain beside what noise makes in which further replicates would change nothing."""
+"""Chance of a gain that no further replicate would put in doubt."""
 
-_HARDLY = 0.05
-"""Share of a gain below which what noise makes of it matters little, even known roughly."""
+_SMALL_SHARE = 0.05
+"""Share of a gain up to which what noise makes of it need not be known better."""
+
+_LARGE_SHARE = 0.25
+"""Share of a gain that noise might make where the first replicates happen to gain little."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +56,8 @@ class Found:
 
     ``nats`` is what the clearest of them on headings gains by features, whatever its form.
     ``without_noise`` where one explains what noise of positions had seemed to. ``suspicious`` where
-    nothing is named though features gain more than chance: no form of ours bears out what they say.
+    nothing is named though features gain what chance hardly gives: no form of ours bears out what
+    they say.
     ``hidden`` are names that gain no more than noise of positions may make.
     """
 
@@ -251,20 +255,26 @@ def noise_of_features(
         rows += run_null(case.chain, ask, numbers, n_workers=case.question.n_workers)
         found = by_noise(np.array(rows), n_strengths, n_tried)
         held = [replace(gain, noise=own) for gain, own in zip(clear, found, strict=True)]
-        if not any(_is_in_doubt(gain) for gain in held):
+        if all(map(_may_be_noise, held)) or all(map(_is_no_noise, held)):
             break
     return found
 
 
-def _is_in_doubt(gain: Gain) -> bool:
-    """Return whether further replicates may tell more of a gain.
+def _may_be_noise(gain: Gain) -> bool:
+    """Return whether noise makes as much often enough."""
+    return gain.p > LEVEL
 
-    They do not of one that noise may well make, nor of one that it hardly makes a part of.
+
+def _is_no_noise(gain: Gain) -> bool:
+    """Return whether a gain is sure, and what noise makes of it matters little for its order.
+
+    Noise that comes and goes may make much though two replicates gain little. So the chance is that
+    beside a good share of the gain itself.
     """
-    if gain.p > LEVEL:
-        return False
-    made = gain.noise.more(gain.n_strengths)
-    return gain.p > _NO_DOUBT or made > _HARDLY * float(gain.log_p.sum())
+    raw = float(gain.log_p.sum())
+    by_two = math.sqrt(1 + 1 / _FIRST_REPLICATES)
+    most = replace(gain, noise=ByNoise(mean_nats=_LARGE_SHARE * raw, stretch=by_two))
+    return gain.noise.more(gain.n_strengths) <= _SMALL_SHARE * raw and most.p <= _NO_DOUBT
 
 
 def as_step(case: Case, screen: Screen, told: Told) -> Step | None:

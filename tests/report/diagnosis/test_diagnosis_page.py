@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from zfcal.diagnose import case
+from zfcal.diagnose import case, selection
 from zfcal.diagnose.document import Sheet, findings_document, gap_document, read_document
 from zfcal.diagnose.findings import FeatureCurve, Gap, Note, Screened, Verdict
 from zfcal.parameters import natural
@@ -207,7 +207,7 @@ def test_a_quick_look_is_told_by_what_makes_it_one():
     """The page does not import the engine, which takes seconds, for three numbers."""
     assert diagnosis_words.QUICK_REPLICATES == case.QUICK_REPLICATES
     assert diagnosis_words.SHARP_M == case._SHARP_M
-    assert diagnosis_words.UNLIKE == case._UNEXPLAINED
+    assert diagnosis_words.UNLIKE == selection.UNNAMED_LEVEL
 
 
 def test_a_control_that_fires_is_the_first_card(make_sheet):

@@ -89,7 +89,7 @@ def by_noise(
     mean = np.maximum(gained.mean(axis=0) - np.log(tried), 0.0)
     apart = np.maximum(2 * mean - k, 0.0)
     spread = (2 * gained).var(axis=0, ddof=1) / (2 * (k + 2 * apart))
-    # Six replicates show a spread badly: theory counts as much as they do.
+    # Six replicates show a spread badly: theory counts as much as they do, and beside two more.
     wide = (_CALM + (n - 1) * spread) / (_CALM + n - 1)
     wide = np.where(apart > 0, np.maximum(wide, 1.0), 1.0)
     return [

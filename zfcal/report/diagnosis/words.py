@@ -21,7 +21,7 @@ SHARP_M = 1e-4
 are those of its theory. As in ``zfcal.diagnose.case``, which takes seconds to import."""
 
 UNLIKE = 1e-3
-"""Where p of the omnibus test is less, model and fish disagree, there as well."""
+"""Where p of the omnibus test is less, model and fish disagree: ``zfcal.diagnose.selection``."""
 
 
 def verdict_sentence(findings: Findings) -> str:
