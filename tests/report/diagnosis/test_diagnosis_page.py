@@ -421,6 +421,12 @@ def test_a_pool_draws_what_is_drawn_without(make_sheet, tmp_path):
     assert drawn == {path.name: path.read_bytes() for path in without}
 
 
+def is_deaf(pid):
+    """Return whether a process holds back interrupts from the keyboard."""
+    (held,) = re.findall(r"SigBlk:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return bool(int(held, 16) >> (signal.SIGINT - 1) & 1)
+
+
 def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
     """An interrupt is for whoever began them; then nobody waits until they are ready."""
     hands = {}
@@ -429,14 +435,12 @@ def test_hands_are_deaf_to_the_keyboard_and_dropped_after_an_error():
         with RenderPool() as pool:
             pool.prepare()
             for hand in multiprocessing.active_children():
-                status = Path(f"/proc/{hand.pid}/status").read_text()
-                (held,) = re.findall(r"SigBlk:\s*(\w+)", status)
-                hands[hand] = int(held, 16) >> (signal.SIGINT - 1) & 1
+                hands[hand] = is_deaf(hand.pid)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert list(hands.values()) == [1, 1]
+    assert list(hands.values()) == [True, True]
     assert [hand.exitcode for hand in hands] == [-signal.SIGTERM] * 2
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
@@ -452,8 +456,8 @@ with RenderPool() as pool:
 """
 
 
-def test_hands_end_with_a_parent_that_is_killed():
-    """They would wait for good."""
+def test_the_first_hands_are_deaf_and_end_with_a_parent_that_is_killed():
+    """They would wait for good. In a process that has not spawned any before."""
     parent = subprocess.Popen(
         [sys.executable, "-c", ALONE],
         stdin=subprocess.PIPE,
@@ -462,8 +466,9 @@ def test_hands_end_with_a_parent_that_is_killed():
         text=True,
     )
     hands = parent.stdout.readline().split()
+    deaf = [is_deaf(pid) for pid in hands]
     parent.kill()
-    assert len(hands) == 2
+    assert deaf == [True, True]
     # They hold its output open: that ends when they do.
     assert parent.communicate(timeout=60)[0] == ""
 

@@ -119,7 +119,7 @@ def _interrupts_held_back() -> Iterator[None]:
     if sys.platform == "win32" or not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # The first process of Python that is spawned has one begin that lets interrupts through again.
+    # Python 3.11 begins one more with the first one that is spawned, and lets interrupts through.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
