@@ -34,7 +34,7 @@ def added(tank, monkeypatch):
 
     def of(
         *, told=ONE, borne_out=True, guess=None, plain=None, named=(), nats=0.0, may_doubt=True,
-        outdoes=True,
+        outdoes=True, ties=None,
     ):  # fmt: skip
         monkeypatch.setattr(adding, "outdoes", lambda *_: outdoes)
         wanted, of.explained = {}, []
@@ -52,7 +52,9 @@ def added(tank, monkeypatch):
             return of_kind
 
         look = SimpleNamespace(
-            ask=lambda: Answer(told=replace(told, cause=None) if told else None, hidden=(LATE,)),
+            ask=lambda: Answer(
+                told=told and replace(told, cause=None, ties=ties or told.ties), hidden=(LATE,)
+            ),
             explained=explain,
             screen=SimpleNamespace(scene=SimpleNamespace(arena=tank)), on_speed=False,
             has_features=True, may_doubt=may_doubt, of=None, not_left_over=lambda guess: guess,
@@ -145,6 +147,14 @@ def test_what_explains_a_name_is_asked_where_a_form_of_it_comes_near_the_guess(a
     turns = Told(gain=replace(ONE.gain, name="turning-bias"), p=0.0, ties=(), lead=0.0)
     told, guess = replace(ONE, cause=turns), step("generic:heading:wall", 90.0, ahead=1.9)
     assert added(told=told, guess=guess)[0] == ["turning-bias"]
+
+
+def test_what_explains_a_name_is_asked_where_a_tie_keeps_out_a_guess(added):
+    """Though the name gains too little to be added itself."""
+    told = replace(ONE, gain=replace(ONE.gain, name="wall-persistence"))
+    guess = step("generic:heading:neighbour-heading", 90.0)
+    names, _, _ = added(told=told, guess=guess, named=["freezing"], nats=400.0, ties=(ONE.gain,))
+    assert (names, added.explained) == (["generic:heading:neighbour-heading"], [[]])
 
 
 def test_the_least_chance_of_all_names_counts_for_what_has_none(added):

@@ -46,7 +46,7 @@ def asked(monkeypatch):
     ("nats", "of_noise", "is_in_doubt"),
     [
         (20.0, 18.0, False),  # Noise makes as much.
-        (6.0, 4.0, False),  # It makes as much in one of twenty.
+        (10.0, 4.0, False),  # It makes as much in one of twenty.
         (15.0, 4.0, True),  # In one of a hundred.
         (20.0, 5.0, True),
         (14.0, 0.0, True),  # Two that make nothing say little of a third.

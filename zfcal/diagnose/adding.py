@@ -129,17 +129,22 @@ def may_guess(there: Sequence[Refit], arena: Arena) -> bool:
 def _explained(look: Look, told: Told, guess: Step | None) -> Told:
     """Return a name with what explains it; as it is where an effect beyond the list leads anyway.
 
-    That gains clearly more than features of any listed one, and is no other form of the name, nor
-    of one that explains it.
+    That is no other form of what explains it either.
     """
-    if guess is None or is_other_form(guess, told):
-        return look.explained(told)
-    if not outdoes(guess, told.gain.log_p, told.gain.nats, look.of):
+    if guess is None or not _leads(guess, told, look.of):
         return look.explained(told)
     forms = tuple(each for each in told.others if is_other_form(guess, each))
     if forms and look.explained(replace(told, others=forms, ties=())).cause is not None:
         return look.explained(told)
     return told
+
+
+def _leads(guess: Step, told: Told, of: Of) -> bool:
+    """Return whether an effect beyond the list gains clearly more than features of any listed one.
+
+    It is no other form of what these name.
+    """
+    return not is_other_form(guess, told) and outdoes(guess, told.gain.log_p, told.gain.nats, of)
 
 
 def _borne_out(look: Look, told: Told, guess: Step | None) -> Step | None:
@@ -184,6 +189,5 @@ def chosen(
         return listed
     is_ahead = listed is None or guess.choice.best.over(listed.choice.best) > SURE
     if said is not None:
-        is_ahead = is_ahead and not is_other_form(guess, said)
-        is_ahead = is_ahead and outdoes(guess, said.gain.log_p, said.gain.nats, of)
+        is_ahead = is_ahead and _leads(guess, said, of)
     return guess if is_ahead else listed
