@@ -231,6 +231,8 @@ def noise_of_features(
 ) -> list[ByNoise]:
     """Return what noise makes features gain, by replicates of the model.
 
+    By two of them where that is enough: noise makes as much as each gain often, or each is sure.
+
     Parameters
     ----------
     case
