@@ -13,6 +13,7 @@ from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.weights import evenly, factor_on_attention
 from zfcal.model.extended import maximise
 from zfcal.model.features import Component, Leaving, OneOf, Tilt, Turned
+from zfcal.model.scene import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -187,3 +188,21 @@ def test_rounding_is_nothing():
     left = off(new, basis)
     np.testing.assert_allclose(basis.T @ left, 0.0, atol=1e-12)
     assert np.linalg.norm(left) > 0.9 * np.linalg.norm(new)
+
+
+@pytest.mark.slow
+def test_noise_does_not_hide_a_component_from_it(record, tank, fish):
+    """The model's lapses are those of exact positions, and take what a component would explain."""
+    samples, noise_m = record(41, {"alignment": {"weight": 2.0, "kappa": 12.0}}), 1e-3
+    errors_m = noise_m * np.random.default_rng(6).standard_normal(samples.xy_m.shape)
+    scene = make_scene(dataclasses.replace(samples, xy_m=samples.xy_m + errors_m), tank)
+    fits = Fits(law=Law(scene=scene, fitted=maximise(scene, fish), noise_m=noise_m))
+    fits.prepare()
+    drawn = next(
+        each
+        for each in find_effect("alignment").features(tank)
+        if isinstance(each, Component) and each.label == "drawn, as seen"
+    )
+    gained = fits.gain("alignment", drawn).nats
+    assert gained > 50
+    assert 0.15 * gained < fits.first_look.nats(drawn) < gained

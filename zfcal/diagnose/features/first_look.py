@@ -1,7 +1,7 @@
 """A first look at features, which says what each may gain before any is fitted.
 
 By the scores of their weights where these have no strength (Rao 1948, Proceedings of the Cambridge
-Philosophical Society 44: 50-57).
+Philosophical Society 44: 50-57), and what is fitted with them is at its maximum.
 """
 
 from __future__ import annotations
@@ -42,6 +42,30 @@ _NEXT_TO_NOTHING = 1e-6
 """Share of a score's length that is rounding: columns may be sums of what is fitted with them."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Null:
+    """A law's mixture where what is fitted with every feature is at its maximum.
+
+    The law of noisy positions has that elsewhere than the model, which was fitted to the measured
+    ones: there its lapses take the headings that a component would explain.
+
+    Parameters
+    ----------
+    base : tuple of ndarray, shape (step, 1)
+        At the heading taken, and integrated.
+    lapse : ndarray, shape (step,)
+        Share of lapses.
+    """
+
+    base: Columns
+    lapse: Floats
+
+    def take(self, rows: NDArray[np.intp]) -> Null:
+        """Return that of some steps."""
+        at, over = self.base
+        return Null(base=(at[rows], over[rows]), lapse=self.lapse[rows])
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstLook:
     """A first look at features of a law.
@@ -50,6 +74,8 @@ class FirstLook:
     ----------
     law
         Of the steps.
+    null
+        Its mixture before any feature is there.
     own
         Columns that are fitted with every feature.
     landing_scores
@@ -62,6 +88,7 @@ class FirstLook:
     """
 
     law: Law
+    null: Null
     own: Sequence[Columns]
     landing_scores: Callable[[Landing], Floats]
     leaving_scores: Callable[[Leaving, Floats], tuple[Floats, Floats]]
@@ -70,13 +97,13 @@ class FirstLook:
     @property
     def prepared(self) -> tuple[object, ...]:
         """What all features need, worked out before they are asked side by side."""
-        return self._no_lapse, self._mean_heading, self._own_basis
+        return self._no_lapse, self._mean_heading, self._own_basis, self._untried
 
     def nats(self, feature: Choosable) -> float:
         """Return about how many nats a feature gains beyond what it has to, less its strengths.
 
         The density of one more component has no variance where that of the base is next to
-        nothing, so it is asked for by what a few strengths of it gain, the lapse as it is.
+        nothing, so it is asked for by what a few strengths of it gain, all else as it is.
         """
         if feature.over is None or isinstance(feature, Landing):
             return self._nats(feature)
@@ -121,7 +148,7 @@ class FirstLook:
     def _scores_of(self, columns: Columns) -> Floats:
         """Return the scores of what adds to the mixture, shape (step, weight)."""
         made = np.empty(columns[0].shape)
-        write_scores(columns, self.law.base, self._no_lapse, made)
+        write_scores(columns, self.null.base, self._no_lapse_at_null, made)
         return made
 
     @cached_property
@@ -140,9 +167,9 @@ class FirstLook:
         return max(alike, sum(max(nats, 0.0) for nats in each)), at.shape[1]
 
     def _best_tried(self, at: Floats, over: Floats) -> float:
-        lapse, (base_at, base_over) = self.law.lapses.likely, self.law.base
+        base_at, base_over = self.null.base
         base, added = (base_at[:, 0], base_over[:, 0]), (at, over)
-        density, uniform = np.empty(len(at)), lapse * UNIFORM
+        density, uniform = np.empty(len(at)), self.null.lapse * UNIFORM
         gains = []
         for share in _TRIED:
             write_tried(self._here, base, added, share, uniform, density)
@@ -152,20 +179,29 @@ class FirstLook:
     @cached_property
     def _here(self) -> Floats:
         """Attraction of where each step landed, times that it was no lapse, shape (step,)."""
-        return np.asarray((1 - self.law.lapses.likely) * np.exp(self.law.log_here))
+        return np.asarray((1 - self.null.lapse) * np.exp(self.law.log_here))
+
+    @cached_property
+    def _at_null(self) -> Floats:
+        """Density of each step without a feature, times that it was no lapse, shape (step,)."""
+        base_at, base_over = self.null.base
+        return np.asarray(self._here * (base_at / base_over)[:, 0])
 
     @cached_property
     def _untried(self) -> float:
-        """Log likelihood of the law as it is."""
-        base_at, base_over = self.law.base
-        density = self._here * base_at[:, 0] / base_over[:, 0]
-        return float(np.log(density + self.law.lapses.likely * UNIFORM).sum())
+        """Log likelihood without a feature."""
+        return float(np.log(self._at_null + self.null.lapse * UNIFORM).sum())
+
+    @cached_property
+    def _no_lapse_at_null(self) -> Floats:
+        """Probability of each step that it was none, shape (step,)."""
+        return np.asarray(self._at_null / (self._at_null + self.null.lapse * UNIFORM))
 
     @cached_property
     def _no_lapse(self) -> Floats:
-        """Probability of each step that it was none, shape (step,)."""
+        """That by the law as it is, which factors on headings are fitted to."""
         (base_at, base_over), lapse = self.law.base, self.law.lapses.likely
-        density = self._here * (base_at / base_over)[:, 0]
+        density = (1 - lapse) * np.exp(self.law.log_here) * (base_at / base_over)[:, 0]
         return np.asarray(density / (density + lapse * UNIFORM))
 
     @cached_property

@@ -31,6 +31,7 @@ from zfcal.diagnose.features.first_look import (
     LOOKED_AT,
     ONE_IN,
     FirstLook,
+    Null,
     best_of,
     has_many,
     thinned,
@@ -239,6 +240,7 @@ class Fits:
         """A look at a few of the steps, beside the same as all of them."""
         law, kept = thinned(self.law, ONE_IN)
         few = replace(self, law=law, beyond=None)
+        few.__dict__["_at_null"] = self._at_null.take(kept)
         walls = self.landings.walls
         few.__dict__["landings"] = Landings(
             law=law, walls=walls and (walls[0][kept], walls[1][kept])
@@ -249,9 +251,26 @@ class Fits:
     def first_look(self) -> FirstLook:
         """What features may gain, before any is fitted."""
         return FirstLook(
-            law=self.law, own=self._own[0], landing_scores=self.landings.scores,
-            leaving_scores=self.leavings.scores,
+            law=self.law, null=self._at_null, own=self._own[0],
+            landing_scores=self.landings.scores, leaving_scores=self.leavings.scores,
         )  # fmt: skip
+
+    @cached_property
+    def _at_null(self) -> Null:
+        """The mixture at the null's maximum."""
+        columns, _ = self._own
+        at, over = (
+            np.concatenate([column[side] for column in columns], axis=1) for side in (0, 1)
+        )
+        x, n = self._null.x, at.shape[1]
+        (base_at, base_over), least = self.law.base, _OWN * self.law.own[1]
+        return Null(
+            base=(
+                np.maximum(base_at + at @ x[:n, None], _LEAST * base_at),
+                np.maximum(base_over + over @ x[:n, None], least),
+            ),
+            lapse=self.law.lapses.shares(x[n:]),
+        )
 
     def _linear(
         self, added: Sequence[Columns], bounds: Sequence[Bounds], start: Floats | None

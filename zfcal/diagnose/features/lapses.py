@@ -47,7 +47,11 @@ class Lapses:
     @cached_property
     def likely(self) -> Floats:
         """Shares of lapses at the start, shape (step,)."""
-        return np.asarray(expit(self.start)[self._zones[1]])
+        return self.shares(self.start)
+
+    def shares(self, levels: Floats) -> Floats:
+        """Return the shares of lapses by their logits in the zones, shape (step,)."""
+        return np.asarray(expit(levels)[self._zones[1]])
 
     def mixed(self, density: Floats, levels: Floats) -> tuple[float, Floats, Floats]:
         """Return the log likelihood, the shares of steps that are no lapse, and its slopes.
@@ -69,5 +73,5 @@ class Lapses:
 
     def log_mixed(self, density: Floats, levels: Floats) -> Floats:
         """Return log densities with lapses."""
-        lapse = expit(levels)[self._zones[1]]
+        lapse = self.shares(levels)
         return np.asarray(np.log((1 - lapse) * density + lapse * UNIFORM))
