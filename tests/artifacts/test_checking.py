@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from zfcal.artifacts import machine
+from zfcal.artifacts import checking, machine
 from zfcal.artifacts.checking import check_trial
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING
 from zfcal.artifacts.freshness import hash_inputs
@@ -188,10 +188,76 @@ def test_a_growing_mcap_is_noted_and_a_cut_one_is_a_warning(trial, write_mcap):
     path = trial.root / "poses" / "000000.mcap"
     write_mcap(path, finish=False)
 
-    assert found_in(trial, "poses/000000.mcap") == [(NOTE, "still grows")]
+    assert found_in(trial, "poses/000000.mcap") == [
+        (NOTE, "not closed: still grows, or its writer was stopped")
+    ]
+    assert "poses" not in {f.where for f in check_trial(trial.root)}
     [(level, says)] = found_in(trial, "poses/000000.mcap", now_s=time.time() + 60)
     assert level == WARNING
     assert "20 messages can be read" in says
+
+
+def zeroed(path, place):
+    """Overwrite 20 bytes of a file with zeros."""
+    data = bytearray(path.read_bytes())
+    data[place : place + 20] = bytes(20)
+    path.write_bytes(data)
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Let nobody wait for a tracker to close a minute."""
+    monkeypatch.setattr(checking, "_CLOSING_S", 0.0)
+
+
+@pytest.mark.usefixtures("at_once")
+@pytest.mark.parametrize("folder", ["poses", "drive", "frames/overhead"])
+def test_a_cut_mcap_that_another_follows_is_damaged(trial, write_mcap, folder):
+    """However lately it was changed: it cannot grow any more. What is lost is said."""
+    path = trial.root / folder / "000000.mcap"
+    size = write_mcap(path) // 2
+    write_mcap(trial.root / folder / "000060.mcap")
+    path.write_bytes(path.read_bytes()[:size])
+
+    [finding] = [f for f in check_trial(trial.root) if f.level != OK]
+
+    assert (finding.level, finding.where) == (ERROR, f"{folder}/000000.mcap")
+    assert finding.says.startswith("was cut short; ")
+    assert f"of {size} bytes are lost" in finding.says
+    assert "messages can be read" in finding.says
+    assert finding.hint
+    assert (OK, "1 whole and valid") in found_in(trial, folder.partition("/")[0])
+
+
+def test_a_closed_mcap_that_is_damaged_within_is_an_error(trial, write_mcap):
+    """Though it was changed just now: with its footer it cannot grow."""
+    path = trial.root / "frames" / "overhead" / "000060.mcap"
+    size = write_mcap(path)
+    zeroed(path, size // 3)
+
+    [(level, says)] = found_in(trial, "frames/overhead/000060.mcap")
+    assert level == ERROR
+    assert says.startswith("is damaged: a damaged record (")
+    assert f"of {size} bytes are lost" in says
+    assert "frames" not in {f.where for f in check_trial(trial.root)}
+
+
+def test_a_growing_mcap_that_is_damaged_within_is_an_error(trial, write_mcap):
+    """It may go on, but what lies behind the damage is lost."""
+    path = trial.root / "poses" / "000000.mcap"
+    zeroed(path, write_mcap(path, finish=False) - 300)
+
+    assert found_in(trial, "poses/000000.mcap")[0][0] == ERROR
+
+
+def test_a_minute_that_is_closed_just_after_the_next_began_is_whole(trial, write_mcap, monkeypatch):
+    """A tracker writes the first frame of a minute before it closes the last one."""
+    path = trial.root / "poses" / "000000.mcap"
+    write_mcap(path, finish=False)
+    write_mcap(trial.root / "poses" / "000060.mcap")
+    monkeypatch.setattr(checking.time, "sleep", lambda _: write_mcap(path))
+
+    assert troubles(trial) == []
 
 
 def test_whole_mcap_files_are_counted(trial, write_mcap):

@@ -22,9 +22,9 @@ from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import Lineage, package_version, read_lineage
 from zfcal.artifacts.machine import check_computer
-from zfcal.artifacts.mcap_files import overview
+from zfcal.artifacts.mcap_files import has_footer, overview
 from zfcal.artifacts.models import read_model, read_model_for
-from zfcal.artifacts.reading.contents import hash_of
+from zfcal.artifacts.reading.contents import hash_of, numbered_of
 from zfcal.artifacts.reading.opening import open_regular, unreadable
 from zfcal.artifacts.reading.places import check_inside, is_regular
 from zfcal.artifacts.settings import read_trial
@@ -47,6 +47,12 @@ _CLOCK_SLACK_S = 2.0
 
 _GROWING_S = 10.0
 """A file that changed so lately is taken to be growing still."""
+
+_CLOSING_S = 1.0
+"""A tracker closes a minute once the first frame of the next is written, and sooner than this."""
+
+_NOT_CLOSED = "not closed"
+"""So begins what is said of a file that is neither whole nor known to be damaged."""
 
 _FORGOTTEN_S = 3600.0
 """No copy and no write takes so long: a dot-file of that age was left behind."""
@@ -101,13 +107,18 @@ def check_trial(root: Path, *, now_s: float | None = None) -> list[Finding]:
     for path in _files(root):
         found = list(_file_findings(place, path))
         findings += found
-        if _checker_of(root, path) and not any(f.level == ERROR for f in found):
+        if _checker_of(root, path) and not any(map(_is_part, found)):
             counts[path.relative_to(root).parts[0]] += 1
     findings += [
         Finding(level=OK, where=folder, says=f"{count} whole and valid")
         for folder, count in sorted(counts.items())
     ]
     return findings + list(check_computer(root, now_s))
+
+
+def _is_part(finding: Finding) -> bool:
+    """Return whether a finding says that its file is not whole and valid."""
+    return finding.level == ERROR or finding.says.startswith(_NOT_CLOSED)
 
 
 def _settings(root: Path, now_s: float) -> tuple[_Place, list[Finding]]:
@@ -300,18 +311,32 @@ def _check_model(place: _Place, path: Path) -> Iterator[Finding]:
 
 
 def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
-    found = overview(path)
     name = path.relative_to(place.root).as_posix()
+    is_fresh = place.now_s - path.stat().st_mtime < _GROWING_S
+    # Before it is read: what has its footer or is followed by then is whole, or never will be.
+    is_closed, n_later = has_footer(path), _n_later(path)
+    found = overview(path)
+    if not found.whole and is_fresh and not is_closed and n_later == 1:
+        time.sleep(_CLOSING_S)
+        found = overview(path)
     if found.whole:
         return
-    if place.now_s - path.stat().st_mtime < _GROWING_S:
-        yield Finding(level=NOTE, where=name, says="still grows")
+    if is_closed or n_later or not found.is_cut:
+        says = "was cut short" if found.is_cut else f"is damaged: {found.problem}"
+        hint = "Copy it again from where it was recorded. Commands read what lies before."
+        yield Finding(level=ERROR, where=name, says=f"{says}; {found.loss}", hint=hint)
+    elif is_fresh:
+        says = f"{_NOT_CLOSED}: still grows, or its writer was stopped"
+        yield Finding(level=NOTE, where=name, says=says)
     else:
-        says = (
-            f"{found.problem}; {found.lost_bytes} of {found.total_bytes} bytes are lost, "
-            f"{found.counts.total()} messages can be read"
-        )
+        says = f"{_NOT_CLOSED}: it was cut short, or its writer was stopped; {found.loss}"
         yield Finding(level=WARNING, where=name, says=says, hint="Commands read what is whole.")
+
+
+def _n_later(path: Path) -> int:
+    """Return how many segments of the same folder follow one."""
+    start_s = second_of(path, ".mcap") or 0
+    return sum(second > start_s for second in numbered_of(path.parent, ".mcap"))
 
 
 def _check_camera(_: _Place, path: Path) -> Iterator[Finding]:

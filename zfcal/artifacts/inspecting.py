@@ -178,12 +178,7 @@ def _mcap(path: Path) -> tuple[str | None, str | None, Description]:
         {"topic": topic, "schema": schema, "messages": found.counts[topic]}
         for topic, schema in sorted(found.schemas.items())
     ]
-    problem = None
-    if not found.whole:
-        problem = (
-            f"{found.problem}; {found.lost_bytes} of {found.total_bytes} bytes are lost, "
-            f"{found.counts.total()} messages can be read"
-        )
+    problem = None if found.whole else f"{found.problem}; {found.loss}"
     contents = {
         "messages": found.counts.total(),
         "from_s": found.start_s,

@@ -37,6 +37,10 @@ BROKEN = (
 """What reading a damaged MCAP file may raise."""
 
 
+_MAGIC = b"\x89MCAP0\r\n"
+"""An MCAP file begins with it, and a closed one ends with it."""
+
+
 @dataclass(slots=True, kw_only=True)
 class Overview:
     """What an MCAP file holds, as far as it can be read.
@@ -59,6 +63,8 @@ class Overview:
         How far reading came, and the file's size.
     problem
         Why reading stopped early; empty for a whole file.
+    is_cut
+        Whether it just ends too early: nothing before its end is damaged.
     """
 
     profile: str = ""
@@ -72,11 +78,20 @@ class Overview:
     read_bytes: int = 0
     total_bytes: int = 0
     problem: str = ""
+    is_cut: bool = False
 
     @property
     def lost_bytes(self) -> int:
         """Bytes behind the last record that could be read."""
         return 0 if self.whole else self.total_bytes - self.read_bytes
+
+    @property
+    def loss(self) -> str:
+        """How much is lost of a file that is not whole, in words."""
+        return (
+            f"{self.lost_bytes} of {self.total_bytes} bytes are lost, "
+            f"{self.counts.total()} messages can be read"
+        )
 
 
 def overview(path: Path) -> Overview:
@@ -128,9 +143,26 @@ def read_messages(path: Path, found: Overview) -> Iterator[tuple[Channel, Messag
                 yield channels[record.channel_id], record
         found.whole = True
     except EndOfFile:
+        found.is_cut = True
         found.problem = "the file ends in the middle of a record: it was cut short, or still grows"
     except BROKEN as error:
         found.problem = f"a damaged record ({error})"
+
+
+def has_footer(path: Path) -> bool:
+    """Return whether an MCAP file ends as a closed one does: nothing more will come.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be opened.
+    """
+    try:
+        with open_regular(path) as file:
+            file.seek(max(0, os.fstat(file.fileno()).st_size - len(_MAGIC)))
+            return file.read() == _MAGIC
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 def read_metadata(path: Path, name: str) -> dict[str, str] | None:
@@ -250,9 +282,9 @@ def _check_magic(path: Path, file: io.BufferedReader, size: int) -> None:
         raise DamagedError(
             f"{path}: the file is empty (0 bytes).", hint="Remove it, or copy it again."
         )
-    head = file.read(8)
+    head = file.read(len(_MAGIC))
     file.seek(0)
-    if head != b"\x89MCAP0\r\n":
+    if head != _MAGIC:
         raise DamagedError(
             f"{path}: is not an MCAP file (it starts with {head!r}).",
             hint="Move it out of the trial, or copy the right file there.",

@@ -11,9 +11,9 @@ from typing import TypeAlias, final
 
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.lineage import JSON, Lineage
+from zfcal.artifacts.mcap_files import has_footer
 from zfcal.artifacts.pose_files import PoseWriter, read_poses
 from zfcal.artifacts.reading.contents import check_contents, numbered_of
-from zfcal.artifacts.reading.opening import open_regular
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_extra, read_tracks, write_tracks
 from zfcal.errors import DamagedError, InputError
@@ -266,15 +266,9 @@ class Minutes:
 def poses_reason(path: Path, lineage: Lineage) -> str | None:
     """Return why a file of poses is to be written; None if it is whole and up to date."""
     reason = stale_reason([path], lineage)
-    if reason is None and not _has_footer(path):
+    if reason is None and not has_footer(path):
         return "was not closed"
     return reason
-
-
-def _has_footer(path: Path) -> bool:
-    with open_regular(path) as file:
-        file.seek(-8, 2)
-        return file.read() == b"\x89MCAP0\r\n"
 
 
 def _poses_path(root: Path, start_s: int) -> Path:
