@@ -44,10 +44,21 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """Something of a source that could not be read, and what to do about it."""
+    """Something of a source that could not be read, and what to do about it.
+
+    Parameters
+    ----------
+    says
+        What, in a sentence that begins with the name of the file.
+    hint
+        What to do about it.
+    end_s
+        Images from this second on are none of it; infinite where that is unknown.
+    """
 
     says: str
     hint: str = ""
+    end_s: float = math.inf
 
 
 class Source(Protocol):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import final
 
 from zfcal.artifacts.atomic import check_free
-from zfcal.artifacts.frame_files import FrameWriter, read_frames
+from zfcal.artifacts.frame_files import FrameWriter, frame_segments, read_frames
 from zfcal.artifacts.freshness import relative_to
 from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.mcap_files import Overview
@@ -20,6 +22,7 @@ from zfcal.stages.events import Tell
 from zfcal.stages.recording import hash_sources
 from zfcal.stages.segments import STEP_S
 from zfcal.stages.taken import unless_taken
+from zfcal.trial import second_of
 
 _EPOCH_S = 1e8
 """Later than this since the start of a trial: the times count from 1970."""
@@ -82,25 +85,34 @@ class _RecordedFrames:
 
     def shots(self) -> Iterator[Shot]:
         """Yield the images; what cannot be read goes to `problems`."""
-        found = Overview()
-        for time_s, data in read_frames(self._path, found=found):
+        paths = frame_segments(self._path) if self._path.is_dir() else [self._path]
+        for path, later in itertools.zip_longest(paths, paths[1:]):
+            found = Overview()
+            yield from self._shots_of(path, found)
+            if found.problem:
+                # Before the next image: who has enough with that one has heard of it.
+                ends = math.inf if later is None else second_of(later, ".mcap") or 0
+                self.problems.append(
+                    Problem(
+                        says=f"{path}: {found.problem}; {found.lost_bytes} bytes are lost.",
+                        hint="Copy it again from where it was recorded; what could be read is "
+                        "tracked.",
+                        end_s=ends - self._zero_s,
+                    )
+                )
+
+    def _shots_of(self, path: Path, found: Overview) -> Iterator[Shot]:
+        for time_s, data in read_frames(path, found=found):
             image = decoded(data)
             if image is None:
                 self.problems.append(
                     Problem(
-                        says=f"{self.name}: the image of {time_s:.3f} s cannot be decoded.",
+                        says=f"{path}: the image of {time_s:.3f} s cannot be decoded.",
                         hint="Copy the file again from where it was recorded.",
                     )
                 )
                 continue
             yield Shot(time_s=time_s - self._zero_s, image=image)
-        if found.problem:
-            self.problems.append(
-                Problem(
-                    says=f"{self.name}: {found.problem}; {found.lost_bytes} bytes are lost.",
-                    hint="Copy it again from where it was recorded; what could be read is tracked.",
-                )
-            )
 
 
 @final

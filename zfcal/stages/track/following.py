@@ -98,6 +98,7 @@ class Following:
             lambda tracks: {
                 **measured(plan.opened.trial, tracks),
                 LEARNT_KEY: dict(self._outcome.learnt),
+                **self._outcome.lacks(),
             },
             tell,
             task=task,

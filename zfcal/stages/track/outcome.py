@@ -12,8 +12,8 @@ import numpy as np
 
 from zfcal.artifacts.lineage import JSON
 from zfcal.cameras.frames import Frame, Image
-from zfcal.cameras.stamps import Tally
-from zfcal.stages.camera.rig import Feed
+from zfcal.cameras.stamps import Problem, Tally
+from zfcal.stages.camera.rig import BELOW, OVERHEAD, Feed
 from zfcal.stages.events import LeftOut, Note, Result, Tell
 from zfcal.stages.track.below import Below
 from zfcal.stages.track.learnt import learnt_by, notes_of, remedy
@@ -26,6 +26,9 @@ from zfcal.tracking.seen import TrackerOptions
 from zfcal.tracking.tracker import FishTracker
 from zfcal.tracks import FISH, GUESS, FramePoses, Tracks
 from zfcal.trial import Trial
+
+LACKS_KEY = "lacks"
+"""Extra metadata of a segment: what of the images up to its end could not be read, in sentences."""
 
 _SAYS = {
     "black": "the image shows nothing (a lens cap, a lost signal, no light)",
@@ -194,10 +197,27 @@ class Outcome:
         self._warn_of_few()
         self._tell(Result(value=self._numbers()))
         for feed in self._feeds:
-            for problem in feed.source.problems:
+            for problem in self._problems(feed):
                 self._tell(
                     LeftOut(path=Path(feed.source.name), problem=problem.says, hint=problem.hint)
                 )
+
+    def lacks(self) -> dict[str, JSON]:
+        """Return what could not be read of a recording so far, for its segments; maybe nothing.
+
+        Files have their bare names: where they lay does not bear on the tracks.
+        """
+        found: list[JSON] = []
+        for camera, feed in zip((OVERHEAD, BELOW), self._feeds, strict=False):
+            for problem in self._problems(feed):
+                name, _, says = problem.says.partition(": ")
+                found.append(f"{camera}: {Path(name).name}: {says}")
+        return {LACKS_KEY: found} if found and not self._plan.is_live else {}
+
+    def _problems(self, feed: Feed) -> list[Problem]:
+        """Return what could not be read of a camera in the stretch that is tracked."""
+        first_s = self._plan.options.start_s or 0.0
+        return [problem for problem in feed.source.problems if problem.end_s > first_s]
 
     def _warn_of_few(self) -> None:
         """Warn where fewer than half of the fish were found, and say what to try."""

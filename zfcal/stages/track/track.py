@@ -9,13 +9,15 @@ from zfcal.artifacts.lineage import Lineage
 from zfcal.artifacts.pose_messages import POSES
 from zfcal.artifacts.reading.contents import Contents, one_content
 from zfcal.artifacts.segments import segment_path, segment_starts
+from zfcal.artifacts.tables import read_extra
 from zfcal.cameras.live import ArrivalClock
 from zfcal.stages.camera.sources import source_of
-from zfcal.stages.events import Planned, Tell, UpToDate
+from zfcal.stages.events import Note, Planned, Tell, UpToDate
 from zfcal.stages.making import settled
 from zfcal.stages.recording import check_same_source, starts_between, stretch_of
 from zfcal.stages.track.following import Following
 from zfcal.stages.track.minutes import Origins, pose_files, poses_reason
+from zfcal.stages.track.outcome import LACKS_KEY
 from zfcal.stages.track.plan import Plan, TrackOptions, plan_of
 from zfcal.stages.track.resuming import Resumed, begin_anew, resume
 from zfcal.stages.trial_context import Task, at_work, open_trial, reason_to_make, tell_version
@@ -90,7 +92,16 @@ def _is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
     for start, path in zip(starts, paths, strict=True):
         tell(UpToDate(path=path))
         tell(UpToDate(path=known[start]))
+    _tell_lacks(paths[-1], tell)
     return True
+
+
+def _tell_lacks(path: Path, tell: Tell) -> None:
+    """Say again what the images lacked that a recording's last segment was made from."""
+    lacks = read_extra(path).get(LACKS_KEY)
+    for says in lacks if isinstance(lacks, list) else []:
+        text = f"{path}: was tracked without what cannot be read. {says}"
+        tell(Note(text=text, warning=True))
 
 
 def _tell_plan(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> None:
