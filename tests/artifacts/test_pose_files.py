@@ -156,6 +156,30 @@ def test_a_follower_goes_on_behind_a_file_that_was_never_closed(path, tmp_path):
     assert [poses.frame for poses in follower.poll()] == [900]
 
 
+@pytest.mark.parametrize("newest", [False, True])
+def test_a_follower_says_what_is_lost_of_a_file_that_was_cut(path, tmp_path, newest):
+    """Not of one that is closed once the next has begun, nor of one that may grow."""
+    follower = PoseFollower(tmp_path, newest=newest)
+    cut, late, last = [PoseWriter(path.with_name(f"{k:06d}.mcap"), LINEAGE) for k in (0, 60, 120)]
+    for writer, number in zip((cut, late, last), (0, 900, 1800), strict=True):
+        writer.add(frame(number))
+    cut.abandon()
+    with cut.path.open("ab") as file:
+        file.write(b"\x06\x20" + bytes(15))
+    follower.poll()
+    late.close()
+
+    found = follower.cuts(is_over=False)
+    if newest:
+        assert found == {}
+        return
+    assert list(found) == [cut.path]
+    assert "17 bytes behind the last whole record are lost" in str(found[cut.path])
+    assert list(follower.cuts(is_over=True)) == [cut.path, last.path]
+    last.close()
+    assert list(follower.cuts(is_over=True)) == [cut.path]
+
+
 def test_a_file_that_is_written_anew_is_read_anew(path, tmp_path):
     """A second run of the tracker begins at the start."""
     follower = PoseFollower(tmp_path)

@@ -156,8 +156,15 @@ class DriveWriter:
             raise storage_error(self.path, error) from error
 
 
-def read_drive(path: Path) -> Iterator[Item]:
+def read_drive(path: Path, found: Overview | None = None) -> Iterator[Item]:
     """Yield the messages of a file in its order; of one that was cut short, those before the cut.
+
+    Parameters
+    ----------
+    path
+        The file.
+    found
+        A new overview, which afterwards says whether the file is whole, and what was lost.
 
     Raises
     ------
@@ -167,7 +174,7 @@ def read_drive(path: Path) -> Iterator[Item]:
         It is no such file.
     """
     topics = set(_TOPICS.values())
-    for channel, message in read_messages(path, Overview()):
+    for channel, message in read_messages(path, Overview() if found is None else found):
         if channel.topic in topics:
             yield _item(path, channel, message)
 

@@ -7,6 +7,7 @@ viewers. Log times are seconds since the start of the trial.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -131,7 +132,10 @@ class PoseWriter:
 
 
 def read_poses(
-    path: Path, *, left_out: Callable[[DamagedError], None] | None = None
+    path: Path,
+    *,
+    left_out: Callable[[DamagedError], None] | None = None,
+    cut: Callable[[DamagedError], None] | None = None,
 ) -> Iterator[FramePoses]:
     """Yield the poses of a file, in its order; of one that was cut short, those before the cut.
 
@@ -142,6 +146,8 @@ def read_poses(
     left_out
         Hears of each frame that is none, and of each agent whose pose is none; such are left
         out then, as a follower does.
+    cut
+        Hears how much is lost of a file that is not closed.
 
     Raises
     ------
@@ -152,7 +158,8 @@ def read_poses(
     """
     if not os.path.lexists(path):
         raise InputError(f"{path}: no such file.", hint="Check the path, and where you stand.")
-    for _, data in Tail(path, "/agents").messages():
+    tail = Tail(path, "/agents")
+    for _, data in tail.messages():
         try:
             poses = from_json(path, data, absent=left_out)
         except DamagedError as error:
@@ -161,6 +168,8 @@ def read_poses(
             left_out(error)
         else:
             yield poses
+    if cut is not None and tail.cut is not None:
+        cut(tail.cut)
 
 
 def read_clock(path: Path) -> dict[str, str] | None:
@@ -191,6 +200,7 @@ class PoseFollower:
         self._told: set[tuple[Path, str]] = set()
         self._problems: list[DamagedError] = []
         self._clock = _Clock() if newest else None
+        self._left: list[Tail] = []
 
     @property
     def path(self) -> Path | None:
@@ -228,6 +238,26 @@ class PoseFollower:
         found, self._problems = self._problems, []
         return found
 
+    def cuts(self, *, is_over: bool) -> dict[Path, DamagedError]:
+        """Return what is lost of files that were not closed, though none adds to them any more.
+
+        A tracker closes a file just after it has begun the next: ask when all has been read.
+        Who begins with the newest file follows a tracker, and is told of none.
+
+        Parameters
+        ----------
+        is_over
+            Whether nothing more is added to the file that is followed either.
+        """
+        found = {}
+        for tail in [*self._left, *([self._tail] if is_over and self._tail else [])]:
+            # One that is bad, or is gone by now, has been told.
+            with contextlib.suppress(DamagedError, InputError):
+                tail.poll()
+            if tail.cut is not None and (tail.path, _FILE) not in self._told:
+                found[tail.path] = tail.cut
+        return found
+
     def _begin(self, path: Path, found: list[FramePoses]) -> bool:
         """Go on with a later file, and return whether it has begun.
 
@@ -237,6 +267,8 @@ class PoseFollower:
         looks = looks_of(path)
         added = self._added(tail)
         if tail.is_begun:
+            if self._tail is not None and not (self._newest or self._tail.is_closed):
+                self._left.append(self._tail)
             self._tail, self._known = tail, second_of(path, ".mcap") or 0
             found += added
             return True

@@ -59,6 +59,17 @@ class Tail:
         """Whether a record of it was read: it is an MCAP file."""
         return self._offset > 0 or self.is_closed
 
+    @property
+    def cut(self) -> DamagedError | None:
+        """What to say of a file to which nothing more will be added; None if it is closed."""
+        if self.is_closed:
+            return None
+        return DamagedError(
+            f"{self.path}: was cut short, or its writer was stopped: it is not closed, and "
+            f"{self.lost_bytes} bytes behind the last whole record are lost.",
+            hint="Copy it again from where it was recorded; what lies before is read.",
+        )
+
     def poll(self) -> list[tuple[int, bytes]]:
         """Return what was added: the log time in nanoseconds, and the data of each message.
 

@@ -90,9 +90,16 @@ class Loop:
                 self._crew.log.flush()
                 self._step_virtual()
                 if frames and self._is_over(frames[-1].time_s):
+                    self._tell_cuts(is_over=False)
                     return "the duration is over"
             self._show()
+        self._tell_cuts(is_over=True)
         return "the poses have ended"
+
+    def _tell_cuts(self, *, is_over: bool) -> None:
+        """Say which files of poses were cut short."""
+        for path, problem in self._follower.cuts(is_over=is_over).items():
+            self._crew.tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
 
     def _show(self) -> None:
         """Tell how it goes, now and then."""

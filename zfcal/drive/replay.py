@@ -6,6 +6,7 @@ poses come from ``poses/``. Targets and commands follow from these alone.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import tempfile
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from typing import Any, final
 
 from zfcal.artifacts.drive_files import drive_files, read_drive
 from zfcal.artifacts.lineage import read_lineage
+from zfcal.artifacts.mcap_files import Overview
 from zfcal.artifacts.models import read_model_for
 from zfcal.artifacts.pose_files import read_poses
 from zfcal.drive.pilot import InForce, Manner, Pilot, Target, command_item, target_item
@@ -61,13 +63,26 @@ class NoLine:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """How much was worked out again, and how much came out the same."""
+    """How much was worked out again, and how much came out the same.
+
+    Parameters
+    ----------
+    targets, same_targets, commands, same_commands
+        All that could be compared, and those that came out the same.
+    frames_lost
+        Frames that the log names and ``poses/`` does not hold.
+    not_compared
+        Targets and commands behind a loss that came out in another way: they may depend on it.
+    first_difference
+        Which one that could be compared came out in another way first; empty for none.
+    """
 
     targets: int = 0
     same_targets: int = 0
     commands: int = 0
     same_commands: int = 0
     frames_lost: int = 0
+    not_compared: int = 0
     first_difference: str = ""
 
     @property
@@ -108,11 +123,14 @@ def replay(root: Path, tell: Tell) -> Tally:
             tell(UpToDate(path=path))
             tell(Progress(stage="replay", done=number, total=len(files)))
     tally = again.tally
+    again.tell_cut_poses()
     tell(Result(value={key: getattr(tally, key) for key in Tally.__slots__}))
     says = (
         f"{tally.same_targets} of {tally.targets} targets and {tally.same_commands} of "
         f"{tally.commands} commands came out the same"
     )
+    if tally.not_compared:
+        says += f"; {tally.not_compared} behind what is lost could not be compared"
     if not tally.is_same:
         raise InputError(
             f"{root / 'drive'}: {says}; the first that did not: {tally.first_difference}.",
@@ -135,16 +153,30 @@ class _Again:
         self._model: InForce | None = None
         self._target: Target | None = None
         self._manner = Manner()
+        self._is_behind_loss = False
 
     def file(self, start_s: int, path: Path) -> None:
         """Take the next file."""
         self._poses.go_to(start_s)
+        found = Overview()
         try:
             self._manner = _manner_of(read_lineage(path).options)
-            for item in read_drive(path):
+            for item in read_drive(path, found):
                 self._item(item)
         except DamagedError as error:
-            self._tell(LeftOut(path=path, problem=str(error), hint=error.hint))
+            self._lose(path, str(error), error.hint)
+        else:
+            if not found.whole:
+                hint = "Copy it again from where it was made; what lies before is compared."
+                self._lose(path, f"{path}: {found.problem}; {found.loss}.", hint)
+
+    def _lose(self, path: Path, problem: str, hint: str) -> None:
+        self._is_behind_loss = True
+        self._tell(LeftOut(path=path, problem=problem, hint=hint))
+
+    def tell_cut_poses(self) -> None:
+        """Say which poses were cut short; the last file may still grow, unless it lacks frames."""
+        self._poses.tell_cuts(lacks_frames=self.tally.frames_lost > 0)
 
     def _item(self, item: dict[str, Any]) -> None:
         match item["what"]:
@@ -162,6 +194,9 @@ class _Again:
 
     def _take_model(self, item: dict[str, Any]) -> None:
         self._model = _model_of(item, self._opened)
+        if item.get("begins"):
+            # A driver that begins knows nothing of what was before.
+            self._is_behind_loss = False
         if item.get("begins") or self._pilot is None:
             self._pilot = Pilot(self._opened, self._manner, FishBot(self._manner.letter, NoLine()))
 
@@ -184,6 +219,9 @@ class _Again:
         tally = self.tally
         said = {key: value for key, value in item.items() if key not in _NOT_DECIDED}
         same = made is not None and said == made
+        if self._is_behind_loss and not same:
+            tally.not_compared += 1
+            return
         setattr(tally, kind, getattr(tally, kind) + 1)
         setattr(tally, f"same_{kind}", getattr(tally, f"same_{kind}") + same)
         if not same and not tally.first_difference:
@@ -199,6 +237,14 @@ class _Poses:
         self._tell = tell
         self._frames: dict[int, FramePoses] = {}
         self._read: set[int] = set()
+        self._cuts: dict[Path, DamagedError] = {}
+
+    def tell_cuts(self, *, lacks_frames: bool) -> None:
+        """Say which files were cut short."""
+        last = max(self._files, default=-1)
+        for path, problem in self._cuts.items():
+            if lacks_frames or path != self._files[last]:
+                self._tell(LeftOut(path=path, problem=str(problem), hint=problem.hint))
 
     def go_to(self, start_s: int) -> None:
         """Read the minute that begins then, those about it, and forget what lies long before."""
@@ -218,7 +264,8 @@ class _Poses:
         problems: list[DamagedError] = []
         try:
             # The driver went on behind frames, and beside agents, that are none, too.
-            yield from read_poses(path, left_out=problems.append)
+            cut = functools.partial(self._cuts.__setitem__, path)
+            yield from read_poses(path, left_out=problems.append, cut=cut)
         except DamagedError as error:
             problems.append(error)
         for problem in problems[:1]:
