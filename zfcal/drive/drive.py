@@ -86,7 +86,7 @@ def _open(root: Path, options: DriveOptions) -> tuple[OpenTrial, Lineage]:
 
 
 def lineage_of(opened: OpenTrial, options: DriveOptions) -> Lineage:
-    """Return where the log of a drive comes from; which models drove, it says itself."""
+    """Return where the log of a drive comes from, but for the models: the log adds them itself."""
     manner = dataclasses.asdict(options.manner)
     if options.model is not None:
         manner["model"] = relative_to(opened.trial.root, options.model)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 import time
+from collections.abc import Iterable
 from itertools import takewhile
 from queue import SimpleQueue
 from typing import Any, final
@@ -36,7 +38,7 @@ class DriveLog:
     trial
         Where it goes.
     lineage
-        Where it comes from.
+        Where it comes from. The model by which a file begins is an input of that file, too.
     tell
         Hears of every file, when it is closed.
     is_patient
@@ -62,6 +64,8 @@ class DriveLog:
         self._writer: DriveWriter | None = None
         self._start_s = -1
         self._is_open = False
+        self._of_file = lineage
+        self._model: dict[str, str] = {}
         self._taken: dict[str, list[float]] = {TICK_TO_BYTE: [], POSE_TO_STATE: []}
         self.n_ticks_skipped = 0
         self.n_steps_missed = 0
@@ -125,18 +129,28 @@ class DriveLog:
             if not self._is_open or minute > self._start_s:
                 self._close_file()
                 self._start_s, self._is_open = max(minute, self._start_s), True
+                self._of_file = self._lineage_of_file()
             writer = self._taken_up()
             own = list(takewhile(lambda item: _minute_of(item) <= self._start_s, self._kept))
             for item in own:
                 writer.add(item)
             writer.flush()
             del self._kept[: len(own)]
+            self._model = _model_in(reversed(own)) or self._model
+
+    def _lineage_of_file(self) -> Lineage:
+        """Return where the file that begins now comes from; later models stand in the log itself.
+
+        Poses grow while they are read: they have no hash yet.
+        """
+        model = _model_in(self._kept[:1]) or self._model or _model_in(self._kept)
+        return dataclasses.replace(self._lineage, inputs={**self._lineage.inputs, **model})
 
     def _taken_up(self) -> DriveWriter:
         """Return the writer of the file that is open; after a failure it goes on in it."""
         if self._writer is None:
             path = self._trial.path("drive", self._start_s, ".mcap")
-            self._writer = DriveWriter(path, self._lineage)
+            self._writer = DriveWriter(path, self._of_file)
         return self._writer
 
     def _fail(self, error: StorageError) -> None:
@@ -222,3 +236,9 @@ class DriveLog:
 
 def _minute_of(item: dict[str, Any]) -> int:
     return int((item["time_s"] + 1e-6) // SEGMENT_S * SEGMENT_S)
+
+
+def _model_in(items: Iterable[dict[str, Any]]) -> dict[str, str]:
+    """Return the hash of the first model among messages, by its name; empty for none."""
+    found = next((item for item in items if item["what"] == "model"), None)
+    return {} if found is None else {found["model"]: found["sha256"]}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from zfcal.artifacts.drive_files import drive_files, read_drive
-from zfcal.artifacts.freshness import stale_reason
+from zfcal.artifacts.freshness import hash_inputs, stale_reason
 from zfcal.artifacts.reading.contents import hash_of, numbered_of
 from zfcal.artifacts.segments import segment_path
 from zfcal.errors import DamagedError, InputError
@@ -97,8 +98,11 @@ def drive_demo(trial: Path, tell: Tell, *, task: Task) -> None:
 
     options = DriveOptions(port=VIRTUAL, clock="poses", duration_s=DRIVE_S)
     log = trial / "drive" / "000000.mcap"
+    known = lineage_of(open_trial(trial), options)
+    models = numbered_of(trial / "models", ".toml")
+    inputs = {**known.inputs, **hash_inputs(trial, [models[max(models)]])}
     is_current = (
-        stale_reason([log], lineage_of(open_trial(trial), options)) is None
+        stale_reason([log], dataclasses.replace(known, inputs=inputs)) is None
         and _is_of_newest(trial)
         and not task.force
     )
