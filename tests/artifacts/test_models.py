@@ -1,7 +1,9 @@
 """Model files: written for people, read with care, fitted to an arena."""
 
 import dataclasses
+import json
 import tomllib
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -185,6 +187,31 @@ def test_a_wrong_model_is_named_with_its_file(path, old, new, says):
     with pytest.raises(InputError, match=says.replace("[", r"\[")) as caught:
         read_model(path)
     assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("base", "hint"),
+    [
+        ("zoned-visions", "Did you mean 'zoned-vision'? base: Name of the base model."),
+        ("log-linear", "base: Name of the base model."),
+        ("", "base: Name of the base model."),
+    ],
+)
+def test_a_base_model_that_is_not_known_is_refused(path, base, hint):
+    """Simulations would be of another model than the file says; the known one is named."""
+    edit(path, 'base = "zoned-vision"', f'base = "{base}"')
+
+    with pytest.raises(InputError) as caught:
+        read_model(path)
+    assert str(caught.value) == f'{path}: base must be "zoned-vision", got "{base}".'
+    assert caught.value.hint == hint
+
+
+def test_the_base_of_a_new_model_is_known(model):
+    """A model file has the base that a model has unless told, and no other yet."""
+    schema = json.loads((files("zfcal.schemas") / "model.schema.json").read_text())
+
+    assert schema["properties"]["base"]["enum"] == [model.base]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.4])

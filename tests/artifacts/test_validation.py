@@ -45,6 +45,20 @@ def test_a_key_like_no_other_gets_no_guess():
     assert caught.value.hint.startswith("Known keys:")
 
 
+def test_a_value_that_is_none_of_those_known_is_named_with_the_nearest():
+    """Of a word; a number is like none."""
+    lens = {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "distortion": []}
+    camera = {"schema": "zfcal.camera/1", "size_px": [640, 480], "lens": lens}
+    says = 'one of "pinhole", "fisheye", "homography", got "fisheyes"'
+
+    with pytest.raises(InputError, match=says) as caught:
+        check({**camera, "model": "fisheyes"}, "camera", "below.toml")
+    assert caught.value.hint.startswith("Did you mean 'fisheye'? model: pinhole")
+    with pytest.raises(InputError, match="got 3") as caught:
+        check({**camera, "model": 3}, "camera", "below.toml")
+    assert caught.value.hint.startswith("model: pinhole")
+
+
 def test_a_missing_key_is_explained():
     """With what it means."""
     settings = {key: value for key, value in SETTINGS.items() if key != "dt_s"}

@@ -193,7 +193,15 @@ def _explain(error: ValidationError) -> tuple[str, str]:
         return _unknown_key(error, place)
     if error.validator == "required":
         return _missing_key(error, place)
-    return f"{place} must be {expected}, got {_shown(error.instance)}", _description(error)
+    message = f"{place} must be {expected}, got {_shown(error.instance)}"
+    return message, _near_value(error) + _description(error)
+
+
+def _near_value(error: ValidationError) -> str:
+    """Return which of the values that may stand there is near the one that does."""
+    if error.validator != "enum" or not isinstance(error.instance, str):
+        return ""
+    return nearest(error.instance, [each for each in _values(error) if isinstance(each, str)])
 
 
 def _unknown_key(error: ValidationError, place: str) -> tuple[str, str]:
@@ -244,6 +252,11 @@ def _values(error: ValidationError) -> Iterable[object]:
     return list(values)
 
 
+def _known(error: ValidationError) -> str:
+    values = ", ".join(map(_shown, _values(error)))
+    return f"one of {values}" if ", " in values else values
+
+
 def _other(error: ValidationError) -> str:
     return f"such that {error.validator} {_shown(error.validator_value)} holds"
 
@@ -251,7 +264,7 @@ def _other(error: ValidationError) -> str:
 _EXPLANATIONS: dict[str, Callable[[ValidationError], str]] = {
     "type": _type,
     "const": lambda error: _shown(error.validator_value),
-    "enum": lambda error: "one of " + ", ".join(map(_shown, _values(error))),
+    "enum": _known,
     "minimum": lambda error: f"at least {error.validator_value}",
     "maximum": lambda error: f"at most {error.validator_value}",
     "exclusiveMinimum": lambda error: f"more than {error.validator_value}",
