@@ -9,7 +9,7 @@ import click
 
 from .durations import seconds
 from .foreign import FORMATS, foreign_options
-from .options import EXISTING, PLACE, seed_option, speaks, tank_options
+from .options import EXISTING, PLACE, makes_artifacts, seed_option, speaks, tank_options
 from .output import Output
 from .reproducing import check_together, reproduce_archives, reproduce_virtual
 
@@ -43,7 +43,7 @@ from .reproducing import check_together, reproduce_archives, reproduce_virtual
 @click.option("--robot", is_flag=True, help="One robot, which the file itself names.")
 @foreign_options
 @seed_option("Of the first trial that is made.  [default: 1; of the twin 9001]")
-@click.option("--force", is_flag=True, help="Make everything again.")
+@makes_artifacts
 @speaks
 def command(out: Output, archives: tuple[Path, ...], folder: Path | None, **options: Any) -> None:
     r"""Compare scores of archived trials with published ones.

@@ -71,7 +71,7 @@ def reproduce_archives(
         scoring=options["scoring"],
     )
     verdict = reproduce(found, asked, folder, out.tell, task=_task(options))
-    if verdict != "agrees":
+    if verdict not in {"agrees", None}:
         out.worsen(EXIT_DISAGREES)
 
 
@@ -122,11 +122,12 @@ def reproduce_virtual(
     }
     twin = TwinOptions(**{name: value for name, value in asked.items() if value is not None})
     reference = read_reference(options["reference"])
-    if reproduce_twin(twin, reference, folder, out.tell, task=_task(options)) != "agrees":
+    verdict = reproduce_twin(twin, reference, folder, out.tell, task=_task(options))
+    if verdict not in {"agrees", None}:
         out.worsen(EXIT_DISAGREES)
 
 
 def _task(options: Mapping[str, Any]) -> Task:
     from zfcal.stages.trial_context import Task
 
-    return Task(force=options["force"])
+    return Task(dry_run=options["dry_run"], force=options["force"])

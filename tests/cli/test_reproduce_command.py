@@ -124,6 +124,73 @@ def test_until_180_s_a_robot_has_what_it_began_with(zfcal, tracks_csv, tmp_path,
     assert driving_courses(root, [given])[0]["S", 240] != one["S", 240]
 
 
+RESULTS = ["reproduction.json", "reproduction.csv", "reproduction.png"]
+
+
+def planned(done, folder):
+    """Return the files that a dry run would make, by their path in the folder."""
+    document = json.loads(done.out)
+    assert done.code == document["exit_code"] == 0, done.err
+    assert {each["state"] for each in document["artifacts"]} <= {"planned", "up to date"}
+    names = [each["path"] for each in document["artifacts"] if each["state"] == "planned"]
+    return [name.removeprefix(f"{folder}/") for name in names]
+
+
+def test_a_dry_run_says_what_an_archive_becomes(zfcal, archive, tmp_path):
+    """And what follows of that; nothing is written."""
+    done = zfcal("reproduce", "trial", "-o", "again", *QUICK, "--dry-run", "--json")
+    tracks = sorted(f"trial/tracks/{path.name}" for path in (archive / "tracks").iterdir())
+    settings = ["arena.geojson", "models/000000.toml", "trial.toml"]
+    files = [*(f"trial/{name}" for name in settings), *tracks]
+    assert sorted(planned(done, "again")) == sorted([*files, *RESULTS])
+    assert "again/trial: is analysed and calibrated after that." in done.err
+    assert not (tmp_path / "again").exists()
+
+
+def test_a_dry_run_says_that_foreign_tracks_are_imported(zfcal, tracks_csv, tmp_path, monkeypatch):
+    """How many segments they have only their import knows."""
+    monkeypatch.chdir(tmp_path)
+    tracks_csv("old.csv")
+    done = zfcal("reproduce", "old.csv", "-o", "again", *TANK, *QUICK, "--dry-run", "--json")
+    settings = ["old/trial.toml", "old/models/000000.toml"]
+    assert planned(done, "again") == [*settings, *RESULTS]
+    assert "old.csv: is imported into again/old/tracks after that." in done.err
+    assert not (tmp_path / "again").exists()
+
+
+def test_a_dry_run_says_what_a_twin_records(zfcal, tmp_path):
+    """The tracks of each virtual trial, and what is made of it."""
+    words = ("--twin", "--trials", "2", "--duration", "3min", "-o", "twin")
+    done = zfcal("reproduce", *words, "--dry-run", "--json")
+    tracks = [
+        f"tanks/twin-0{k}/trial/tracks/{start:06d}.parquet"
+        for k in (1, 2)
+        for start in (0, 60, 120)
+    ]
+    assert planned(done, "twin") == [*tracks, *RESULTS]
+    assert "twin/default/twin-02: is made of twin/tanks/twin-02/trial and calib" in done.err
+    assert not (tmp_path / "twin").exists()
+
+
+@pytest.mark.slow
+def test_a_dry_run_goes_as_far_as_there_is_something(zfcal, archive, tmp_path):
+    """Nothing where all is there; then what one missing file leads to."""
+    dry = ("reproduce", "trial", "-o", "again", *QUICK, "--dry-run", "--json")
+    zfcal("reproduce", "trial", "-o", "again", *QUICK)
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "again").rglob("*")}
+    done = zfcal(*dry)
+    assert planned(done, "again") == []
+    assert planned(zfcal(*dry[:-1], "--force", "--json"), "again")[-3:] == RESULTS
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "again").rglob("*")} == before
+
+    (tmp_path / "again" / "trial" / "models" / "000120.toml").unlink()
+    assert {"trial/models/000120.toml", *RESULTS} <= {*planned(zfcal(*dry), "again")}
+    (tmp_path / "again" / "trial" / "stats" / "000120.parquet").unlink()
+    done = zfcal(*dry)
+    assert "trial/stats/000120.parquet" in planned(done, "again")
+    assert "again/trial: is calibrated after that." in done.err
+
+
 @pytest.mark.parametrize(("words", "says"), [
     ((), "Missing argument 'ARCHIVE...'; or --twin."),
     (("trial", "--twin"), "--twin makes its own trials"),

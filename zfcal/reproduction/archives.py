@@ -11,7 +11,7 @@ from zfcal.artifacts.reading.opening import read_limited
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.stages.events import Made, Tell
+from zfcal.stages.events import Made, Note, Planned, Tell
 from zfcal.stages.import_ import Source, import_tracks
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.trial_context import Task, open_trial
@@ -89,7 +89,7 @@ def _trial_of(archives: Archives, k: int, folder: Path, tell: Tell, task: Task) 
             hint="Say where the trials go with -o DIR.",
         )
     if (path / CONFIG_NAME).is_file():
-        copy_trial(path, root, tell)
+        copy_trial(path, root, tell, task=task)
         return root
     if archives.new is None:
         raise InputError(
@@ -98,12 +98,22 @@ def _trial_of(archives: Archives, k: int, folder: Path, tell: Tell, task: Task) 
         )
     new = replace(archives.new, seed=archives.new.seed + k, source=path.name)
     create_trial(root, new, tell, task=task)
+    if task.dry_run and not (root / CONFIG_NAME).exists():
+        tell(Note(text=f"{path}: is imported into {root / 'tracks'} after that."))
+        return root
     source = Source(path=path, format=archives.format, options=archives.options)
     import_tracks(root, source, tell, task=task)
     return root
 
 
-def copy_trial(source: Path, root: Path, tell: Tell, *, model: Path | None = None) -> None:
+def copy_trial(
+    source: Path,
+    root: Path,
+    tell: Tell,
+    *,
+    model: Path | None = None,
+    task: Task | None = None,
+) -> None:
     """Copy what a trial begins with: settings, arena, starting model and tracks.
 
     What is there with the same content stays, so that what was made of it is up to date.
@@ -116,6 +126,8 @@ def copy_trial(source: Path, root: Path, tell: Tell, *, model: Path | None = Non
         Hears of each file that is written.
     model
         Another starting model than the trial's own.
+    task
+        How; whatever is asked for, the same content is not written again.
 
     Raises
     ------
@@ -138,6 +150,10 @@ def copy_trial(source: Path, root: Path, tell: Tell, *, model: Path | None = Non
     for origin, place in parts:
         content = read_limited(origin)
         if place.is_file() and read_limited(place) == content:
+            continue
+        if task is not None and task.dry_run:
+            reason = "differs from the archive" if place.exists() else "missing"
+            tell(Planned(path=place, reason=reason))
             continue
         write_bytes_whole(place, content)
         tell(Made(path=place, reason="copied from the archive"))

@@ -27,16 +27,20 @@ from zfcal.reproduction.document import (
     lines_of,
 )
 from zfcal.reproduction.picture import reproduction_picture
+from zfcal.reproduction.planning import Planning, plan_calibrated, reason_before
 from zfcal.reproduction.reference import Reference, Scoring
 from zfcal.reproduction.verdict import Verdict
 from zfcal.stages.analyse.analyse import AnalyseOptions, analyse
 from zfcal.stages.calibrate.calibrate import calibrate
 from zfcal.stages.calibrate.searching import AS_PUBLISHED, CalibrateOptions
-from zfcal.stages.events import Made, Note, Result, Tell, UpToDate
+from zfcal.stages.events import Made, Note, Planned, Result, Tell, UpToDate
 from zfcal.stages.trial_context import Task
 
 NAME = "reproduction.json"
 """The document; the table and the picture lie beside it under the same name."""
+
+_BESIDE = (".csv", ".png")
+"""Endings of the table and the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +77,7 @@ def reproduce(
     tell: Tell,
     *,
     task: Task | None = None,
-) -> Verdict:
+) -> Verdict | None:
     """Reproduce published scores from archives.
 
     Parameters
@@ -91,18 +95,18 @@ def reproduce(
 
     Returns
     -------
-    str
-        ``agrees``, ``disagrees`` or ``undecided``.
+    str or None
+        ``agrees``, ``disagrees`` or ``undecided``; None of a dry run.
 
     Raises
     ------
     ZfcalError
         An archive is wrong, or none has a window that can be calibrated.
     """
-    task = task or Task()
-    roots = bring_in(archives, folder, tell, task=task)
+    task, plan = task or Task(), Planning(tell)
+    roots = bring_in(archives, folder, plan, task=task)
     for root in roots:
-        calibrated(root, options.calibrate, tell, task=task)
+        calibrated(root, options.calibrate, plan, task=task)
 
     def ways() -> tuple[list[Way], dict[str, JSON]]:
         courses = {root.name: course_of(root, options.scored_by) for root in roots}
@@ -115,13 +119,16 @@ def reproduce(
 
     said: dict[str, JSON] = {"way": options.way, "scoring": options.scored_by}
     origin = Origin(reference=options.reference, roots=roots, options=said)
-    return publish(origin, ways, folder, tell, task=task)
+    return publish(origin, ways, folder, plan, task=task)
 
 
-def calibrated(root: Path, options: CalibrateOptions, tell: Tell, *, task: Task) -> None:
+def calibrated(root: Path, options: CalibrateOptions, plan: Planning, *, task: Task) -> None:
     """Analyse and calibrate a trial, as ``zfcal analyse`` and ``zfcal calibrate`` do."""
-    analyse(root, AnalyseOptions(), tell, task=task)
-    calibrate(root, options, tell, task=task)
+    if task.dry_run:
+        plan_calibrated(root, options, plan, task=task)
+        return
+    analyse(root, AnalyseOptions(), plan, task=task)
+    calibrate(root, options, plan, task=task)
 
 
 def course_of(root: Path, scoring: Scoring) -> Course:
@@ -163,10 +170,10 @@ def publish(
     origin: Origin,
     ways: Callable[[], tuple[Sequence[Way], Mapping[str, JSON]]],
     folder: Path,
-    tell: Tell,
+    plan: Planning,
     *,
     task: Task,
-) -> Verdict:
+) -> Verdict | None:
     """Write document, table and picture unless they are up to date, and tell what was found.
 
     Parameters
@@ -177,28 +184,39 @@ def publish(
         Returns the ways, of which the first decides, and more of the document.
     folder
         Where they go.
-    tell
-        Hears of them.
+    plan
+        Hears of them, and knows what would be made before.
     task
         A forced one makes them again.
 
     Returns
     -------
-    str
-        The verdict.
+    str or None
+        The verdict; None of a dry run.
     """
+    if task.dry_run:
+        _plan(origin, folder, plan, task=task)
+        return None
     place, lineage = folder / NAME, origin.lineage(folder)
     reason = "forced" if task.force else _reason(place, lineage)
     if reason is not None:
         _write(place, *ways(), origin.reference, lineage)
     document = read_json(place)
     for path in (place, *(folder / name for name in document["files"])):
-        tell(UpToDate(path=path) if reason is None else Made(path=path, reason=reason))
+        plan(UpToDate(path=path) if reason is None else Made(path=path, reason=reason))
     for text in lines_of(document):
-        tell(Note(text=text))
-    tell(Result(value=document))
+        plan(Note(text=text))
+    plan(Result(value=document))
     verdict: Verdict = document["verdict"]
     return verdict
+
+
+def _plan(origin: Origin, folder: Path, plan: Planning, *, task: Task) -> None:
+    """Say whether document, table and picture would be made, and why."""
+    place = folder / NAME
+    reason = reason_before(place, plan, task=task) or _reason(place, origin.lineage(folder))
+    for path in (place, *(place.with_suffix(suffix) for suffix in _BESIDE)):
+        plan(UpToDate(path=path) if reason is None else Planned(path=path, reason=reason))
 
 
 def _reason(place: Path, lineage: Lineage) -> str | None:
@@ -220,9 +238,10 @@ def _write(
     reference: Reference,
     lineage: Lineage,
 ) -> None:
+    table, picture = (place.with_suffix(suffix) for suffix in _BESIDE)
     contents = {
-        place.with_suffix(".csv"): intervals_csv(ways, reference).encode(),
-        place.with_suffix(".png"): png_of(reproduction_picture(ways, reference)),
+        table: intervals_csv(ways, reference).encode(),
+        picture: png_of(reproduction_picture(ways, reference)),
     }
     for path, content in contents.items():
         write_bytes_whole(path, content)

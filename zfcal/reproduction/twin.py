@@ -14,19 +14,23 @@ import numpy as np
 
 from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.models import read_model_for
+from zfcal.artifacts.segments import segment_path
 from zfcal.calibrate.task import Settings
 from zfcal.errors import InputError
 from zfcal.parameters import Parameters, from_genes, n_genes
 from zfcal.reproduction.archives import copy_trial
 from zfcal.reproduction.courses import Course, driving_courses, models_of, reported_course
 from zfcal.reproduction.document import Way
+from zfcal.reproduction.planning import Planning
 from zfcal.reproduction.reference import Reference
 from zfcal.reproduction.reproduce import Origin, calibrated, publish
 from zfcal.reproduction.statements import statements_of
 from zfcal.reproduction.verdict import Verdict
 from zfcal.stages.calibrate.searching import AS_PUBLISHED, CalibrateOptions
-from zfcal.stages.events import Progress, Tell
+from zfcal.stages.events import Note, Planned, Progress, Tell, UpToDate
+from zfcal.stages.recording import starts_between
 from zfcal.stages.trial_context import Task, open_trial
+from zfcal.trial import LOOP_NAME
 from zfcal.virtual.closed_loop import closed_loop
 from zfcal.virtual.trial import LoopOptions
 
@@ -72,7 +76,7 @@ def reproduce_twin(
     tell: Tell,
     *,
     task: Task | None = None,
-) -> Verdict:
+) -> Verdict | None:
     """Make virtual trials, calibrate them as the paper did, and hold them against its statements.
 
     Parameters
@@ -90,14 +94,14 @@ def reproduce_twin(
 
     Returns
     -------
-    str
-        The verdict on what the paper's way reports.
+    str or None
+        The verdict on what the paper's way reports; None of a dry run.
     """
-    task = task or Task()
-    recorded = _recorded(options, folder, tell, task)
-    published = _all_calibrated(recorded, folder / "as-published", AS_PUBLISHED, tell, task)
+    task, plan = task or Task(), Planning(tell)
+    recorded = _recorded(options, folder, plan, task)
+    published = _all_calibrated(recorded, folder / "as-published", AS_PUBLISHED, plan, task)
     default = _all_calibrated(
-        recorded, folder / "default", CalibrateOptions(keeps_way=True), tell, task
+        recorded, folder / "default", CalibrateOptions(keeps_way=True), plan, task
     )
 
     def ways() -> tuple[list[Way], dict[str, JSON]]:
@@ -124,7 +128,7 @@ def reproduce_twin(
         "seed": options.seed,
     }
     origin = Origin(reference=reference, roots=[*published, *default], options=said)
-    return publish(origin, ways, folder, tell, task=task)
+    return publish(origin, ways, folder, plan, task=task)
 
 
 def _recorded(options: TwinOptions, folder: Path, tell: Tell, task: Task) -> list[Path]:
@@ -139,20 +143,36 @@ def _recorded(options: TwinOptions, folder: Path, tell: Tell, task: Task) -> lis
             settings=Settings(generations=0),
         )
         # A recording has no answer to a force: it would be the same to the byte.
-        found.append(closed_loop(folder / "tanks" / f"twin-{k + 1:02d}", loop, tell, task=task))
+        place = folder / "tanks" / f"twin-{k + 1:02d}"
+        record = _plan_recorded if task.dry_run else closed_loop
+        found.append(record(place, loop, tell, task=task))
     return found
 
 
+def _plan_recorded(place: Path, loop: LoopOptions, tell: Tell, *, task: Task) -> Path:
+    """Say which tracks a virtual trial would record; return the trial."""
+    root = place / "trial"
+    is_whole = (root / LOOP_NAME).exists() and not task.force
+    for start in starts_between(0.0, loop.duration_s):
+        path = segment_path(root, start)
+        reason = "forced" if path.exists() else "missing"
+        tell(UpToDate(path=path) if is_whole else Planned(path=path, reason=reason))
+    return root
+
+
 def _all_calibrated(
-    recorded: Sequence[Path], folder: Path, options: CalibrateOptions, tell: Tell, task: Task
+    recorded: Sequence[Path], folder: Path, options: CalibrateOptions, plan: Planning, task: Task
 ) -> list[Path]:
     found = []
     for k, source in enumerate(recorded):
-        tell(Progress(stage=folder.name, done=k, total=len(recorded)))
+        plan(Progress(stage=folder.name, done=k, total=len(recorded)))
         root = folder / source.parent.name
-        copy_trial(source, root, tell)
-        calibrated(root, options, tell, task=task)
         found.append(root)
+        if plan.is_planned(source):
+            plan(Note(text=f"{root}: is made of {source} and calibrated after that."))
+            continue
+        copy_trial(source, root, plan, task=task)
+        calibrated(root, options, plan, task=task)
     return found
 
 
