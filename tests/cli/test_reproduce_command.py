@@ -218,6 +218,15 @@ def test_a_wrong_archive_is_named(zfcal, archive, tracks_csv, words, says):
     assert says in done.err
 
 
+def test_a_reference_that_is_no_toml_is_an_error(zfcal, archive, tracks_csv, tmp_path):
+    """Exit code 1, not that of work that was done without a damaged file."""
+    tracks_csv("old.csv")
+    done = zfcal("reproduce", "trial", "--reference", "old.csv", "-o", "again")
+    assert done.code == 1
+    assert "old.csv: is not valid TOML" in done.err
+    assert not (tmp_path / "again").exists()
+
+
 @pytest.mark.slow
 def test_a_small_twin_says_what_holds(zfcal, tmp_path, monkeypatch):
     """One trial of three minutes: four ways, all statements, none of them decided."""

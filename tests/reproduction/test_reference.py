@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from zfcal.errors import DamagedError, InputError
+from zfcal.errors import InputError
 from zfcal.reproduction.reference import read_reference
 
 OWN = """
@@ -86,7 +86,7 @@ def test_two_contrasts_of_one_name_are_refused(write):
         read_reference(write(twice))
 
 
-def test_a_file_that_is_no_toml_is_damaged(write):
-    """And is named."""
-    with pytest.raises(DamagedError, match=r"reference\.toml"):
+def test_a_file_that_is_no_toml_is_refused(write):
+    """And is named: nothing can be compared without it, so it is no damage that is left out."""
+    with pytest.raises(InputError, match=r"reference\.toml: is not valid TOML"):
         read_reference(write("source = "))

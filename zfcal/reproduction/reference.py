@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from zfcal.artifacts.validation import check, read_toml
+from zfcal.artifacts.validation import check, read_toml, written_by_people
 from zfcal.errors import InputError
 
 _MARGIN = 0.05
@@ -99,12 +99,11 @@ def read_reference(path: Path | None = None) -> Reference:
     Raises
     ------
     InputError
-        There is no such file, or a value is unknown, missing or wrong.
-    DamagedError
-        It is not TOML.
+        There is no such file, it is not TOML, or a value is unknown, missing or wrong.
     """
     if path is not None:
-        return _reference(read_toml(path), path)
+        with written_by_people():
+            return _reference(read_toml(path), path)
     with as_file(files("zfcal.reproduction") / "published.toml") as place:
         return _reference(read_toml(place), place)
 
