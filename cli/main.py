@@ -11,6 +11,7 @@ import errno
 import gc
 import importlib
 import io
+import itertools
 import os
 import signal
 import sys
@@ -24,7 +25,14 @@ import click
 from click.shell_completion import get_completion_class
 
 from .options import laid_out
-from .output import EXIT_INTERRUPTED, ReaderGoneError, complain
+from .output import (
+    EXIT_INTERRUPTED,
+    HAS_VOICE,
+    Output,
+    ReaderGoneError,
+    complain,
+    usage_text,
+)
 
 COMMANDS = {
     "demo": "demo",
@@ -260,7 +268,7 @@ def run(argv: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, _terminate)
     _open_streams()
     try:
-        code = group.main(args=list(argv), prog_name="zfcal", standalone_mode=False)
+        code = _obey(argv)
         sys.stdout.flush()
     except (KeyboardInterrupt, click.Abort):
         return EXIT_INTERRUPTED
@@ -268,10 +276,17 @@ def run(argv: Sequence[str]) -> int:
         return error.exit_code
     except (BrokenPipeError, ReaderGoneError):
         return _reader_gone()
-    except click.ClickException as error:
-        return _explain_usage(error)
     except Exception as error:  # noqa: BLE001 - the one place where what escaped becomes text
         return _explain(error, argv)
+    return code
+
+
+def _obey(argv: Sequence[str]) -> int:
+    """Run the command; wrong usage is explained within what a reader may leave at any time."""
+    try:
+        code = group.main(args=list(argv), prog_name="zfcal", standalone_mode=False)
+    except click.UsageError as error:
+        return _explain_usage(error, argv)
     return code if isinstance(code, int) else 0
 
 
@@ -304,11 +319,30 @@ def _drop_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _explain_usage(error: click.ClickException) -> int:
-    context = getattr(error, "ctx", None)
-    path = context.command_path if context is not None else "zfcal"
-    complain(error.format_message(), hint=f"See: {path} --help")
+def _explain_usage(error: click.UsageError, argv: Sequence[str]) -> int:
+    error.ctx = error.ctx or _context_of(argv)
+    message, hint = usage_text(error)
+    complain(message, hint=hint)
+    # What stands behind -- is no option.
+    as_json = "--json" in itertools.takewhile(lambda word: word != "--", argv)
+    if as_json and not error.ctx.meta.get(HAS_VOICE):
+        out = Output(error.ctx.info_name or "", as_json=True, verbose=0, quiet=True)
+        out.record(error)
+        out.print_document()
     return _EXIT_USAGE
+
+
+def _context_of(argv: Sequence[str]) -> click.Context:
+    """Return the context of the command that is named: click has none for some mistakes."""
+    context = click.Context(group, info_name="zfcal")
+    for word in argv:
+        if not isinstance(context.command, click.Group):
+            break
+        command = context.command.get_command(context, word)
+        if command is None:
+            break
+        context = click.Context(command, parent=context, info_name=word)
+    return context
 
 
 def _explain(error: Exception, argv: Sequence[str]) -> int:

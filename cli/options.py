@@ -13,7 +13,7 @@ import click
 from zfcal.api import values
 from zfcal.errors import OptionError
 
-from .output import Output
+from .output import HAS_VOICE, Output
 
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
@@ -117,6 +117,7 @@ def speaks(command: Command, *, as_json: str = "One JSON document instead of pat
         if quiet and verbose:
             raise click.UsageError("--quiet and --verbose contradict each other.")
         name = context.info_name or ""
+        context.meta[HAS_VOICE] = True
         with Output(name, as_json=as_json, verbose=verbose, quiet=quiet) as out:
             _obey(command, out, options)
         context.exit(out.exit_code)

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 EXIT_DAMAGED = 3
 EXIT_INTERRUPTED = 130
 EXIT_DISAGREES = 4
+HAS_VOICE = f"{__name__}.has_voice"
+"""Key in what click keeps of a run, once a command writes its JSON document itself."""
+
 _SEVERITY = (0, EXIT_DISAGREES, EXIT_DAMAGED, 75, 1)
 """Exit codes from the best to the worst: of several trials the worst one counts."""
 
@@ -35,6 +38,13 @@ def complain(message: str, *, hint: str = "") -> None:
     _say(f"{_paint('zfcal: error:', 'red')} {message}")
     if hint:
         _say(f"{_paint('hint:', 'cyan')} {hint}")
+
+
+def usage_text(error: click.UsageError) -> tuple[str, str]:
+    """Return what is said of wrong usage, and where help is."""
+    context = error.ctx or click.get_current_context(silent=True)
+    path = context.command_path if context is not None else "zfcal"
+    return error.format_message(), f"See: {path} --help"
 
 
 def _say(text: str) -> None:
@@ -113,9 +123,9 @@ class Output:
         if isinstance(error, BrokenPipeError):
             raise ReaderGoneError from error
         if error is not None:
-            self._record(error)
+            self.record(error)
         if self.as_json and not self.in_lines:
-            self._print_document()
+            self.print_document()
         if error is None and not self.quiet:
             self._summarise()
 
@@ -178,10 +188,12 @@ class Output:
             self._bars.clear()
             _say(record.getMessage())
 
-    def _record(self, error: BaseException) -> None:
+    def record(self, error: BaseException) -> None:
         """Put into the document what `main` will say to the person."""
-        text = {"message": str(error) or type(error).__name__, "hint": getattr(error, "hint", "")}
-        self._errors.append(text)
+        message, hint = str(error) or type(error).__name__, getattr(error, "hint", "")
+        if isinstance(error, click.UsageError):
+            message, hint = usage_text(error)
+        self._errors.append({"message": message, "hint": hint})
         self.exit_code = EXIT_INTERRUPTED if isinstance(error, KeyboardInterrupt) else 1
         self.exit_code = getattr(error, "exit_code", self.exit_code)
 
@@ -254,7 +266,8 @@ class Output:
         elif fresh and not self._errors:
             _say(f"{self.command}: nothing to do, {fresh} up to date.")
 
-    def _print_document(self) -> None:
+    def print_document(self) -> None:
+        """Write the JSON document to standard output."""
         document: Any = {
             "command": self.command,
             "exit_code": self.exit_code,

@@ -1,6 +1,7 @@
 """The group: help, completion, and how errors and signals end."""
 
 import io
+import json
 import os
 import re
 import signal
@@ -166,6 +167,32 @@ def test_wrong_usage_ends_with_2_and_names_the_help(zfcal, words):
     assert done.code == 2
     assert done.out == ""
     assert done.err.splitlines()[-1] == f"hint: See: zfcal {words[0]} --help"
+
+
+@pytest.mark.parametrize(("words", "command", "message"), [
+    (("analyse", "--json"), "analyse", "Missing argument 'TRIAL...'."),
+    (("analyse", "trial", "--bogus", "--json"), "analyse", "No such option '--bogus'."),
+    (("analyse", "trial", "--json", "-q", "-v"), "analyse", "--quiet and --verbose contradict"),
+    (("export", "trial", "--json"), "export", "There is nothing to export"),
+    (("watch", "trial", "--bogus", "--json"), "watch", "No such option '--bogus'."),
+    (("camera", "corners", "1,2", "3,4", "--json"), "corners", "Argument 'corners' takes 4 values"),
+    (("anlyse", "--json"), "zfcal", "No command 'anlyse'."),
+])  # fmt: skip
+def test_wrong_usage_with_json_is_one_document_as_well(zfcal, words, command, message):
+    """Said on standard error as ever, whoever finds it."""
+    done = zfcal(*words)
+    document = json.loads(done.out)
+    (error,) = document["errors"]
+    assert (done.code, document["exit_code"], document["command"]) == (2, 2, command)
+    assert error["message"].startswith(message)
+    path = {"corners": "zfcal camera corners", "zfcal": "zfcal"}.get(command, f"zfcal {command}")
+    assert error["hint"] == f"See: {path} --help"
+    assert done.err == f"zfcal: error: {error['message']}\nhint: {error['hint']}\n"
+
+
+def test_what_stands_behind_two_dashes_asks_for_no_document(zfcal):
+    """A trial may be called --json."""
+    assert zfcal("analyse", "--bogus", "--", "--json").out == ""
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1"])
