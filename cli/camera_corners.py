@@ -11,9 +11,15 @@ from .camera_options import aim_of, box, image_options, numbers, place_options
 from .options import makes_artifacts, speaks
 from .output import Output
 
+_NAMES = ("LL", "LR", "UR", "UL")
+
+
+def _pixel(name: str, text: str) -> tuple[float, ...]:
+    return numbers(text, 2, of=name)
+
 
 @click.command("corners")
-@click.argument("corners", nargs=4, metavar="LL LR UR UL")
+@click.argument("corners", nargs=4, metavar=" ".join(_NAMES))
 @click.option("--arena", metavar="NAME|FILE", help="Whose corners; default: the trial's arena.")
 @click.option("--bounds-m", callback=box, metavar="X0,Y0,X1,Y1", help="Instead of an arena.")
 @image_options
@@ -47,7 +53,7 @@ def corners(
     from zfcal.stages.camera.corners import Corners, make_from_corners
 
     given = Corners(
-        px=tuple((x, y) for x, y in (numbers(text, 2) for text in corners)),
+        px=tuple((x, y) for x, y in map(_pixel, _NAMES, corners)),
         size_px=size,
         image=image,
         arena=arena,

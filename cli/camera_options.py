@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,14 +23,17 @@ figure_option = click.option(
 )
 
 
-def numbers(text: str, count: int) -> tuple[float, ...]:
-    """Return as many numbers as asked for from ``1,2.5``."""
+def numbers(text: str, count: int, *, of: str | None = None) -> tuple[float, ...]:
+    """Return as many finite numbers as asked for from ``1,2.5``; ``of`` is what they belong to."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
     if len(values) != count:
-        raise click.BadParameter(f"expected {count} numbers with commas between, got {text!r}.")
+        message = f"expected {count} numbers with commas between, got {text!r}."
+        raise click.BadParameter(message, param_hint=of)
+    if not all(map(math.isfinite, values)):
+        raise click.BadParameter(f"expected finite numbers, got {text!r}.", param_hint=of)
     return values
 
 

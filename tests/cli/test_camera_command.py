@@ -55,6 +55,32 @@ def test_the_second_time_nothing_is_done(zfcal, trial):
     assert "option corners_px" in moved.err
 
 
+@pytest.mark.parametrize(("k", "name"), [*enumerate(["LL", "LR", "UR", "UL"])])
+@pytest.mark.parametrize(("text", "expected"), [
+    ("28,nan", "finite numbers"),
+    ("inf,30", "finite numbers"),
+    ("28,-inf", "finite numbers"),
+    ("28", "2 numbers with commas between"),
+    ("a,b", "2 numbers with commas between"),
+])  # fmt: skip
+def test_a_corner_that_is_no_pair_of_finite_numbers_is_named(zfcal, trial, k, name, text, expected):
+    """Wrong usage; the corner has the name that help gives it."""
+    corners = [*CORNERS[:k], text, *CORNERS[k + 1 :]]
+    words = ["--size", "500x500", "--trial", "trial", "--camera", "overhead"]
+    done = zfcal("camera", "corners", *corners, *words)
+    assert done.code == 2
+    assert f"Invalid value for {name}: expected {expected}, got {text!r}." in done.err
+    assert not (trial / "cameras").exists()
+
+
+def test_bounds_are_finite_numbers(zfcal):
+    """As corners are."""
+    words = ["--bounds-m", "0,0,nan,1", "--size", "500x500", "-o", "camera.toml"]
+    done = zfcal("camera", "corners", *CORNERS, *words)
+    assert done.code == 2
+    assert "'--bounds-m': expected finite numbers, got '0,0,nan,1'." in done.err
+
+
 def test_what_a_person_wrote_in_the_settings_stays(zfcal, trial):
     """Comments, and the camera's source."""
     path = trial / "trial.toml"
