@@ -95,6 +95,19 @@ def test_an_input_that_changed_is_named(output, expected, inputs, reason):
     assert stale_reason([output], with_inputs(expected, **inputs)) == reason
 
 
+def test_an_input_that_is_there_and_not_asked_any_more_is_not_gone(output, expected, tmp_path):
+    """It lies in the trial, whether that is told or found above the output."""
+    fewer = with_inputs(expected, **{"trial.toml": "1" * 64})
+    (tmp_path / "tracks").mkdir()
+    (tmp_path / "tracks" / "000000.parquet").touch()
+
+    reason = "tracks/000000.parquet is no longer an input"
+    assert stale_reason([output], fewer) == reason
+    assert stale_reason([output], fewer, root=tmp_path) == reason
+    elsewhere = tmp_path / "elsewhere"
+    assert stale_reason([output], fewer, root=elsewhere) == "input tracks/000000.parquet is gone"
+
+
 def test_another_seed_command_or_version_of_the_schema_is_named(output, expected):
     """Each bears on the numbers."""
     seed = dataclasses.replace(expected, seed=8)

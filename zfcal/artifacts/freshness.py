@@ -41,7 +41,11 @@ def relative_to(root: Path, path: Path) -> str:
 
 
 def stale_reason(
-    outputs: Sequence[Path], expected: Lineage, *, ignore_options: Sequence[str] = ()
+    outputs: Sequence[Path],
+    expected: Lineage,
+    *,
+    ignore_options: Sequence[str] = (),
+    root: Path | None = None,
 ) -> str | None:
     """Return why outputs must be made again; None if they are up to date.
 
@@ -56,6 +60,8 @@ def stale_reason(
         The lineage that they would get now.
     ignore_options
         Options that do not bear on the result of this run.
+    root
+        The folder to which the paths in lineage are relative; None for one above the output.
 
     Returns
     -------
@@ -63,7 +69,8 @@ def stale_reason(
         One line, such as ``missing`` or ``option runs: 1 -> 2``.
     """
     for path in outputs:
-        reason = _reason(path, expected, ignore_options)
+        roots = path.absolute().parents if root is None else [root]
+        reason = _reason(path, expected, ignore_options, roots)
         if reason:
             return reason
     return None
@@ -81,7 +88,9 @@ def version_change(outputs: Sequence[Path], expected: Lineage) -> str | None:
     return None
 
 
-def _reason(path: Path, expected: Lineage, ignore_options: Sequence[str]) -> str | None:
+def _reason(
+    path: Path, expected: Lineage, ignore_options: Sequence[str], roots: Sequence[Path]
+) -> str | None:
     if not path.exists():
         return "missing"
     try:
@@ -91,7 +100,7 @@ def _reason(path: Path, expected: Lineage, ignore_options: Sequence[str]) -> str
     return (
         _schema_change(found.schema, expected.schema)
         or _command_change(found, expected)
-        or _input_change(found.inputs, expected.inputs)
+        or _input_change(found.inputs, expected.inputs, roots)
         or _option_change(found.options, expected.options, ignore_options)
         or (None if found.seed == expected.seed else f"seed: {found.seed} -> {expected.seed}")
     )
@@ -108,12 +117,16 @@ def _command_change(found: Lineage, expected: Lineage) -> str | None:
     return f"made by {found.command}, not by {expected.command}"
 
 
-def _input_change(found: Mapping[str, str], expected: Mapping[str, str]) -> str | None:
+def _input_change(
+    found: Mapping[str, str], expected: Mapping[str, str], roots: Sequence[Path]
+) -> str | None:
     for name in sorted({*found, *expected}):
         if name not in found:
             return f"input {name} is new"
         if name not in expected:
-            return f"input {name} is gone"
+            # It may be there, and not be asked any more: another option, or a shorter stretch.
+            is_there = any((root / name).exists() for root in roots)
+            return f"{name} is no longer an input" if is_there else f"input {name} is gone"
         if found[name] != expected[name]:
             return f"input {name} changed"
     return None

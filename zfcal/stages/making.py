@@ -196,7 +196,12 @@ class _Making:
             if output.sidecar is not None:
                 reason = None if output.path.is_file() else "missing"
             else:
-                reason = stale_reason([output.path], output.lineage, ignore_options=output.ignore)
+                reason = stale_reason(
+                    [output.path],
+                    output.lineage,
+                    ignore_options=output.ignore,
+                    root=self._run.root,
+                )
             if reason is not None:
                 return reason
         if self._run.task.force:

@@ -162,7 +162,7 @@ def test_force_ends_in_the_same_bytes(make_trial, asked, heard, read_all):
         ({"n_null": 199}, "option null: 39 -> 199"),
         ({"noise_m": 0.0005}, "option noise_mm: none -> 0.5"),
         ({"seed": 9}, "seed: 1 -> 9"),
-        ({"window_s": (0, 120)}, "input tracks/000120.parquet is gone"),
+        ({"window_s": (0, 120)}, "tracks/000120.parquet is no longer an input"),
     ],
 )
 def test_what_bears_on_the_result_makes_it_stale(make_trial, asked, heard, options, reason):
