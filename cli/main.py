@@ -305,7 +305,7 @@ def _open_streams() -> None:
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - the signal's signature
-    raise Terminated
+    raise Terminated("Ended by SIGTERM.")
 
 
 def _reader_gone() -> int:

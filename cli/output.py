@@ -193,6 +193,8 @@ class Output:
         message, hint = str(error) or type(error).__name__, getattr(error, "hint", "")
         if isinstance(error, click.UsageError):
             message, hint = usage_text(error)
+        elif isinstance(error, KeyboardInterrupt):
+            message = "Interrupted."
         self._errors.append({"message": message, "hint": hint})
         self.exit_code = EXIT_INTERRUPTED if isinstance(error, KeyboardInterrupt) else 1
         self.exit_code = getattr(error, "exit_code", self.exit_code)

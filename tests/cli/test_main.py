@@ -14,6 +14,7 @@ import pytest
 from zfcal.errors import DamagedError, InputError, LockedError, StorageError, ZfcalError
 from zfcal_cli import main as main_module
 from zfcal_cli.main import COMMANDS, TASKS, group, run
+from zfcal_cli.output import Output
 
 
 def all_commands():
@@ -299,6 +300,24 @@ def test_a_signal_ends_a_waiting_command_quietly(command, trial, number, code):
         waiting.send_signal(number)
         assert waiting.wait(timeout=20) == code
         assert b"Traceback" not in waiting.stderr.read()
+
+
+@pytest.mark.parametrize(("number", "says"), [
+    (signal.SIGINT, "Interrupted."),
+    (signal.SIGTERM, "Ended by SIGTERM."),
+])  # fmt: skip
+def test_a_signal_is_an_error_of_the_document(monkeypatch, capsys, number, says):
+    """In words, whichever command it ends."""
+
+    def wait(*_, **__):
+        with Output("calibrate", as_json=True, verbose=0, quiet=False):
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(main_module.group, "main", wait)
+    code = run(["calibrate", "trial", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert document["exit_code"] == code == 128 + number
+    assert document["errors"] == [{"message": says, "hint": ""}]
 
 
 def test_a_reader_that_goes_away_ends_it_quietly(command, trial):

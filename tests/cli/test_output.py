@@ -132,10 +132,12 @@ def test_json_is_one_document_with_everything(speak):
 
 
 def test_an_interrupt_still_leaves_a_document(capsys):
-    """With the exit code that the process has."""
+    """With the exit code that the process has, and a word for people."""
     with pytest.raises(KeyboardInterrupt), Output("a", as_json=True, verbose=0, quiet=False):
         raise KeyboardInterrupt
-    assert json.loads(capsys.readouterr().out)["exit_code"] == 130
+    document = json.loads(capsys.readouterr().out)
+    assert document["exit_code"] == 130
+    assert document["errors"] == [{"message": "Interrupted.", "hint": ""}]
 
 
 def test_quiet_leaves_errors_and_what_is_left_out(speak):
