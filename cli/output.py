@@ -29,15 +29,19 @@ EXIT_DISAGREES = 4
 HAS_VOICE = f"{__name__}.has_voice"
 """Key in what click keeps of a run, once a command writes its JSON document itself."""
 
+_STEERING = {
+    code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"
+}
+
 _SEVERITY = (0, EXIT_DISAGREES, EXIT_DAMAGED, 75, 1)
 """Exit codes from the best to the worst: of several trials the worst one counts."""
 
 
 def complain(message: str, *, hint: str = "") -> None:
     """Write an error, and what to do about it, to standard error."""
-    _say(f"{_paint('zfcal: error:', 'red')} {message}")
+    _say(f"{_paint('zfcal: error:', 'red')} {_printable(message)}")
     if hint:
-        _say(f"{_paint('hint:', 'cyan')} {hint}")
+        _say(f"{_paint('hint:', 'cyan')} {_printable(hint)}")
 
 
 def usage_text(error: click.UsageError) -> tuple[str, str]:
@@ -50,6 +54,11 @@ def usage_text(error: click.UsageError) -> tuple[str, str]:
 def _say(text: str) -> None:
     """Write a line to standard error."""
     click.echo(text, err=True)
+
+
+def _printable(text: str) -> str:
+    """Return a text without signs that steer a terminal, which names of files may hold."""
+    return text.translate(_STEERING)
 
 
 def _paint(text: str, colour: str) -> str:
@@ -222,7 +231,7 @@ class Output:
     def _plan(self, path: Path, reason: str) -> None:
         self._artifacts[path] = {"path": str(path), "state": "planned", "reason": reason}
         self._bars.clear()
-        _say(f"would make {path}: {reason}")
+        _say(_printable(f"would make {path}: {reason}"))
 
     def _leave_out(self, event: LeftOut) -> None:
         key = (str(event.path), event.problem)
@@ -232,9 +241,9 @@ class Output:
             return
         self._left_out[key] = {"path": key[0], "problem": key[1]}
         self._bars.clear()
-        _say(f"{_paint('zfcal: left out:', 'yellow')} {event.problem}")
+        _say(f"{_paint('zfcal: left out:', 'yellow')} {_printable(event.problem)}")
         if event.hint:
-            _say(f"{_paint('hint:', 'cyan')} {event.hint}")
+            _say(f"{_paint('hint:', 'cyan')} {_printable(event.hint)}")
 
     def _talk(self, level: str, text: str) -> None:
         if {"level": level, "text": text} in self._messages:
@@ -242,7 +251,8 @@ class Output:
         self._messages.append({"level": level, "text": text})
         if not self.quiet:
             self._bars.clear()
-            _say(f"{_paint('warning:', 'yellow')} {text}" if level == "warning" else text)
+            shown = _printable(text)
+            _say(f"{_paint('warning:', 'yellow')} {shown}" if level == "warning" else shown)
 
     def _artifact(self, path: Path, state: str, reason: str) -> None:
         known = self._artifacts.get(path)

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 STDIN = "-"
 
+_LONGEST_PATH = 4096
+"""Characters: more than a system takes."""
+
+_SHOWN = 20
+"""Characters of a line that is no path."""
+
 
 def each_trial(out: Output, trials: Sequence[str], work: Callable[[Work], object]) -> None:
     """Work on each trial in turn; where one fails, the others still have theirs.
@@ -85,13 +91,13 @@ def _each_line(out: Output, stream: TextIO, work: Callable[[Work], object]) -> N
 
     roots: dict[Path, None] = {}
 
-    def at(path: Path) -> None:
-        found = work_of(path)
+    def at(text: str) -> None:
+        found = work_of(_path_of(text))
         roots[found.root] = None
         work(found)
 
-    for path in _paths(stream):
-        out.attempt(functools.partial(at, path))
+    for text in _lines(stream):
+        out.attempt(functools.partial(at, text))
     if not roots:
         out.note("No artifact came on standard input: nothing to do.")
     for root in roots:
@@ -99,7 +105,20 @@ def _each_line(out: Output, stream: TextIO, work: Callable[[Work], object]) -> N
         out.attempt(functools.partial(work, Work(root=root)))
 
 
-def _paths(stream: TextIO) -> Iterable[Path]:
+def _lines(stream: TextIO) -> Iterable[str]:
     for line in stream:
         if text := line.rstrip("\n"):
-            yield Path(text)
+            yield text
+
+
+def _path_of(text: str) -> Path:
+    """Return the path that a line is; what no system takes for one is shown in short."""
+    if "\0" not in text and len(text) <= _LONGEST_PATH:
+        return Path(text)
+    from zfcal.errors import InputError
+
+    raise InputError(
+        f"standard input: a line of {len(text)} characters that begins with {text[:_SHOWN]!r} "
+        "is no path.",
+        hint="Give the paths of artifacts, one a line, as other commands write them.",
+    )

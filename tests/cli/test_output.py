@@ -75,6 +75,20 @@ def test_a_damaged_input_is_named_once_and_ends_with_3(speak):
     assert "hint: Copy it again." in err
 
 
+def test_names_of_files_do_not_steer_the_terminal(speak):
+    """Errors, hints, warnings and what is left out show such signs as letters."""
+    name = "a\x1b[31m\x9b\x00\tb"
+    told = (
+        LeftOut(path=A, problem=name, hint=name),
+        Note(text=name, warning=True),
+        Planned(path=Path(name), reason="missing"),
+        fail_with(InputError(name, hint=name)),
+    )
+    err = speak(*told)[1]
+    assert err.count("a\\x1b[31m\\x9b\\x00\tb") == 6
+    assert "\x1b" not in err
+
+
 def test_what_is_left_out_without_damage_ends_with_0(speak):
     """A minute without fish is no damage."""
     assert speak(LeftOut(path=A, problem="no fish", damaged=False))[2] == 0

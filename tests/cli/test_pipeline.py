@@ -107,6 +107,22 @@ def test_a_pipe_is_worked_on_line_by_line(command, trial):
     assert rest == [f"trial/{name}.parquet" for name in names]
 
 
+@pytest.mark.parametrize(("line", "begins"), [
+    ("\0" * 100_000, r"'\x00\x00"),
+    ("trial\0", r"'trial\x00'"),
+    ("a/" * 3000, "'a/a/"),
+])  # fmt: skip
+def test_a_line_that_is_no_path_is_shown_in_short(zfcal, monkeypatch, line, begins):
+    """Something else was piped in: a line of it is no message."""
+    monkeypatch.setattr(sys, "stdin", iter([f"{line}\n"]))
+    done = zfcal("analyse", "-")
+    assert done.code == 1
+    says = f"zfcal: error: standard input: a line of {len(line)} characters that begins with "
+    assert done.err.startswith(f"{says}{begins}")
+    assert max(map(len, done.err.splitlines())) < 200
+    assert "\0" not in done.err
+
+
 @pytest.mark.slow
 def test_an_upstream_that_fails_is_seen_by_pipefail_and_does_no_harm(shell, trial):
     """Nothing comes through the pipe: that is said, and is nothing to do."""
