@@ -195,8 +195,10 @@ def test_a_trial_is_imported_analysed_and_calibrated_without_pandas(tracks_csv, 
 def test_report_writes_a_page_once(zfcal, trial):
     """The second time there is nothing to do."""
     zfcal("analyse", "trial")
+    planned = zfcal("report", "trial", "--dry-run").err.splitlines()
     done = zfcal("report", "trial")
     assert done.code == 0
+    assert planned[:-1] == [f"would make {line}: missing" for line in done.lines]
     assert done.lines[0] == "trial/report/index.html"
     assert "nothing to do" in zfcal("report", "trial").err
     assert (

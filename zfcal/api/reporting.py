@@ -15,6 +15,7 @@ from zfcal.report.page import (
     report_files,
     report_left_out,
     report_options,
+    report_plan,
     report_reason,
     write_report,
 )
@@ -99,7 +100,8 @@ def _write_one(
             for line in report_left_out(roots, folder):
                 tell(LeftOut(path=Path(), problem=line, hint=_HINT))
         elif task.dry_run:
-            tell(Planned(path=(folder or roots[0] / "report") / PAGE, reason=reason))
+            for path in report_plan(roots, folder, how=how, on_damage=tell_damage(tell)):
+                tell(Planned(path=path, reason=reason))
         else:
             for path in write_report(roots, folder, how=how, on_damage=tell_damage(tell)):
                 tell(Made(path=path, reason=reason))

@@ -91,17 +91,8 @@ def write_report(
     """
     place = _place(roots, out_dir)
     lineage = _lineage(roots, place, how)
-    views = [
-        replace(
-            gather(root, on_damage or _ignore, alone=len(roots) == 1),
-            label=label,
-            published=how.published,
-        )
-        for root, label in zip(roots, labels_of(roots), strict=True)
-    ]
-    _check_one_arena(views)
+    views, pictures = _shown(roots, how, on_damage)
     to_film = None if how.film is None else _to_film(views)
-    pictures = pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
     written = []
     for picture in pictures:
         for kind in how.printing.formats:
@@ -125,6 +116,51 @@ def write_report(
     check(document, "integration", numbers)
     write_text_whole(numbers, json.dumps(document, indent=2, ensure_ascii=False) + "\n")
     return [page, *written[:-1], numbers]
+
+
+def report_plan(
+    roots: Sequence[Path],
+    out_dir: Path | None = None,
+    *,
+    how: ReportOptions = AS_USUAL,
+    on_damage: Damage | None = None,
+) -> list[Path]:
+    """Return the files that `write_report` would return; nothing is written.
+
+    Parameters
+    ----------
+    roots, out_dir, how, on_damage
+        As for `write_report`.
+
+    Raises
+    ------
+    InputError
+        As `write_report`.
+    """
+    folder = _place(roots, out_dir).folder
+    views, pictures = _shown(roots, how, on_damage)
+    names = [f"{each.name}.{kind}" for each in pictures for kind in how.printing.formats]
+    if how.film is not None:
+        _to_film(views)
+        names.append(f"film.{how.film}")
+    table = [_TABLE] if len(views) > 1 else []
+    return [folder / name for name in (PAGE, *names, *table, _NUMBERS)]
+
+
+def _shown(
+    roots: Sequence[Path], how: ReportOptions, on_damage: Damage | None
+) -> tuple[list[TrialView], list[Picture]]:
+    """Return what is known of the trials, and the pictures of it."""
+    views = [
+        replace(
+            gather(root, on_damage or _ignore, alone=len(roots) == 1),
+            label=label,
+            published=how.published,
+        )
+        for root, label in zip(roots, labels_of(roots), strict=True)
+    ]
+    _check_one_arena(views)
+    return views, pictures_of_trial(views[0]) if len(views) == 1 else pictures_of_trials(views)
 
 
 def report_reason(

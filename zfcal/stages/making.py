@@ -227,7 +227,7 @@ class _Making:
             run.tell(UpToDate(path=output.path))
             return True
         if run.task.dry_run:
-            self._plan([output], reason)
+            self._plan([output.path], reason)
             return False
         is_there = False
         with unless_taken(output.path, run.tell):
@@ -243,7 +243,7 @@ class _Making:
         if not self._is_alone and self._is_taken(outputs):
             return []
         if run.task.dry_run:
-            self._plan(outputs, reason)
+            self._plan([*item.expected, *(output.path for output in outputs)], reason)
             return []
         for output in outputs:
             check_free(output.path)
@@ -264,10 +264,10 @@ class _Making:
             else:
                 self._run.tell(event)
 
-    def _plan(self, outputs: Sequence[Output], reason: str) -> None:
-        for output in outputs:
-            self._run.tell(Planned(path=output.path, reason=reason))
-            self._run.planned.append(output.path)
+    def _plan(self, paths: Iterable[Path], reason: str) -> None:
+        for path in dict.fromkeys(paths):
+            self._run.tell(Planned(path=path, reason=reason))
+            self._run.planned.append(path)
 
     def _is_taken(self, outputs: Sequence[Output]) -> bool:
         """Return whether a folder stands where one of the files is to go, which is told."""

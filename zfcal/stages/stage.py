@@ -148,12 +148,15 @@ class Item:
         Does what is to be done where the files are there, made now or before.
     apart
         Whether each file is up to date or made by itself; otherwise all of them or none.
+    expected
+        For a dry run: further files, as far as they are known before.
     """
 
     outputs: Sequence[Output]
     compute: Callable[[], Iterable[Draft]]
     finish: Callable[[], None] = _nothing
     apart: bool = False
+    expected: Sequence[Path] = ()
 
 
 class Stage(ABC, Generic[S, K]):

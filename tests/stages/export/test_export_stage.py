@@ -237,6 +237,20 @@ def test_a_dry_run_writes_nothing(trial, heard, read_all):
     assert not (trial / "export").exists()
 
 
+@pytest.mark.parametrize("name", ["csv", "parquet"])
+def test_a_dry_run_names_the_tables_that_are_made(name, trial, heard):
+    """Before and after a first export: what a trial has tells which there are."""
+    export(trial, asked(name), heard.append, task=Task(dry_run=True))
+    planned = names_of(heard, Planned)
+    heard.clear()
+    export(trial, asked(name), heard.append)
+    assert planned == names_of(heard, Made)
+    assert len(planned) > 1
+    heard.clear()
+    export(trial, asked(name), heard.append, task=Task(dry_run=True, force=True))
+    assert names_of(heard, Planned) == planned
+
+
 @pytest.mark.parametrize("name", ["csv", "parquet", "sleap"])
 def test_a_damaged_segment_is_left_out_and_told_each_time(name, trial, heard):
     """The other minutes are exported."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -104,7 +104,13 @@ class _Manifest:
     left_out: tuple[str, ...] = ()
 
 
-def exported(run: Run, place: Place, lineage: Lineage, make: Callable[[], Content]) -> Item:
+def exported(
+    run: Run,
+    place: Place,
+    lineage: Lineage,
+    make: Callable[[], Content],
+    names: Iterable[str] = (),
+) -> Item:
     """Return the files of an export as what a stage makes.
 
     Parameters
@@ -115,6 +121,8 @@ def exported(run: Run, place: Place, lineage: Lineage, make: Callable[[], Conten
         Of all of them.
     make
         Reads the trial and returns what the files are; called only where they are made.
+    names
+        Those of its files that are known before, for a dry run.
     """
     known = _read(place.sidecar).files
     outputs = [_output(place, lineage, name, digest) for name, digest in known.items()]
@@ -122,6 +130,7 @@ def exported(run: Run, place: Place, lineage: Lineage, make: Callable[[], Conten
         outputs=[*outputs, Output(path=place.sidecar, lineage=lineage)],
         compute=lambda: _drafts(run, place, lineage, make),
         finish=lambda: _tell(place, run.tell),
+        expected=[place.where / name for name in names],
     )
 
 

@@ -49,7 +49,8 @@ def tables_item(run: Run, name: str, options: ExportOptions) -> Item:
     lineage = run.lineage(SCHEMA, inputs, options={"format": name})
     place = Place(root=run.root, name=name, folder=options.folder, reads="tracks.csv")
     wanted = [table for table, paths in files.items() if set(paths) & set(inputs)]
-    return exported(run, place, lineage, lambda: _content(run.root, name, wanted))
+    names = [f"{table}.{name}" for table in wanted]
+    return exported(run, place, lineage, lambda: _content(run.root, name, wanted), names)
 
 
 def _content(root: Path, name: str, wanted: list[str]) -> Content:
