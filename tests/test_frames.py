@@ -81,10 +81,13 @@ def test_who_follows_the_robot_is_a_row_for_each_measure_and_lag(trial):
 
 
 def test_counts_are_whole_numbers_where_a_bin_is_not_defined(trial):
-    """Occupation has no bins: the bin of these is missing, not NaN as a number."""
+    """Occupation has no bins: the bin of these is missing, not NaN as a number.
+
+    A bin is as wide as in the file.
+    """
     found = trial.stats()
     assert (found["count"] >= 0).all()
-    assert str(found["bin"].dtype) == "Int64"
+    assert str(found["bin"].dtype) == "Int32"
     assert found[found["feature"] == "O"]["bin"].isna().all()
 
 
@@ -103,6 +106,24 @@ def test_parameters_are_those_of_the_model_files(trial):
     start = found[found["window_end_s"] == 0]
     assert start["low"].isna().all()
     assert start["identified"].isna().all()
+
+
+def test_columns_have_their_types_where_they_are_empty(trial, tmp_path):
+    """A starting model has no intervals and no rule, findings of no effect no row."""
+    shutil.copytree(trial.root, tmp_path / "new", ignore=shutil.ignore_patterns("000*0.toml"))
+    shutil.copy(trial.root / "models" / "000000.toml", tmp_path / "new" / "models")
+    alone = zfcal.open(tmp_path / "new").parameters()
+    assert alone[["low", "high", "identified", "intervals_by", "rule"]].isna().all(axis=None)
+    assert alone.dtypes.to_dict() == trial.parameters().dtypes.to_dict()
+    types = [str(each) for each in alone.dtypes]
+    assert types == ["int64", "str", *["float64"] * 3, "boolean", "str", "str"]
+
+    place = tmp_path / "findings.json"
+    place.write_text(json.dumps(findings_of([])))
+    none = trial.findings(place)
+    assert len(none) == 0
+    types = [str(each) for each in none.dtypes]
+    assert types == ["int64", "str", "str", *["float64"] * 5, "str"]
 
 
 def test_forward_scores_are_those_of_the_newest_record(trial):

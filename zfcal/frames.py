@@ -33,27 +33,29 @@ Damage: TypeAlias = Callable[[DamagedError | SchemaError], None]
 TABLES = ("tracks", "stats", "following", "scores", "rules", "parameters", "findings")
 """The tables of a trial: the methods of `TrialTables` that return one."""
 
-_PARAMETERS = (
-    "window_end_s",
-    "parameter",
-    "value",
-    "low",
-    "high",
-    "identified",
-    "intervals_by",
-    "rule",
-)
-_FINDINGS = (
-    "rank",
-    "effect",
-    "parameter",
-    "value",
-    "low",
-    "high",
-    "gain_nats_per_step",
-    "p",
-    "ties",
-)
+_PARAMETERS = {
+    "window_end_s": "int64",
+    "parameter": "str",
+    "value": "float64",
+    "low": "float64",
+    "high": "float64",
+    "identified": "boolean",
+    "intervals_by": "str",
+    "rule": "str",
+}
+"""Columns and their types, also where a column is empty."""
+
+_FINDINGS = {
+    "rank": "int64",
+    "effect": "str",
+    "parameter": "str",
+    "value": "float64",
+    "low": "float64",
+    "high": "float64",
+    "gain_nats_per_step": "float64",
+    "p": "float64",
+    "ties": "str",
+}
 
 
 @final
@@ -254,9 +256,7 @@ class TrialTables:
         ]
         if not rows:
             raise _nothing(self.root / "models", f"First: zfcal calibrate {self.root}")
-        return pd.DataFrame(rows, columns=list(_PARAMETERS)).astype(
-            {"identified": "boolean", "window_end_s": "int64"}
-        )
+        return pd.DataFrame(rows, columns=list(_PARAMETERS)).astype(_PARAMETERS)
 
     def findings(self, path: str | Path | None = None) -> pd.DataFrame:
         """Return the effects that a diagnosis names; without any the table is empty.
@@ -287,7 +287,7 @@ class TrialTables:
         found = read_json(place)
         check(found, "findings", place)
         rows = [row for rank, each in enumerate(found["effects"], 1) for row in _found(rank, each)]
-        table = pd.DataFrame(rows, columns=list(_FINDINGS))
+        table = pd.DataFrame(rows, columns=list(_FINDINGS)).astype(_FINDINGS)
         table.attrs = {"verdict": found["verdict"], "gap": found.get("gap") or []}
         return table
 
@@ -328,8 +328,9 @@ def _as_frame(tables: list[pa.Table]) -> pd.DataFrame:
     frame: pd.DataFrame = table.to_pandas()
     for name, column in zip(table.column_names, table.columns, strict=True):
         if pa.types.is_integer(column.type) and column.null_count:
-            # Where null means "not defined" a whole number stays one.
-            frame[name] = column.to_pandas(integer_object_nulls=True).astype("Int64")
+            # Where null means "not defined" a whole number stays one, as wide as in the file.
+            width = str(column.type).capitalize()
+            frame[name] = column.to_pandas(integer_object_nulls=True).astype(width)
     return frame
 
 

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from mcap.writer import Writer
 
@@ -138,6 +139,23 @@ def test_tables_have_all_that_the_trial_has(trial, heard):
     assert read_lineage(folder / "parquet" / "stats.parquet").inputs.keys() >= {
         "stats/000120.parquet"
     }
+
+
+def test_columns_of_parquet_have_their_types_whatever_they_hold(trial):
+    """Nothing calibrated it: no intervals, no rule. Whole numbers are as wide as in the trial."""
+    analyse(trial, AnalyseOptions(), say_nothing)
+    export(trial, asked("parquet"), say_nothing)
+    folder = trial / "export" / "parquet"
+    types = {
+        name: dict(zip(found.names, map(str, found.types), strict=True))
+        for name in ("parameters", "stats", "scores")
+        for found in [pq.read_schema(folder / f"{name}.parquet")]
+    }
+    assert "null" not in {each for table in types.values() for each in table.values()}
+    assert types["parameters"]["low"] == types["parameters"]["high"] == "double"
+    assert types["parameters"]["rule"] == types["parameters"]["parameter"]
+    assert types["parameters"]["intervals_by"] == types["parameters"]["parameter"]
+    assert types["stats"]["bin"] == "int32"
 
 
 def test_a_table_for_others_is_no_damaged_one(trial):
