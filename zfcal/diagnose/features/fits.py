@@ -259,9 +259,7 @@ class Fits:
     def _at_null(self) -> Null:
         """The mixture at the null's maximum."""
         columns, _ = self._own
-        at, over = (
-            np.concatenate([column[side] for column in columns], axis=1) for side in (0, 1)
-        )
+        at, over = (np.concatenate([column[side] for column in columns], axis=1) for side in (0, 1))
         x, n = self._null.x, at.shape[1]
         (base_at, base_over), least = self.law.base, _OWN * self.law.own[1]
         return Null(

@@ -211,13 +211,13 @@ class Law:
         return [each / mean / len(made) for each in made]
 
     def mean(self, parts: list[Columns]) -> Columns:
-        """Return the average of columns over the draws."""
-        if len(parts) == 1:
+        """Return the average of columns over the draws, or over the first ones."""
+        if len(self.draws) == 1:
             return parts[0]
         at, over = (np.zeros(each.shape) for each in parts[0])
-        for weight, own in zip(self._weights, parts, strict=True):
-            at += weight[:, None] * own[0]
-            over += weight[:, None] * own[1]
+        for weight, own in zip(self._weights, parts, strict=False):
+            at += len(self.draws) / len(parts) * weight[:, None] * own[0]
+            over += len(self.draws) / len(parts) * weight[:, None] * own[1]
         return at, over
 
     def bells(self, toward: Floats, kappa: Floats | float) -> Columns:
@@ -245,7 +245,7 @@ class Law:
             taken = attention if feature.instead is True else feature.instead(draw.seen)
             return less(made, weighed(present, taken))
 
-        return of(self.draws[0]) if first else self.mean([of(draw) for draw in self.draws])
+        return self.mean([of(draw) for draw in (self.draws[:1] if first else self.draws)])
 
     def _bells_of(self, feature: Component, draw: Draw) -> Columns:
         if not isinstance(feature.toward, str):
