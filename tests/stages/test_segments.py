@@ -12,7 +12,7 @@ from zfcal.behaviour.located import join
 from zfcal.behaviour.statistics import measure
 from zfcal.errors import InputError
 from zfcal.stages import segments as module
-from zfcal.stages.segments import Segments, guess_options, segment_hashes
+from zfcal.stages.segments import END_KEY, Segments, covered, guess_options, segment_hashes
 from zfcal.tracks import FISH
 
 STARTS = [0, 60, 120, 180]
@@ -118,3 +118,26 @@ def test_a_lineage_states_how_guesses_count_where_there_are_some(make_trial):
 
     assert guess_options([paths[0], paths[2]]) == {}
     assert guess_options(paths) == {"guesses": "seen"}
+
+
+def test_tracks_cover_what_lies_between_their_first_and_last_row(make_trial):
+    """A part begins with its first row, ends with its last, and a missing minute parts it."""
+    root = make_trial(seconds=230)
+    first = segment_path(root, 0)
+    rows = read_tracks(first)
+    write_tracks(first, rows.take(rows.time_s >= 35.4), read_lineage(first))
+    assert covered(root, (0, 240), fps=5.0) == [(35, 230)]
+    assert covered(root, (50, 200), fps=5.0) == [(50, 200)]
+    segment_path(root, 120).unlink()
+    assert covered(root, (0, 240), fps=5.0) == [(35, 120), (180, 230)]
+    assert covered(root, (100, 200), fps=5.0) == [(100, 120), (180, 200)]
+    assert covered(root, (120, 180), fps=5.0) == covered(root, (230, 900), fps=5.0) == []
+
+
+def test_tracks_cover_what_was_recorded_with_nobody_in_sight(make_trial):
+    """The last segment states that the recording went on to 228.5 s, or that it did not."""
+    root = make_trial(seconds=220)
+    last = segment_path(root, 180)
+    for end_s, covered_s in ((228.5, 229), (210.0000001, 210)):
+        write_tracks(last, read_tracks(last), read_lineage(last), extra={END_KEY: end_s})
+        assert covered(root, (0, 240), fps=5.0) == [(0, covered_s)]

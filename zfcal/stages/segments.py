@@ -6,6 +6,7 @@ located is remembered, by the content of the file.
 
 from __future__ import annotations
 
+import math
 import os
 from collections import OrderedDict
 from collections.abc import Iterable
@@ -32,6 +33,9 @@ from zfcal.units import SEGMENT_S
 STEP_S = int(SEGMENT_S)
 END_KEY = "end_s"
 """Extra metadata of a segment: the second up to which the recording filled it."""
+
+_ROUNDING_S = 1e-6
+"""Times are sums and quotients of floating-point numbers: 150 s may be a hair more."""
 
 _REMEMBERED = 200_000
 """Points kept in memory, some 12 MB: two hours of five agents at 5 Hz."""
@@ -216,12 +220,54 @@ def is_whole(root: Path, start_s: int, *, fps: float) -> bool:
     its last row lies within two frames of the end. A damaged one counts as whole:
     whoever reads it says what is wrong.
     """
-    path = segment_path(root, start_s)
     try:
-        end_s = read_extra(path).get(END_KEY)
-        if not isinstance(end_s, int | float):
-            time_s = read_tracks(path).time_s
-            end_s = time_s[-1] + 2 / fps if len(time_s) else start_s
+        end_s = _end_of(root, start_s, past_last_s=2 / fps)
     except (DamagedError, InputError):
         return True
     return bool(end_s >= start_s + SEGMENT_S - 0.5 / fps)
+
+
+def _end_of(root: Path, start_s: int, *, past_last_s: float) -> float:
+    """Return where the recording of a segment ends: as it states, or a while past its last row."""
+    path = segment_path(root, start_s)
+    end_s = read_extra(path).get(END_KEY)
+    if isinstance(end_s, int | float):
+        return float(end_s)
+    time_s = read_tracks(path).time_s
+    return float(time_s[-1]) + past_last_s if len(time_s) else float(start_s)
+
+
+def covered(root: Path, span_s: tuple[int, int], *, fps: float) -> list[tuple[int, int]]:
+    """Return the parts of a stretch of time that tracks cover, in order, in whole seconds.
+
+    Parts begin with the first row after a missing segment, and end where the recording does.
+    A second that is covered in part counts.
+
+    Parameters
+    ----------
+    root
+        The trial's directory.
+    span_s
+        From and to, in seconds since trial start.
+    fps
+        Frame rate of the tracks, in hertz.
+
+    Raises
+    ------
+    InputError, DamagedError
+        A segment at which a part begins or ends cannot be read.
+    """
+    starts = segment_starts(root)
+    known = set(starts)
+    firsts = [start for start in starts if start - STEP_S not in known]
+    lasts = [start for start in starts if start + STEP_S not in known]
+    found = []
+    for first, last in zip(firsts, lasts, strict=True):
+        if first < span_s[1] and span_s[0] < last + STEP_S:
+            time_s = read_tracks(segment_path(root, first)).time_s
+            begin_s = float(time_s[0]) if len(time_s) else float(first)
+            end_s = _end_of(root, last, past_last_s=1 / fps)
+            low = max(span_s[0], math.floor(begin_s + _ROUNDING_S))
+            high = min(span_s[1], math.ceil(end_s - _ROUNDING_S))
+            found += [(low, high)] if low < high else []
+    return found

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.models import read_model, read_result
 from zfcal.behaviour.located import locate
 from zfcal.behaviour.statistics import measure
@@ -17,6 +18,7 @@ from zfcal.stages.calibrate.holdout import (
     calibrate_span,
     evaluate_model,
     pooled_fish,
+    tracked_in,
 )
 from zfcal.stages.events import Made, Note, UpToDate, say_nothing
 from zfcal.stages.segments import Segments
@@ -124,3 +126,58 @@ def test_a_stretch_without_tracks_is_refused(tmp_path, make_trial, quick, heard)
     """The trial ends at 240 s."""
     with pytest.raises(InputError, match="no tracks from 600 s"):
         calibrate_span(make_trial(), span_of(tmp_path, train=(600, 900)), quick, heard.append)
+
+
+def made_by(span, root, quick):
+    """Return what a calibration says, and the model's result and lineage, fresh from its file."""
+    heard = []
+    calibrate_span(root, span, quick, heard.append)
+    said = [event.text for event in heard if isinstance(event, Note)]
+    return said, read_result(span.output), read_lineage(span.output).options
+
+
+def test_a_window_is_cut_to_its_tracks(tmp_path, make_trial, quick):
+    """The trial ends at 150 s: of a window to 600 s comes, by the byte, the model of 0:150."""
+    root = make_trial(seconds=150)
+    said, _, options = made_by(span_of(tmp_path, (0, 150), None), root, quick)
+    whole = (tmp_path / "first.toml").read_bytes()
+    assert [text.split(":")[0] for text in said] == ["Window 0"]
+    assert (options["window"], options["window_s"]) == ("0:150", 150.0)
+    (tmp_path / "first.toml").unlink()
+    said, _, _ = made_by(span_of(tmp_path, (0, 600), None), root, quick)
+    assert said[0].startswith("Window 0:600 s: there are tracks from 0 s to 150 s alone")
+    assert said[1].startswith("Window 0:150 s: S ")
+    assert (tmp_path / "first.toml").read_bytes() == whole
+    assert made_by(span_of(tmp_path, (0, 150), None), root, quick)[0] == []
+
+
+def test_a_held_out_stretch_is_cut_to_its_tracks(tmp_path, make_trial, quick):
+    """What is judged to 600 s is what is judged to 150 s, where the trial ends."""
+    root = make_trial(seconds=150)
+    _, whole, _ = made_by(span_of(tmp_path, (0, 60), (60, 150)), root, quick)
+    (tmp_path / "first.toml").unlink()
+    said, cut, options = made_by(span_of(tmp_path, (0, 60), (60, 600)), root, quick)
+    assert said[0].startswith("Held-out 60:600 s: there are tracks from 60 s to 150 s alone")
+    assert cut["held_out"] == whole["held_out"]
+    assert options["held_out"] == "60:150"
+
+
+def test_a_ceiling_is_of_as_many_seconds_as_were_tracked(tmp_path, make_trial, quick):
+    """Without the second minute, 0:150 has 90 s of tracks, and says so."""
+    root = make_trial(seconds=150)
+    (root / "tracks" / "000060.parquet").unlink()
+    said, _, options = made_by(span_of(tmp_path, (0, 150), None), root, quick)
+    assert said[0] == "Window 0:150 s: 60 s in between have no tracks; 90 s count."
+    assert (options["window"], options["window_s"]) == ("0:150", 90.0)
+    assert tracked_in(open_trial(root), (0, 150)).seconds == 90.0
+
+
+def test_a_model_that_stated_another_length_of_its_window_stays(tmp_path, make_trial, quick):
+    """Models of old state 120 s, whatever their window; where tracks cover it they are right."""
+    root = make_trial(seconds=150)
+    span = span_of(tmp_path, (0, 150), None)
+    made_by(span, root, quick)
+    text = span.output.read_text()
+    assert "window_s = 150.0" in text
+    span.output.write_text(text.replace("window_s = 150.0", "window_s = 120.0"))
+    assert made_by(span, root, quick)[0] == []

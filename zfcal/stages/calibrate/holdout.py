@@ -41,7 +41,7 @@ from zfcal.stages.calibrate.searching import (
 from zfcal.stages.calibrate.telling import stretch_note
 from zfcal.stages.events import Event, Note, Result, Tell
 from zfcal.stages.making import run
-from zfcal.stages.segments import STEP_S, Segments, guess_options
+from zfcal.stages.segments import STEP_S, Segments, covered, guess_options
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
@@ -70,6 +70,51 @@ class Span:
                 f"The window {_text(self.train_s)} and the held-out {_text(held_out)} overlap.",
                 hint="What is held out must not be learnt from.",
             )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracked:
+    """What there are tracks of in a stretch that was asked for.
+
+    Parameters
+    ----------
+    asked_s
+        From and to of the stretch, in seconds since trial start.
+    parts_s
+        From and to of each part of it that tracks cover, in order; at least one.
+    """
+
+    asked_s: tuple[int, int]
+    parts_s: tuple[tuple[int, int], ...]
+
+    @property
+    def span_s(self) -> tuple[int, int]:
+        """From the first to the last second that is covered."""
+        return self.parts_s[0][0], self.parts_s[-1][1]
+
+    @property
+    def seconds(self) -> float:
+        """How long the parts are together: a ceiling is that of so long a window."""
+        return float(sum(end_s - start_s for start_s, end_s in self.parts_s))
+
+    @property
+    def goes_without_saying(self) -> tuple[str, ...]:
+        """Options of a lineage that the window states already; models of old state another."""
+        start_s, end_s = self.span_s
+        return ("window_s",) if self.seconds == end_s - start_s else ()
+
+    def notes(self, name: str) -> list[Note]:
+        """Return what to say where tracks do not cover all that was asked for."""
+        said = []
+        if self.span_s != self.asked_s:
+            start_s, end_s = self.span_s
+            text = f"there are tracks from {start_s} s to {end_s} s alone, and only these count."
+            said.append(f"{name} {_text(self.asked_s)} s: {text}")
+        without_s = self.span_s[1] - self.span_s[0] - self.seconds
+        if without_s > 0:
+            text = f"{without_s:g} s in between have no tracks; {self.seconds:g} s count."
+            said.append(f"{name} {_text(self.span_s)} s: {text}")
+        return [Note(text=text, warning=True) for text in said]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,15 +182,16 @@ def evaluate_model(
     parameters
         The model, which is taken as it is, measured speeds included.
     span_s
-        From and to, in seconds since trial start.
+        From and to, in seconds since trial start; what tracks cover of it counts.
     seed
         Of the simulations: 10 x 1800 s for the score, and 200 windows as long as
-        the stretch for the ceiling.
+        the tracks of the stretch for the ceiling.
     segments
         What was read before.
     """
     opened = (segments := segments or Segments()).open(root)
     control, _ = pooled_fish(opened, segments, span_s)
+    tracked = tracked_in(opened, span_s)
     group = FixedModel(
         arena=opened.arena,
         template=parameters,
@@ -153,11 +199,11 @@ def evaluate_model(
         n_fish=opened.trial.n_fish,
         n_workers=CalibrateOptions().workers,
     )
-    settings = Settings(window_s=float(span_s[1] - span_s[0]))
+    settings = Settings(window_s=tracked.seconds)
     task = RoundTask(
         group=group,
         control=control,
-        seeds=SeedSource(trial_seed=seed, window_end_s=span_s[1]),
+        seeds=SeedSource(trial_seed=seed, window_end_s=tracked.span_s[1]),
     )
     confirmed, ceiling = judge(task, settings, to_genes(parameters)[None, :])
     return Evaluation(scores=confirmed.scores, ceiling=ceiling)
@@ -180,10 +226,7 @@ def pooled_fish(
     start_s, end_s = span_s
     starts = [s for s in segment_starts(opened.trial.root) if start_s - STEP_S < s < end_s]
     if not starts:
-        raise InputError(
-            f"{opened.trial.root}: has no tracks from {start_s} s to {end_s} s.",
-            hint=f"Import them first: zfcal import SRC {opened.trial.root}",
-        )
+        raise _no_tracks(opened, span_s)
     points = join([segments.read(opened, start) for start in starts]).between(start_s, end_s)
     statistics = measure(points.of_kind(FISH), opened.arena, further=further)
     if not statistics.occupation.sum():
@@ -191,6 +234,30 @@ def pooled_fish(
             f"{opened.trial.root}: no fish was seen inside the arena from {start_s} s to {end_s} s."
         )
     return statistics, starts
+
+
+def tracked_in(opened: OpenTrial, span_s: tuple[int, int]) -> Tracked:
+    """Return what there are tracks of in a stretch of a trial.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    DamagedError
+        A segment is damaged.
+    """
+    parts = covered(opened.trial.root, span_s, fps=opened.trial.fps)
+    if not parts:
+        raise _no_tracks(opened, span_s)
+    return Tracked(asked_s=span_s, parts_s=tuple(parts))
+
+
+def _no_tracks(opened: OpenTrial, span_s: tuple[int, int]) -> InputError:
+    root = opened.trial.root
+    return InputError(
+        f"{root}: has no tracks from {span_s[0]} s to {span_s[1]} s.",
+        hint=f"Import them first: zfcal import SRC {root}",
+    )
 
 
 def calibrate_span(
@@ -228,10 +295,12 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
     control, starts = pooled_fish(opened, segments, span.train_s, names)
     if span.held_out_s:
         starts = sorted({*starts, *pooled_fish(opened, segments, span.held_out_s)[1]})
+    tracked, span = _cut(opened, span, run.tell)
+    options = replace(options, settings=replace(options.settings, window_s=tracked.seconds))
     output = Output(
         path=span.output,
         lineage=_lineage(run, opened, options, span, starts),
-        ignore=options.not_asked,
+        ignore=(*options.not_asked, *tracked.goes_without_saying),
     )
     seed = options.seed_of(opened.trial)
 
@@ -247,9 +316,7 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
             guests=None if estimated is None else estimated.genes,
             seeds=SeedSource(trial_seed=seed, window_end_s=span.train_s[1]),
         )
-        window_s = float(span.train_s[1] - span.train_s[0])
-        settings = replace(options.settings, window_s=window_s)
-        asked = replace(options, settings=settings).left_since(began_s)
+        asked = options.left_since(began_s)
         checkpoint = output.path.with_name(f".{output.path.name}.checkpoint")
         key = checkpoint_key(output.lineage)
         result = run_search(round_task, asked, checkpoint, run.tell, key=key)
@@ -271,6 +338,18 @@ def _model(run: Run, span: Span, options: CalibrateOptions) -> Item:
         discard(checkpoint)
 
     return Item(outputs=[output], compute=compute)
+
+
+def _cut(opened: OpenTrial, span: Span, tell: Tell) -> tuple[Tracked, Span]:
+    """Return what there are tracks of in the window, and the span cut to that, which is told."""
+    tracked = tracked_in(opened, span.train_s)
+    said, held_out_s = tracked.notes("Window"), None
+    if span.held_out_s:
+        judged_on = tracked_in(opened, span.held_out_s)
+        said, held_out_s = said + judged_on.notes("Held-out"), judged_on.span_s
+    for note in said:
+        tell(note)
+    return tracked, replace(span, train_s=tracked.span_s, held_out_s=held_out_s)
 
 
 def _lineage(
