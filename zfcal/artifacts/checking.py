@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from zfcal.arena import Arena
+from zfcal.artifacts.agreement import disagreements
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.atomic import is_orphan, is_part
 from zfcal.artifacts.cameras import read_camera_file
@@ -131,6 +132,8 @@ def _settings(root: Path, now_s: float) -> tuple[_Place, list[Finding]]:
     except ZfcalError as error:
         where = CONFIG_NAME if trial is None else trial.arena
         findings.append(_mistake(where, root, error))
+    if trial is not None:
+        findings += [_mistake(CONFIG_NAME, root, problem) for problem in disagreements(trial)]
     if trial is not None and not (root / trial.model).is_file():
         findings.append(
             Finding(

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from zfcal.arena import Arena
+from zfcal.artifacts.agreement import check_agreement
 from zfcal.artifacts.arenas import load_arena
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import Lineage, read_lineage
@@ -143,9 +144,11 @@ def gather(
     Raises
     ------
     InputError
-        It is no trial, or its settings or arena are wrong.
+        It is no trial, its settings or arena are wrong, or its tracks are of other agents than it
+        states.
     """
     trial = read_trial(root)
+    check_agreement(trial)
     arena = load_arena(trial.arena, root)
     reader = _Reader(trial=trial, arena=arena, on_damage=on_damage)
     courses, scored = _courses(reader)

@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import Generic, TypeVar, final
 
+from zfcal.artifacts.agreement import check_agreement
 from zfcal.artifacts.atomic import check_free
 from zfcal.artifacts.freshness import stale_reason
 from zfcal.artifacts.reading.contents import one_content
@@ -35,6 +36,9 @@ from zfcal.stages.trial_context import Task, at_work, tell_version
 K = TypeVar("K")
 S = TypeVar("S")
 T = TypeVar("T")
+
+_JUDGES = frozenset({"analyse", "calibrate", "diagnose", "extend"})
+"""Commands that score tracks, or hold a model against them: settings must agree with these."""
 
 
 def run(
@@ -61,13 +65,16 @@ def run(
     Raises
     ------
     ZfcalError
-        The trial is wrong, the disk is full, or the same command is at work on it.
+        The trial is wrong or its tracks are of other agents than it states, the disk is full, or
+        the same command is at work on it.
     ChangedError
         Inputs of the only thing changed again and again.
     """
     task = task or Task()
     # First: where there is no trial no lock is to lie.
-    read_trial(root)
+    trial = read_trial(root)
+    if stage.name in _JUDGES:
+        check_agreement(trial)
     started = Run(root=root, command=stage.name, tell=tell, task=task)
     with at_work(root, stage.name, task):
         if isinstance(stage, OneThing):

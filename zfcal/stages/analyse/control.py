@@ -12,6 +12,7 @@ from typing import Self
 import numpy as np
 
 from zfcal.arrays import Ints
+from zfcal.artifacts.agreement import check_agreement
 from zfcal.artifacts.freshness import hash_inputs, relative_to
 from zfcal.artifacts.lineage import JSON
 from zfcal.artifacts.segments import segment_path
@@ -74,7 +75,8 @@ class ControlGroup:
         Raises
         ------
         InputError
-            One has a robot, other zones or bins, another step, or no tracks.
+            One has a robot, other zones or bins, another step, or no tracks, or its tracks are of
+            other agents than it states.
         """
         if not roots:
             return None
@@ -83,6 +85,7 @@ class ControlGroup:
         options: dict[str, JSON] = {}
         for root in roots:
             other = segments.open(root)
+            check_agreement(other.trial)
             _check_comparable(opened, other)
             hashes = segment_hashes(root, whole_segments(other.trial))
             pooled = segments.pool(other, hashes, tell)
