@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .durations import seconds
-from .options import EXISTING, POSITIVE, Command, FiniteRange, adds
+from .options import EXISTING, POSITIVE, SEED, Command, FiniteRange, adds
 
 _PRESENT = (
     "real_time", "no_video", "duration_s", "generations", "publish", "champion", "budget_s",
@@ -67,7 +67,7 @@ _OPTIONS = adds(
         type=EXISTING,
         help="What the fish swim by, effects and all, before they differ and drift.",
     ),
-    click.option("--seed", type=click.IntRange(min=0), help="Of everything.  [default: 1]"),
+    click.option("--seed", type=SEED, help="Of everything.  [default: 1]"),
     click.option(
         "--wariness",
         type=FiniteRange(-3, 5),

@@ -12,6 +12,7 @@ import click
 
 from zfcal.api import values
 from zfcal.errors import OptionError
+from zfcal.trial import LARGEST_SEED
 
 from .output import HAS_VOICE, Output
 
@@ -51,6 +52,7 @@ class _Fours(click.IntRange):
 
 
 POSITIVE = FiniteRange(min=0, min_open=True)
+SEED = click.IntRange(min=0, max=LARGEST_SEED)
 
 
 def checked(take: Callable[[str], Any]) -> Callable[[str], Any]:
@@ -154,8 +156,8 @@ workers_option = click.option(
 
 
 def seed_option(text: str) -> Decorator:
-    """Add --seed, a non-negative whole number."""
-    return click.option("--seed", type=click.IntRange(min=0), default=None, help=text)
+    """Add --seed, a whole number from 0 on that a TOML file can hold."""
+    return click.option("--seed", type=SEED, default=None, help=text)
 
 
 tank_options = adds(

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from zfcal.errors import InputError
-from zfcal.trial import Trial, second_of
+from zfcal.trial import LARGEST_SEED, Trial, second_of
 
 GOOD = {
     "root": Path("trial"),
@@ -127,6 +127,13 @@ def test_a_negative_seed_is_refused():
     """Random numbers derive from whole numbers from 0 on."""
     with pytest.raises(InputError, match="seed must be a whole number from 0 on, got -1"):
         Trial(**GOOD | {"seed": -1})
+
+
+def test_a_seed_that_toml_cannot_hold_is_refused():
+    """Its file could not be read again."""
+    assert Trial(**GOOD | {"seed": 2**63 - 1}).seed == LARGEST_SEED
+    with pytest.raises(InputError, match="at most 9223372036854775807, got 9223372036854775808"):
+        Trial(**GOOD | {"seed": 2**63})
 
 
 def test_settings_do_not_change():

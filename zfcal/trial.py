@@ -16,6 +16,9 @@ FIRST_MODEL = "models/000000.toml"
 LOOP_NAME = "closed-loop.json"
 """What a virtual closed loop was asked for, written when it has ended."""
 
+LARGEST_SEED = 2**63 - 1
+"""TOML holds whole numbers of 64 bits, one of them the sign."""
+
 _DIGITS = 6
 
 NUMBER = "(?:[0-9]{6}|[1-9][0-9]{6,8})"
@@ -71,6 +74,8 @@ class Trial:
             )
         if self.seed < 0:
             raise InputError(f"{where}: seed must be a whole number from 0 on, got {self.seed!r}.")
+        if self.seed > LARGEST_SEED:
+            raise InputError(f"{where}: seed must be at most {LARGEST_SEED}, got {self.seed!r}.")
         frames = self.dt_s * self.fps
         if not (
             math.isfinite(frames) and round(frames) >= 1 and abs(frames - round(frames)) < 1e-3

@@ -32,6 +32,8 @@ VOICE = {"as_json", "verbose", "quiet", "traceback"}
 """How a command speaks; a function has ``tell``."""
 
 MODEL = {"model": "trial/models/000000.toml", "duration": 60}
+SEEDED = [("calibrate", {}), ("diagnose", {}), ("extend", {}), ("simulate", MODEL)]
+TOO_LARGE = "--seed: 9223372036854775808 is above 9223372036854775807"
 
 
 def options_of(command):
@@ -260,6 +262,8 @@ def literals(hint):
         ("calibrate", {"budget": float("nan")}, "no positive time"),
         ("calibrate", {"publish": "best"}, "--publish: 'best' is not one of"),
         ("calibrate", {"workers": 0}, "--workers: 0 is below 1"),
+        *((name, {**more, "seed": 2**63}, TOO_LARGE) for name, more in SEEDED),
+        ("calibrate", {"seed": -1}, "--seed: -1 is below 0"),
         ("calibrate", {"window": (9, 3), "out": "x"}, "no stretch"),
         ("calibrate", {"window": "0:100"}, "needs -o FILE"),
         ("calibrate", {"held_out": (0, 100)}, "--held-out belongs to --window"),

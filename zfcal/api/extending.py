@@ -9,7 +9,18 @@ from typing import Any
 
 from zfcal.api.diagnosing import tell_findings
 from zfcal.api.trials import TrialPath, heard_by, task_of, work_of
-from zfcal.api.values import Names, PathLike, Time, existing, place, seconds, several, taken, whole
+from zfcal.api.values import (
+    Names,
+    PathLike,
+    Time,
+    existing,
+    place,
+    seconds,
+    seed,
+    several,
+    taken,
+    whole,
+)
 from zfcal.calibrate.task import Settings
 from zfcal.errors import OptionError
 from zfcal.report.diagnosis.render_pool import RenderPool
@@ -23,7 +34,7 @@ _FORMS = {
     "findings": existing,
     "generations": whole(0),
     "budget": seconds,
-    "seed": whole(0),
+    "seed": seed,
     "workers": whole(1),
     "out": place,
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from zfcal.api.values import existing, flag, names, one_of, seconds, taken, whole
+from zfcal.api.values import existing, flag, names, one_of, seconds, seed, taken, whole
 from zfcal.behaviour.features.registry import SCORED, further
 from zfcal.calibrate.task import Settings
 from zfcal.errors import OptionError
@@ -27,7 +27,7 @@ _FORMS = {
     "publish": one_of("forward", "score", "likelihood"),
     "confirm": whole(0),
     "diversity": one_of("merged", "population"),
-    "seed": whole(0),
+    "seed": seed,
     "workers": whole(1),
     "seed_likelihood": flag,
     "renewal": flag,

@@ -19,6 +19,7 @@ from zfcal.api.values import (
     one_of,
     place,
     seconds,
+    seed,
     shown,
     taken,
     whole,
@@ -69,7 +70,7 @@ def _change(text: Any) -> tuple[str, Any]:
 
 
 _FORMS: dict[str, Callable[[Any], Any]] = {
-    "seed": whole(0),
+    "seed": seed,
     "arena": _arena,
     "fish": whole(0),
     "robots": whole(0),

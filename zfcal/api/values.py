@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from zfcal.errors import OptionError
 from zfcal.report.options import FORMATS, NARROWEST_MM, WIDEST_MM, WIDTHS_MM
+from zfcal.trial import LARGEST_SEED
 
 T = TypeVar("T")
 
@@ -185,8 +186,8 @@ def existing(value: PathLike) -> Path:
     return found
 
 
-def whole(least: int) -> Callable[[Any], int]:
-    """Return what takes a whole number that is not below a least one."""
+def whole(least: int, most: int | None = None) -> Callable[[Any], int]:
+    """Return what takes a whole number that is not below a least one, nor above a most."""
 
     def taken(value: Any) -> int:
         number = _plain(value)
@@ -194,9 +195,15 @@ def whole(least: int) -> Callable[[Any], int]:
             raise OptionError(f"{shown(value)} is no whole number.")
         if number < least:
             raise OptionError(f"{number} is below {least}.")
+        if most is not None and number > most:
+            raise OptionError(f"{number} is above {most}.")
         return number
 
     return taken
+
+
+seed = whole(0, LARGEST_SEED)
+"""Takes a whole number from 0 on that a TOML file can hold."""
 
 
 def number(*, low: float, is_open: bool = False) -> Callable[[Any], float]:

@@ -1,0 +1,57 @@
+"""Words that no command takes: what they would leave behind could not be used."""
+
+import click
+import pytest
+
+from zfcal_cli.main import COMMANDS, group
+
+
+def every_command():
+    """Return every command, and those of groups, by the words that call them."""
+    context = click.Context(group)
+    found = {}
+    for name in COMMANDS:
+        command = group.get_command(context, name)
+        if isinstance(command, click.Group):
+            found |= {f"{name} {part}": each for part, each in command.commands.items()}
+        else:
+            found[name] = command
+    return found
+
+
+def taking(word):
+    """Return the option of that word of every command that has one, by the command's name."""
+    return {
+        name: parameter
+        for name, command in every_command().items()
+        for parameter in command.params
+        if word in parameter.opts
+    }
+
+
+def refused(parameter, text):
+    """Return what a parameter says of a text that it refuses; empty for one that it takes."""
+    try:
+        parameter.type.convert(text, parameter, None)
+    except click.BadParameter as error:
+        return error.message
+    return ""
+
+
+def test_no_command_takes_a_seed_that_toml_cannot_hold():
+    """Whole numbers of 64 bits with a sign, from 0 on."""
+    found = taking("--seed")
+    assert {"init", "simulate", "demo", "calibrate", "diagnose", "extend", "reproduce"} <= {*found}
+    for name, parameter in found.items():
+        for seed in (-1, 2**63, 2**64, 10**23):
+            assert f"{seed} is not in the range" in refused(parameter, str(seed)), name
+        assert parameter.type.convert(str(2**63 - 1), parameter, None) == 2**63 - 1
+
+
+@pytest.mark.parametrize("seed", [2**63, 2**64])
+def test_a_trial_with_too_large_a_seed_is_not_made(zfcal, tmp_path, seed):
+    """It is wrong usage, and nothing is written."""
+    done = zfcal("init", "new", "--arena", "ring", "--fish", "3", "--seed", seed)
+    assert done.code == 2
+    assert f"'--seed': {seed} is not in the range" in done.err
+    assert list(tmp_path.iterdir()) == []
