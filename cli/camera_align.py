@@ -8,14 +8,18 @@ from typing import Any
 import click
 
 from .camera_options import figure_option, task_of
-from .options import PLACE, makes_artifacts, speaks
+from .options import NAME, PLACE, makes_artifacts, speaks
 from .output import Output
 
 
 @click.command("align")
 @click.argument("trial", type=PLACE)
-@click.option("--overhead", metavar="SRC", help="Images from above; default: the trial's frames/.")
-@click.option("--below", metavar="SRC", help="Images from below; default: the trial's frames/.")
+@click.option(
+    "--overhead", type=NAME, metavar="SRC", help="Images from above; default: the trial's frames/."
+)
+@click.option(
+    "--below", type=NAME, metavar="SRC", help="Images from below; default: the trial's frames/."
+)
 @click.option(
     "--start-s", type=click.FloatRange(min=0), default=0.0, show_default=True, help="From here on."
 )

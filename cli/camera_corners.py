@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .camera_options import aim_of, box, image_options, numbers, place_options
-from .options import makes_artifacts, speaks
+from .options import NAME, makes_artifacts, speaks
 from .output import Output
 
 _NAMES = ("LL", "LR", "UR", "UL")
@@ -20,7 +20,9 @@ def _pixel(name: str, text: str) -> tuple[float, ...]:
 
 @click.command("corners")
 @click.argument("corners", nargs=4, metavar=" ".join(_NAMES))
-@click.option("--arena", metavar="NAME|FILE", help="Whose corners; default: the trial's arena.")
+@click.option(
+    "--arena", type=NAME, metavar="NAME|FILE", help="Whose corners; default: the trial's arena."
+)
 @click.option("--bounds-m", callback=box, metavar="X0,Y0,X1,Y1", help="Instead of an arena.")
 @image_options
 @place_options

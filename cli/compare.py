@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from .options import PLACE, makes_artifacts, speaks
+from .options import NAME, PLACE, makes_artifacts, speaks
 from .output import Output
 from .streams import roots_of
 
@@ -36,8 +36,10 @@ def _is_option(word: str) -> bool:
 
 
 @click.command("compare", cls=_TwoSets)
-@click.argument("trials", nargs=-1, required=True, metavar="A...")
-@click.option(_AGAINST, multiple=True, required=True, metavar="B...", help="The trials of set B.")
+@click.argument("trials", nargs=-1, required=True, metavar="A...", type=NAME)
+@click.option(
+    _AGAINST, multiple=True, required=True, type=NAME, metavar="B...", help="The trials of set B."
+)
 @click.option("-o", "--out", type=PLACE, help="Folder for compare.json and a picture.")
 @click.option("--format", type=click.Choice(["png", "svg"]), help="Of the picture.  [png]")
 @makes_artifacts

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .durations import seconds
-from .options import EXISTING, PLACE, FiniteRange, speaks
+from .options import EXISTING, NAME, PLACE, FiniteRange, speaks
 from .output import Output
 
 _LETTERS = tuple("ABCDEFGHIJ")
@@ -27,7 +27,9 @@ _DRIVING = {
 
 @click.command("drive")
 @click.argument("trial", type=PLACE, required=False)
-@click.option("--port", metavar="DEV|virtual", help="Serial port of the robot, or a virtual one.")
+@click.option(
+    "--port", type=NAME, metavar="DEV|virtual", help="Serial port of the robot, or a virtual one."
+)
 @click.option("--model", type=EXISTING, help="This model drives, whatever others the trial gets.")
 @click.option(
     "--pattern",

@@ -24,7 +24,7 @@ from typing import NoReturn
 import click
 from click.shell_completion import get_completion_class
 
-from .options import laid_out
+from .options import PathName, laid_out
 from .output import (
     EXIT_INTERRUPTED,
     HAS_VOICE,
@@ -200,7 +200,7 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
 @click.option(
     "--man",
     metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=PathName(file_okay=False, path_type=Path),
     expose_value=False,
     is_eager=True,
     callback=_write_manual,

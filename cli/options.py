@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,39 @@ from .output import HAS_VOICE, Output
 
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
+_EMPTY = "The name is empty: is a variable of the shell not set?"
 
-EXISTING = click.Path(exists=True, path_type=Path)
-PLACE = click.Path(path_type=Path)
+
+class PathName(click.Path):
+    """A path by its name; the current folder is ``.`` and not a name that is empty."""
+
+    def convert(
+        self,
+        value: str | os.PathLike[str],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:
+        """Return the path."""
+        if not os.fspath(value):
+            self.fail(_EMPTY, param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Name(click.ParamType):
+    """A text that names something, such as a trial, a file or a device."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the text."""
+        if not value:
+            self.fail(_EMPTY, param, ctx)
+        return str(value)
+
+
+EXISTING = PathName(exists=True, path_type=Path)
+PLACE = PathName(path_type=Path)
+NAME = Name()
 
 
 class FiniteRange(click.FloatRange):
@@ -142,7 +173,7 @@ makes_artifacts = adds(
     click.option("--force", is_flag=True, help="Make it again, even if it is up to date."),
 )
 
-takes_trials = click.argument("trials", nargs=-1, required=True, metavar="TRIAL...")
+takes_trials = click.argument("trials", nargs=-1, required=True, metavar="TRIAL...", type=NAME)
 """Trials, or - for paths of artifacts on standard input."""
 
 
@@ -163,6 +194,7 @@ def seed_option(text: str) -> Decorator:
 tank_options = adds(
     click.option(
         "--arena",
+        type=NAME,
         metavar="NAME|FILE",
         help="An arena by name, or a GeoJSON file in metres.",
     ),
@@ -182,7 +214,10 @@ arena_options = adds(
 
 new_trial_options = adds(
     click.option(
-        "--arena", metavar="NAME|FILE", help="Arena of a new trial; default: the model's."
+        "--arena",
+        type=NAME,
+        metavar="NAME|FILE",
+        help="Arena of a new trial; default: the model's.",
     ),
     click.option("--fish", type=click.IntRange(min=0), help="Its fish."),
     click.option("--robot", is_flag=True, help="One robot; the same as --robots 1."),

@@ -8,7 +8,7 @@ import click
 
 from .camera_options import SIDES
 from .durations import seconds
-from .options import EXISTING, PLACE, adds
+from .options import EXISTING, NAME, PLACE, adds
 
 if TYPE_CHECKING:
     from zfcal.stages.track.plan import TrackOptions
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 METHODS = ("shi-tomasi", "silhouette")
 
 tracking_options = adds(
-    click.option("--overhead", metavar="SRC", help="The camera that sees the fish."),
-    click.option("--below", metavar="SRC", help="The camera that sees the robot's LEDs."),
+    click.option("--overhead", type=NAME, metavar="SRC", help="The camera that sees the fish."),
+    click.option(
+        "--below", type=NAME, metavar="SRC", help="The camera that sees the robot's LEDs."
+    ),
     click.option("--camera", type=EXISTING, help="Calibration of the camera overhead."),
     click.option("--below-camera", type=EXISTING, help="Calibration of the camera below."),
     click.option(

@@ -264,6 +264,8 @@ def literals(hint):
         ("calibrate", {"workers": 0}, "--workers: 0 is below 1"),
         *((name, {**more, "seed": 2**63}, TOO_LARGE) for name, more in SEEDED),
         ("calibrate", {"seed": -1}, "--seed: -1 is below 0"),
+        ("calibrate", {"window": "0:100", "out": ""}, "--out: The name of a path is empty"),
+        ("analyse", {"control": ""}, "--control: The name of a path is empty"),
         ("calibrate", {"window": (9, 3), "out": "x"}, "no stretch"),
         ("calibrate", {"window": "0:100"}, "needs -o FILE"),
         ("calibrate", {"held_out": (0, 100)}, "--held-out belongs to --window"),
@@ -290,6 +292,18 @@ def test_an_option_that_cannot_be_is_refused_by_its_name(name, options, says, he
     with pytest.raises(OptionError, match=r".") as caught:
         getattr(zfcal, name)("trial", **options)
     assert says in str(caught.value)
+    assert read_all(here) == before
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_an_empty_name_is_no_trial(name, here, read_all, monkeypatch):
+    """The current folder is ``.``, and is left alone."""
+    monkeypatch.chdir(here / "trial")
+    before = read_all(here)
+    model = {**MODEL, "model": here / MODEL["model"]}
+    options = {"simulate": model, "compare": {"against": here / "alone"}}.get(name, {})
+    with pytest.raises(OptionError, match="The name of a path is empty"):
+        getattr(zfcal, name)("", **options)
     assert read_all(here) == before
 
 

@@ -4,6 +4,7 @@ import click
 import pytest
 
 from zfcal_cli.main import COMMANDS, group
+from zfcal_cli.options import Name
 
 
 def every_command():
@@ -27,6 +28,22 @@ def taking(word):
         for parameter in command.params
         if word in parameter.opts
     }
+
+
+NO_PLACES = {
+    *("--at", "--board", "--bounds-m", "--cluster", "--corners", "--draw", "--effect"),
+    *("--keypoint", "--publish", "--publish-zones", "--size", "--source", "--stages", "corners"),
+}
+"""What takes a text that names no trial, file or device."""
+
+
+def parameters():
+    """Return all arguments and options as (command, its word, parameter)."""
+    return [
+        (name, parameter.opts[-1], parameter)
+        for name, command in every_command().items()
+        for parameter in command.params
+    ]
 
 
 def refused(parameter, text):
@@ -55,3 +72,36 @@ def test_a_trial_with_too_large_a_seed_is_not_made(zfcal, tmp_path, seed):
     assert done.code == 2
     assert f"'--seed': {seed} is not in the range" in done.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_whatever_names_a_place_refuses_an_empty_name():
+    """An unset variable of the shell is no trial, no file and not the current folder."""
+    for name, word, parameter in parameters():
+        if isinstance(parameter.type, click.Path | Name):
+            assert "The name is empty" in refused(parameter, ""), f"{name} {word}"
+        else:
+            assert parameter.type is not click.STRING or word in NO_PLACES, f"{name} {word}"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("init", "", "--arena", "ring", "--fish", "3"),
+        ("init", "new", "--arena", "", "--fish", "3"),
+        ("analyse", ""),
+        ("analyse", "trial", ""),
+        ("check", ""),
+        ("compare", "trial", "--against", ""),
+        ("demo", "", "--dry-run"),
+        ("watch", "", "--dry-run"),
+        ("--man", ""),
+    ],
+)
+def test_an_empty_name_is_wrong_usage(zfcal, tmp_path, words):
+    """Where a trial lies as well: nothing is made in it, and nothing is done to it."""
+    zfcal("init", ".", "--arena", "ring", "--fish", "3")
+    before = sorted(tmp_path.rglob("*"))
+    done = zfcal(*words)
+    assert done.code == 2
+    assert "The name is empty: is a variable of the shell not set?" in done.err
+    assert sorted(tmp_path.rglob("*")) == before

@@ -169,6 +169,8 @@ def place(value: PathLike) -> Path:
     found = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(found, str):
         raise OptionError(f"{shown(value)} is no path.")
+    if not found:
+        raise OptionError("The name of a path is empty; the current folder is '.'.")
     return Path(value)
 
 
