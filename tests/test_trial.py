@@ -123,6 +123,14 @@ def test_a_robot_alone_is_a_trial():
     assert Trial(**GOOD | {"n_fish": 0}).n_agents == 1
 
 
+@pytest.mark.parametrize(("fps", "dt_s"), [(15.0, 2.2), (5.0, 400.0), (0.4, 2.5)])
+def test_a_step_of_more_than_two_seconds_is_refused(fps, dt_s):
+    """No lag at which fish could follow a robot is left then."""
+    assert Trial(**GOOD | {"fps": 5.0, "dt_s": 2.0}).dt_s == 2.0
+    with pytest.raises(InputError, match=f"dt_s must be at most 2 s, got {dt_s} s"):
+        Trial(**GOOD | {"fps": fps, "dt_s": dt_s})
+
+
 def test_a_negative_seed_is_refused():
     """Random numbers derive from whole numbers from 0 on."""
     with pytest.raises(InputError, match="seed must be a whole number from 0 on, got -1"):

@@ -19,6 +19,10 @@ LOOP_NAME = "closed-loop.json"
 LARGEST_SEED = 2**63 - 1
 """TOML holds whole numbers of 64 bits, one of them the sign."""
 
+LONGEST_STEP_S = 2.0
+"""A step is one decision of a fish, 0.1 to 1 s long. Whether others follow a robot is looked for at
+lags of up to two seconds: of longer steps there is none."""
+
 _DIGITS = 6
 
 NUMBER = "(?:[0-9]{6}|[1-9][0-9]{6,8})"
@@ -41,7 +45,7 @@ class Trial:
     fps
         Frame rate of the tracks, in hertz.
     dt_s
-        The model's step in seconds: a whole number of frames.
+        The model's step in seconds: a whole number of frames, at most `LONGEST_STEP_S`.
     seed
         All random numbers of the trial derive from it.
     model
@@ -84,6 +88,11 @@ class Trial:
                 f"{where}: dt_s must be a whole number of frames, got {self.dt_s!r} s "
                 f"at {self.fps!r} Hz ({frames:.4g} frames).",
                 hint=f"One frame is {1 / self.fps:.6g} s.",
+            )
+        if not self.dt_s <= LONGEST_STEP_S:
+            raise InputError(
+                f"{where}: dt_s must be at most {LONGEST_STEP_S:g} s, got {self.dt_s!r} s.",
+                hint="It is the model's step, in seconds: 0.2 is usual.",
             )
 
     @property

@@ -68,6 +68,7 @@ def test_a_whole_number_serves_as_a_rate(trial, settings):
         ("seed = 7", "", "'seed' is missing"),
         ("seed = 7", "seed = 7.5", "seed must be a whole number, got 7.5"),
         ("seed = 7", "seed = -7", "seed must be at least 0"),
+        ("dt_s = 0.2", "dt_s = 400.0", "dt_s must be at most 2, got 400.0"),
         ("seed = 7", f"seed = {2**63}", "seed must be at most 9223372036854775807"),
         ("fps = 15.0", "fps = nan", "fps must be a positive rate"),
         ("fps = 15.0", "fps = inf", "fps must be a positive rate"),
