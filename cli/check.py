@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+import functools
+from pathlib import Path
 
 import click
 
 from .options import speaks, takes_trials
 from .output import Output
-from .streams import each_trial
-
-if TYPE_CHECKING:
-    from zfcal.stages.streams import Work
+from .streams import roots_of
 
 
 @click.command("check")
@@ -31,12 +29,12 @@ def command(out: Output, trials: tuple[str, ...]) -> None:
     from zfcal.artifacts.checking import check_trial
     from zfcal.artifacts.findings import ERROR, OK
 
-    def work(found: Work) -> None:
-        for finding in check_trial(found.root):
-            says = f"{finding.level:8}{found.root}: {finding.where}: {finding.says}"
+    def work(root: Path) -> None:
+        for finding in check_trial(root):
+            says = f"{finding.level:8}{root}: {finding.where}: {finding.says}"
             shown = finding.level != OK or not out.quiet
             out.result(
-                {"trial": str(found.root), **dataclasses.asdict(finding)},
+                {"trial": str(root), **dataclasses.asdict(finding)},
                 text=(f"{says}\n        {finding.hint}" if finding.hint else says)
                 if shown
                 else None,
@@ -44,4 +42,6 @@ def command(out: Output, trials: tuple[str, ...]) -> None:
             if finding.level == ERROR:
                 out.worsen()
 
-    each_trial(out, trials, work)
+    # Once each, however many of its files are named.
+    for root in roots_of(out, trials):
+        out.attempt(functools.partial(work, root))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .closed_loop_options import closed_loop_options
-from .options import PLACE, makes_artifacts, speaks
+from .options import NEW_PLACE, makes_artifacts, speaks
 from .output import Output
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command("demo")
-@click.argument("folder", metavar="[DIR]", type=PLACE, default=Path("zfcal-demo"))
+@click.argument("folder", metavar="[DIR]", type=NEW_PLACE, default=Path("zfcal-demo"))
 @closed_loop_options
 @makes_artifacts
 @speaks

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .options import (
-    PLACE,
+    NEW_PLACE,
     POSITIVE,
     arena_options,
     makes_artifacts,
@@ -18,7 +18,7 @@ from .output import Output
 
 
 @click.command("init")
-@click.argument("trial", type=PLACE)
+@click.argument("trial", type=NEW_PLACE)
 @arena_options
 @click.option(
     "--fps",

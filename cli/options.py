@@ -37,6 +37,21 @@ class PathName(click.Path):
         return super().convert(value, param, ctx)
 
 
+class NewPlace(PathName):
+    """The folder of what a command makes; no paths come to it on standard input."""
+
+    def convert(
+        self,
+        value: str | os.PathLike[str],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:
+        """Return the path."""
+        if os.fspath(value) == "-":
+            self.fail("Give a folder: what is made is not named on standard input.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 class Name(click.ParamType):
     """A text that names something, such as a trial, a file or a device."""
 
@@ -51,6 +66,7 @@ class Name(click.ParamType):
 
 EXISTING = PathName(exists=True, path_type=Path)
 PLACE = PathName(path_type=Path)
+NEW_PLACE = NewPlace(path_type=Path)
 NAME = Name()
 
 

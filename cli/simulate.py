@@ -9,12 +9,12 @@ import click
 
 from .durations import seconds
 from .film_options import film_options
-from .options import EXISTING, PLACE, makes_artifacts, new_trial_options, seed_option, speaks
+from .options import EXISTING, NEW_PLACE, makes_artifacts, new_trial_options, seed_option, speaks
 from .output import Output
 
 
 @click.command("simulate")
-@click.argument("trial", type=PLACE)
+@click.argument("trial", type=NEW_PLACE)
 @click.option("--model", type=EXISTING, required=True, help="A model file.")
 @click.option("--duration", type=seconds, required=True, metavar="TIME", help="Such as 30min.")
 @seed_option("Seed of the simulation.  [default: the trial's]")

@@ -1,5 +1,7 @@
 """Words that no command takes: what they would leave behind could not be used."""
 
+import io
+
 import click
 import pytest
 
@@ -105,3 +107,32 @@ def test_an_empty_name_is_wrong_usage(zfcal, tmp_path, words):
     assert done.code == 2
     assert "The name is empty: is a variable of the shell not set?" in done.err
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("init", "-", "--arena", "ring", "--fish", "3"),
+        ("simulate", "-", "--model", "m.toml", "--duration", "60"),
+        ("demo", "-", "--dry-run"),
+    ],
+)
+def test_what_makes_a_trial_takes_none_from_standard_input(zfcal, tmp_path, words):
+    """No folder of that name is made."""
+    (tmp_path / "m.toml").touch()
+    done = zfcal(*words)
+    assert done.code == 2
+    assert "Give a folder" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["m.toml"]
+
+
+def test_a_check_of_paths_on_standard_input_says_all_once(zfcal, tmp_path, monkeypatch):
+    """Of two files of a trial, what a check of the trial says."""
+    zfcal("init", "trial", "--arena", "ring", "--fish", "3")
+    once = zfcal("check", "trial")
+    paths = "trial/trial.toml\ntrial/models/000000.toml\n"
+    monkeypatch.setattr("sys.stdin", io.StringIO(paths))
+    found = zfcal("check", "-")
+    where = [line.split(":")[1] for line in found.lines]
+    assert where == [line.split(":")[1] for line in once.lines]
+    assert len(set(where)) == len(where)
