@@ -52,10 +52,8 @@ class NewPlace(PathName):
         return super().convert(value, param, ctx)
 
 
-class Name(click.ParamType):
+class Name(click.types.StringParamType):
     """A text that names something, such as a trial, a file or a device."""
-
-    name = "text"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the text."""

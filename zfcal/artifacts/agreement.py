@@ -42,7 +42,8 @@ def check_agreement(trial: Trial) -> None:
 
 def disagreements(trial: Trial) -> list[InputError]:
     """Return in what the tracks of a trial disagree with its settings; empty without tracks."""
-    found = [tracks for start in _looked_at(trial) if len(tracks := _read(trial, start))]
+    read = [_read_or_none(trial, start) for start in _looked_at(trial)]
+    found = [tracks for tracks in read if tracks is not None and len(tracks)]
     problems = [_too_many(trial, found), _other_rate(trial, found)] if found else []
     return [problem for problem in problems if problem is not None]
 
@@ -53,11 +54,11 @@ def _looked_at(trial: Trial) -> list[int]:
     return [starts[int(number)] for number in at]
 
 
-def _read(trial: Trial, start_s: int) -> Tracks | tuple[()]:
+def _read_or_none(trial: Trial, start_s: int) -> Tracks | None:
     try:
         return read_tracks(segment_path(trial.root, start_s))
     except (DamagedError, InputError):
-        return ()
+        return None
 
 
 def _too_many(trial: Trial, found: list[Tracks]) -> InputError | None:
