@@ -96,7 +96,6 @@ def test_sets_that_are_wrong_are_one_line_and_a_hint(zfcal, pairs, words, says):
         ("a1",),
         ("a1", "--against"),
         ("--against", "b1", "b2"),
-        ("a1", "--against", "--json"),
         ("a1", "--against", "b1", "--format", "svg"),
         ("a1", "--against", "b1", "--force"),
         ("a1", "--against", "b1", "-n"),
@@ -108,6 +107,15 @@ def test_words_that_say_no_two_sets_are_wrong_usage(zfcal, words):
     done = zfcal("compare", *words)
 
     assert (done.code, done.out) == (2, "")
+
+
+def test_words_without_a_second_set_are_said_in_the_document(zfcal):
+    """Where one is asked for."""
+    done = zfcal("compare", "a1", "--against", "--json")
+
+    assert done.code == 2
+    (error,) = json.loads(done.out)["errors"]
+    assert error["message"] == "--against needs the trials of set B."
 
 
 def test_against_takes_all_words_up_to_the_next_option(zfcal, pairs):
