@@ -206,3 +206,42 @@ def test_noise_does_not_hide_a_component_from_it(record, tank, fish):
     gained = fits.gain("alignment", drawn).nats
     assert gained > 50
     assert 0.4 * gained < fits.first_look.nats(drawn) < gained
+
+
+def test_what_is_at_its_floor_has_no_score(fits):
+    """There the law does not change, however much is added: one step would outweigh all others."""
+    turning = next(
+        each
+        for effect in all_effects()
+        for each in effect.features(fits.law.scene.arena)
+        if isinstance(each, Turned)
+    )
+    look, (at, over) = fits.first_look, fits.first_look.null.base
+    low = at.copy()
+    low[7] *= 1e-9
+    changing = low.copy()
+    changing[7] = np.inf
+    made = [
+        dataclasses.replace(
+            look, null=dataclasses.replace(look.null, base=(low, over), changing=(each, over))
+        )._scores_of(fits.law.turned(turning))
+        for each in (low, changing)
+    ]
+    assert np.abs(made[0][7]).max() > 1e3
+    assert np.abs(made[1][7]).max() < 10
+
+
+def test_the_mixture_says_where_it_is_at_a_floor(base, monkeypatch):
+    """A parameter that takes away more than there is leaves the floor, and no change."""
+    made = Fits(law=Law(scene=base[0], fitted=base[1]))
+    _ = made._null
+    peak = dataclasses.replace(made._null.peak, x=-1e6 * np.ones_like(made._null.peak.x))
+    monkeypatch.setitem(made.__dict__, "_null", dataclasses.replace(made._null, peak=peak))
+    null = made._at_null
+    lowest = 1e-9 * made.law.base[0]
+    np.testing.assert_array_equal(np.isinf(null.changing[0]), null.base[0] <= lowest)
+    assert 0.3 < np.isinf(null.changing[0]).mean() < 1.0
+    assert (null.base[0] >= lowest).all()
+    there = np.flatnonzero(np.isinf(null.changing[1]))
+    assert np.isinf(null.take(there).changing[1]).all()
+    assert np.isfinite(null.base[1]).all()

@@ -53,17 +53,20 @@ class Null:
     ----------
     base : tuple of ndarray, shape (step, 1)
         At the heading taken, and integrated.
+    changing : tuple of ndarray, shape (step, 1)
+        That, infinite where it is at a floor: there it does not change by what is added.
     lapse : ndarray, shape (step,)
         Share of lapses.
     """
 
     base: Columns
+    changing: Columns
     lapse: Floats
 
     def take(self, rows: NDArray[np.intp]) -> Null:
         """Return that of some steps."""
-        at, over = self.base
-        return Null(base=(at[rows], over[rows]), lapse=self.lapse[rows])
+        base, changing = ((at[rows], over[rows]) for at, over in (self.base, self.changing))
+        return Null(base=base, changing=changing, lapse=self.lapse[rows])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,7 +151,7 @@ class FirstLook:
     def _scores_of(self, columns: Columns) -> Floats:
         """Return the scores of what adds to the mixture, shape (step, weight)."""
         made = np.empty(columns[0].shape)
-        write_scores(columns, self.null.base, self._no_lapse_at_null, made)
+        write_scores(columns, self.null.changing, self._no_lapse_at_null, made)
         return made
 
     @cached_property

@@ -262,11 +262,15 @@ class Fits:
         at, over = (np.concatenate([column[side] for column in columns], axis=1) for side in (0, 1))
         x, n = self._null.x, at.shape[1]
         (base_at, base_over), least = self.law.base, _OWN * self.law.own[1]
+        pairs = (
+            (base_at + at @ x[:n, None], _LEAST * base_at),
+            (base_over + over @ x[:n, None], least),
+        )
+        top, whole = (np.maximum(mixed, floor) for mixed, floor in pairs)
+        free_top, free_whole = (np.where(mixed > floor, mixed, np.inf) for mixed, floor in pairs)
         return Null(
-            base=(
-                np.maximum(base_at + at @ x[:n, None], _LEAST * base_at),
-                np.maximum(base_over + over @ x[:n, None], least),
-            ),
+            base=(top, whole),
+            changing=(free_top, free_whole),
             lapse=self.law.lapses.shares(x[n:]),
         )
 

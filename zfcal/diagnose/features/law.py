@@ -215,7 +215,7 @@ class Law:
         if len(self.draws) == 1:
             return parts[0]
         at, over = (np.zeros(each.shape) for each in parts[0])
-        for weight, own in zip(self._weights, parts, strict=False):
+        for weight, own in zip(self._weights[: len(parts)], parts, strict=True):
             at += len(self.draws) / len(parts) * weight[:, None] * own[0]
             over += len(self.draws) / len(parts) * weight[:, None] * own[1]
         return at, over
