@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from zfcal.arrays import Floats, Ints
 from zfcal.artifacts.segments import segment_path, segment_starts
 from zfcal.artifacts.tables import read_tracks
 from zfcal.errors import DamagedError, InputError
-from zfcal.tracks import Tracks
+from zfcal.tracks import ROBOT, Tracks
 from zfcal.trial import CONFIG_NAME, Trial
 
 _LOOKED_AT = 8
-"""Segments that are read, spread evenly: settings are wrong for all of them or for none."""
+"""Segments that are read, spread evenly; settings are wrong where most of them say so."""
 
 _IN_FRAMES = 0.99
 """An agent more in a hundredth of the frames is a false detection."""
 
 _SAME_RATE = 0.15
-"""A live camera may be a tenth off its rate, by its share; a wrong setting is farther off."""
+"""By so large a share times may be off; a wrong setting is farther off."""
 
 
 def check_agreement(trial: Trial) -> None:
@@ -62,40 +61,39 @@ def _read_or_none(trial: Trial, start_s: int) -> Tracks | None:
 
 
 def _too_many(trial: Trial, found: list[Tracks]) -> InputError | None:
-    present = np.concatenate([_at_once(tracks) for tracks in found])
-    n = int(np.quantile(present, _IN_FRAMES))
-    if n <= trial.n_agents:
+    n = _usual([_at_once(tracks) for tracks in found])
+    n_robots = _usual([_at_once(tracks.take(tracks.kind == ROBOT)) for tracks in found])
+    # A robot may be tracked as one of the fish.
+    if n <= trial.n_agents and n_robots <= trial.n_robots:
         return None
+    held = f"{n} at once" if n > trial.n_agents else f"{n} at once, of which {n_robots} are robots"
     return InputError(
         f"{trial.config}: n_fish = {trial.n_fish} and n_robots = {trial.n_robots} are "
-        f"{trial.n_agents} agents, the tracks hold {n} at once.",
+        f"{trial.n_agents} agents, the tracks hold {held}.",
         hint=f"Set n_fish and n_robots in {CONFIG_NAME} to those of the recording, or make its "
         "tracks again.",
     )
 
 
-def _at_once(tracks: Tracks) -> Ints:
-    """Return how many agents are in each frame that has any, shape (frame,)."""
-    _, counts = np.unique(tracks.frame, return_counts=True)
-    return np.asarray(counts, dtype=np.int64)
+def _usual(numbers: list[int]) -> int:
+    """Return a number that at least half of the segments have, or more."""
+    return sorted(numbers)[(len(numbers) - 1) // 2]
+
+
+def _at_once(tracks: Tracks) -> int:
+    """Return how many agents are there at once, but for false detections."""
+    counts = np.unique(tracks.frame, return_counts=True)[1]
+    return int(np.quantile(counts, _IN_FRAMES)) if len(counts) else 0
 
 
 def _other_rate(trial: Trial, found: list[Tracks]) -> InputError | None:
-    frame_s = np.concatenate([_frame_times(tracks) for tracks in found])
-    if not len(frame_s):
-        return None
-    rate_hz = float(1 / np.median(frame_s))
-    if abs(rate_hz / trial.fps - 1) <= _SAME_RATE:
+    # Of a camera that is slower than its rate frame numbers leave some out: times tell the same.
+    frames = sum(int(tracks.frame[-1] - tracks.frame[0]) for tracks in found)
+    time_s = sum(float(tracks.time_s[-1] - tracks.time_s[0]) for tracks in found)
+    if not (frames > 0 and time_s > 0) or abs(frames / time_s / trial.fps - 1) <= _SAME_RATE:
         return None
     return InputError(
-        f"{trial.config}: the tracks have {rate_hz:.4g} frames a second, fps says {trial.fps:g}.",
+        f"{trial.config}: the tracks have {frames / time_s:.4g} frames a second, fps says "
+        f"{trial.fps:g}.",
         hint=f"Set fps (and dt_s, a whole number of frames) in {CONFIG_NAME} to the recording's.",
     )
-
-
-def _frame_times(tracks: Tracks) -> Floats:
-    """Return the seconds of a frame between each two that follow each other, shape (pair,)."""
-    frames = np.diff(tracks.frame)
-    new = frames > 0
-    frame_s: Floats = np.diff(tracks.time_s)[new] / frames[new]
-    return frame_s[frame_s > 0]
