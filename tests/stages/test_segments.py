@@ -10,7 +10,7 @@ from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join
 from zfcal.behaviour.statistics import measure
-from zfcal.errors import InputError
+from zfcal.errors import DamagedError, InputError
 from zfcal.stages import segments as module
 from zfcal.stages.segments import END_KEY, Segments, covered, guess_options, segment_hashes
 from zfcal.tracks import FISH
@@ -132,6 +132,37 @@ def test_tracks_cover_what_lies_between_their_first_and_last_row(make_trial):
     assert covered(root, (0, 240), fps=5.0) == [(35, 120), (180, 230)]
     assert covered(root, (100, 200), fps=5.0) == [(100, 120), (180, 200)]
     assert covered(root, (120, 180), fps=5.0) == covered(root, (230, 900), fps=5.0) == []
+
+
+def test_tracks_do_not_cover_what_lies_between_a_stop_and_a_restart(make_trial):
+    """Neighbours by name: the one stops at 75 s, the other begins at 160 s."""
+    root = make_trial(seconds=230)
+    for start, kept in ((60, (60.0, 75.0)), (120, (160.0, 180.0))):
+        path = segment_path(root, start)
+        rows = read_tracks(path)
+        lineage, own = read_lineage(path), (rows.time_s >= kept[0]) & (rows.time_s < kept[1])
+        write_tracks(path, rows.take(own), lineage)
+    assert covered(root, (0, 240), fps=5.0) == [(0, 75), (160, 230)]
+    assert covered(root, (100, 150), fps=5.0) == []
+
+
+def test_a_damaged_segment_beside_a_stretch_does_not_bear_on_it(make_trial):
+    """Before it and behind it; within it the damage is an error."""
+    root = make_trial(seconds=230)
+    for start in (0, 180):
+        segment_path(root, start).write_bytes(b"PAR1")
+    assert covered(root, (60, 180), fps=5.0) == [(60, 180)]
+    with pytest.raises(DamagedError):
+        covered(root, (60, 181), fps=5.0)
+
+
+def test_tracks_cover_no_more_than_their_segments(make_trial):
+    """The times of a camera are some milliseconds late: the last frame ends behind its minute."""
+    root = make_trial(seconds=120)
+    path = segment_path(root, 60)
+    rows = read_tracks(path)
+    write_tracks(path, replace(rows, time_s=rows.time_s + 0.01), read_lineage(path))
+    assert covered(root, (0, 240), fps=5.0) == [(0, 120)]
 
 
 def test_tracks_cover_what_was_recorded_with_nobody_in_sight(make_trial):

@@ -35,6 +35,7 @@ END_KEY = "end_s"
 """Extra metadata of a segment: the second up to which the recording filled it."""
 
 _ROUNDING_S = 1e-6
+_SHORT_GAP_S = 1.0
 """Times are sums and quotients of floating-point numbers: 150 s may be a hair more."""
 
 _REMEMBERED = 200_000
@@ -240,8 +241,8 @@ def _end_of(root: Path, start_s: int, *, past_last_s: float) -> float:
 def covered(root: Path, span_s: tuple[int, int], *, fps: float) -> list[tuple[int, int]]:
     """Return the parts of a stretch of time that tracks cover, in order, in whole seconds.
 
-    Parts begin with the first row after a missing segment, and end where the recording does.
-    A second that is covered in part counts.
+    A part begins with its first row, and ends where the recording of a segment ended before the
+    next one began. A second that is covered in part counts, and a shorter gap is none.
 
     Parameters
     ----------
@@ -255,19 +256,30 @@ def covered(root: Path, span_s: tuple[int, int], *, fps: float) -> list[tuple[in
     Raises
     ------
     InputError, DamagedError
-        A segment at which a part begins or ends cannot be read.
+        A segment of that stretch cannot be read.
     """
-    starts = segment_starts(root)
-    known = set(starts)
-    firsts = [start for start in starts if start - STEP_S not in known]
-    lasts = [start for start in starts if start + STEP_S not in known]
-    found = []
-    for first, last in zip(firsts, lasts, strict=True):
-        if first < span_s[1] and span_s[0] < last + STEP_S:
-            time_s = read_tracks(segment_path(root, first)).time_s
-            begin_s = float(time_s[0]) if len(time_s) else float(first)
-            end_s = _end_of(root, last, past_last_s=1 / fps)
-            low = max(span_s[0], math.floor(begin_s + _ROUNDING_S))
-            high = min(span_s[1], math.ceil(end_s - _ROUNDING_S))
-            found += [(low, high)] if low < high else []
-    return found
+    known = segment_starts(root)
+    found: list[tuple[float, float]] = []
+    for start in known:
+        if not (start < span_s[1] and span_s[0] < start + STEP_S):
+            continue
+        # What came before the stretch is not looked at: it may be damaged.
+        before_s = found[-1][1] if found else float(start if start - STEP_S in known else -1)
+        begin_s = before_s if before_s >= start else _begin_of(root, start)
+        end_s = _end_of(root, start, past_last_s=1 / fps)
+        is_to_end = end_s >= start + STEP_S - 2 / fps
+        end_s = float(start + STEP_S) if is_to_end else end_s
+        if found and begin_s - before_s < _SHORT_GAP_S:
+            begin_s = found.pop()[0]
+        found.append((begin_s, end_s))
+    whole = (
+        (max(span_s[0], math.floor(a + _ROUNDING_S)), min(span_s[1], math.ceil(b - _ROUNDING_S)))
+        for a, b in found
+    )
+    return [(a, b) for a, b in whole if a < b]
+
+
+def _begin_of(root: Path, start_s: int) -> float:
+    """Return the time of a segment's first row; where it begins, without any."""
+    time_s = read_tracks(segment_path(root, start_s)).time_s
+    return float(time_s[0]) if len(time_s) else float(start_s)
