@@ -316,11 +316,14 @@ def _check_model(place: _Place, path: Path) -> Iterator[Finding]:
 def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
     name = path.relative_to(place.root).as_posix()
     is_fresh = place.now_s - path.stat().st_mtime < _GROWING_S
-    # Before it is read: what has its footer or is followed by then is whole, or never will be.
-    is_closed, n_later = has_footer(path), _n_later(path)
     found = overview(path)
-    if not found.whole and is_fresh and not is_closed and n_later == 1:
-        time.sleep(_CLOSING_S)
+    if found.whole:
+        return
+    is_closed, n_later = has_footer(path), _n_later(path)
+    if is_fresh:
+        # It may have been closed while it was read, or is just before that.
+        if not is_closed and n_later == 1:
+            time.sleep(_CLOSING_S)
         found = overview(path)
     if found.whole:
         return

@@ -29,6 +29,9 @@ from zfcal.tracks import FramePoses
 from zfcal.trial import second_of
 
 LIBRARY = "zfcal"
+_FRESH_S = 10.0
+"""A file that changed so lately may be closed soon."""
+
 _CLOCK_KEY = "zfcal.clock"
 """Metadata record of a live recording: when the trial began, in seconds since 1970."""
 
@@ -179,6 +182,14 @@ def read_clock(path: Path) -> dict[str, str] | None:
     return tail.metadata.get(_CLOCK_KEY)
 
 
+def _is_fresh(path: Path) -> bool:
+    """Return whether a file was written to moments ago; false for one that is gone."""
+    try:
+        return time.time() - path.stat().st_mtime < _FRESH_S
+    except OSError:
+        return False
+
+
 @final
 class PoseFollower:
     """Follows the poses of a trial while they are written, from minute to minute.
@@ -241,8 +252,9 @@ class PoseFollower:
     def cuts(self, *, is_over: bool) -> dict[Path, DamagedError]:
         """Return what is lost of files that were not closed, though none adds to them any more.
 
-        A tracker closes a file just after it has begun the next: ask when all has been read.
-        Who begins with the newest file follows a tracker, and is told of none.
+        A tracker closes a file just after it has begun the next: of one that was written to
+        moments ago nothing is said before all is over. Who begins with the newest file follows a
+        tracker, and is told of none.
 
         Parameters
         ----------
@@ -254,7 +266,8 @@ class PoseFollower:
             # One that is bad, or is gone by now, has been told.
             with contextlib.suppress(DamagedError, InputError):
                 tail.poll()
-            if tail.cut is not None and (tail.path, _FILE) not in self._told:
+            is_done = is_over or not _is_fresh(tail.path)
+            if tail.cut is not None and is_done and (tail.path, _FILE) not in self._told:
                 found[tail.path] = tail.cut
         return found
 

@@ -205,6 +205,7 @@ class _Again:
         self._target = None
         if poses is None:
             self.tally.frames_lost += 1
+            self._is_behind_loss = True
         elif self._pilot is not None and self._model is not None:
             self._target = self._pilot.see(poses, self._model)
 

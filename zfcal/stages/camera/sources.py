@@ -109,6 +109,7 @@ class _RecordedFrames:
                     Problem(
                         says=f"{path}: the image of {time_s:.3f} s cannot be decoded.",
                         hint="Copy the file again from where it was recorded.",
+                        end_s=math.nextafter(time_s - self._zero_s, math.inf),
                     )
                 )
                 continue
