@@ -279,7 +279,7 @@ class Output:
             _say(f"{self.command}: nothing to do, {fresh} up to date.")
 
     def print_document(self) -> None:
-        """Write the JSON document to standard output."""
+        """Write the JSON document to standard output, as one line among others where there are such."""
         document: Any = {
             "command": self.command,
             "exit_code": self.exit_code,
@@ -291,7 +291,7 @@ class Output:
         }
         if self.bare and len(self._results) == 1 and not self._errors:
             (document,) = self._results
-        text = json.dumps(document, indent=2, ensure_ascii=False)
+        text = json.dumps(document, indent=None if self.in_lines else 2, ensure_ascii=False)
         # A path that is no UTF-8 would make it no JSON.
         click.echo(text.encode(errors="surrogateescape").decode(errors="replace"))
         sys.stdout.flush()

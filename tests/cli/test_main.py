@@ -196,6 +196,13 @@ def test_what_stands_behind_two_dashes_asks_for_no_document(zfcal):
     assert zfcal("analyse", "--bogus", "--", "--json").out == ""
 
 
+def test_wrong_usage_of_a_command_that_writes_lines_is_one(zfcal):
+    """Readers of `watch --json` take a document from each line."""
+    out = zfcal("watch", "trial", "--bogus", "--json").out
+    assert len(out.splitlines()) == 1
+    assert json.loads(out)["errors"][0]["message"].startswith("No such option '--bogus'.")
+
+
 @pytest.mark.parametrize("number", ["nan", "inf", "-1"])
 @pytest.mark.parametrize(
     "words",

@@ -156,7 +156,8 @@ def _plan_recorded(place: Path, loop: LoopOptions, tell: Tell, *, task: Task) ->
     for start in starts_between(0.0, loop.duration_s):
         path = segment_path(root, start)
         reason = "forced" if path.exists() else "missing"
-        tell(UpToDate(path=path) if is_whole else Planned(path=path, reason=reason))
+        is_made = is_whole and path.exists()
+        tell(UpToDate(path=path) if is_made else Planned(path=path, reason=reason))
     return root
 
 
