@@ -279,7 +279,7 @@ class Output:
             _say(f"{self.command}: nothing to do, {fresh} up to date.")
 
     def print_document(self) -> None:
-        """Write the JSON document to standard output, as one line among others where there are such."""
+        """Write the JSON document to standard output, as one line where others are lines."""
         document: Any = {
             "command": self.command,
             "exit_code": self.exit_code,
