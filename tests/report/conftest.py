@@ -197,7 +197,7 @@ def write_small_trial(wander, two_rooms):
         trial = Trial(
             root=root,
             arena="two-rooms",
-            n_fish=4,
+            n_fish=5 - n_robots,
             n_robots=n_robots,
             fps=FPS,
             dt_s=DT_S,
