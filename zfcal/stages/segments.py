@@ -35,8 +35,10 @@ END_KEY = "end_s"
 """Extra metadata of a segment: the second up to which the recording filled it."""
 
 _ROUNDING_S = 1e-6
-_SHORT_GAP_S = 1.0
 """Times are sums and quotients of floating-point numbers: 150 s may be a hair more."""
+
+_SHORT_GAP_S = 1.0
+"""A shorter gap between two segments is none: coverage is told in whole seconds."""
 
 _REMEMBERED = 200_000
 """Points kept in memory, some 12 MB: two hours of five agents at 5 Hz."""
@@ -58,10 +60,13 @@ def segment_hashes(root: Path, starts: Iterable[int]) -> dict[int, str]:
 
 def segment_files(root: Path, span_s: tuple[int, int] | None) -> list[Path]:
     """Return the segments that a stretch of time touches, all for None, in order of time."""
-    starts = segment_starts(root)
-    if span_s is not None:
-        starts = [start for start in starts if span_s[0] - STEP_S < start < span_s[1]]
+    starts = segment_starts(root) if span_s is None else touched(root, span_s)
     return [segment_path(root, start) for start in starts]
+
+
+def touched(root: Path, span_s: tuple[int, int]) -> list[int]:
+    """Return the seconds at which the segments begin that a stretch of time touches, in order."""
+    return [start for start in segment_starts(root) if span_s[0] - STEP_S < start < span_s[1]]
 
 
 def readable(paths: Iterable[Path], tell: Tell) -> list[Path]:
@@ -258,11 +263,9 @@ def covered(root: Path, span_s: tuple[int, int], *, fps: float) -> list[tuple[in
     InputError, DamagedError
         A segment of that stretch cannot be read.
     """
-    known = segment_starts(root)
+    known = set(segment_starts(root))
     found: list[tuple[float, float]] = []
-    for start in known:
-        if not (start < span_s[1] and span_s[0] < start + STEP_S):
-            continue
+    for start in touched(root, span_s):
         # What came before the stretch is not looked at: it may be damaged.
         before_s = found[-1][1] if found else float(start if start - STEP_S in known else -1)
         begin_s = before_s if before_s >= start else _begin_of(root, start)

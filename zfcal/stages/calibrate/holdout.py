@@ -15,7 +15,7 @@ from zfcal.arrays import Floats, Seeds
 from zfcal.artifacts.atomic import discard
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.models import write_model
-from zfcal.artifacts.segments import segment_path, segment_starts
+from zfcal.artifacts.segments import segment_path
 from zfcal.behaviour.ceilings import Ceiling
 from zfcal.behaviour.features.registry import further as further_of
 from zfcal.behaviour.located import join
@@ -41,7 +41,7 @@ from zfcal.stages.calibrate.searching import (
 from zfcal.stages.calibrate.telling import stretch_note
 from zfcal.stages.events import Event, Note, Result, Tell
 from zfcal.stages.making import run
-from zfcal.stages.segments import STEP_S, Segments, covered, guess_options
+from zfcal.stages.segments import Segments, covered, guess_options, touched
 from zfcal.stages.stage import Draft, Item, OneThing, Output, Run
 from zfcal.stages.trial_context import OpenTrial, Task
 from zfcal.tracks import FISH
@@ -224,7 +224,7 @@ def pooled_fish(
         A segment is damaged.
     """
     start_s, end_s = span_s
-    starts = [s for s in segment_starts(opened.trial.root) if start_s - STEP_S < s < end_s]
+    starts = touched(opened.trial.root, span_s)
     if not starts:
         raise _no_tracks(opened, span_s)
     points = join([segments.read(opened, start) for start in starts]).between(start_s, end_s)
