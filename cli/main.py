@@ -327,7 +327,8 @@ def _explain_usage(error: click.UsageError, argv: Sequence[str]) -> int:
     as_json = "--json" in itertools.takewhile(lambda word: word != "--", argv)
     if as_json and not error.ctx.meta.get(HAS_VOICE):
         out = Output(error.ctx.info_name or "", as_json=True, verbose=0, quiet=True)
-        out.in_lines = out.command == "watch"
+        # One line is a document, and a line among those of `watch` as well.
+        out.in_lines = True
         out.record(error)
         out.print_document()
     return _EXIT_USAGE
