@@ -200,7 +200,7 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
 @click.option(
     "--man",
     metavar="DIR",
-    type=PathName(file_okay=False, path_type=Path),
+    type=PathName(file_okay=False),
     expose_value=False,
     is_eager=True,
     callback=_write_manual,

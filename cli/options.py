@@ -23,7 +23,19 @@ _EMPTY = "The name is empty: is a variable of the shell not set?"
 
 
 class PathName(click.Path):
-    """A path by its name; the current folder is ``.`` and not a name that is empty."""
+    """A path by its name; the current folder is ``.`` and not a name that is empty.
+
+    Parameters
+    ----------
+    is_made
+        Whether a command makes what is there: no paths come to that on standard input.
+    **how
+        As of `click.Path`.
+    """
+
+    def __init__(self, *, is_made: bool = False, **how: Any) -> None:
+        super().__init__(path_type=Path, **how)
+        self._is_made = is_made
 
     def convert(
         self,
@@ -34,20 +46,7 @@ class PathName(click.Path):
         """Return the path."""
         if not os.fspath(value):
             self.fail(_EMPTY, param, ctx)
-        return super().convert(value, param, ctx)
-
-
-class NewPlace(PathName):
-    """The folder of what a command makes; no paths come to it on standard input."""
-
-    def convert(
-        self,
-        value: str | os.PathLike[str],
-        param: click.Parameter | None,
-        ctx: click.Context | None,
-    ) -> Any:
-        """Return the path."""
-        if os.fspath(value) == "-":
+        if self._is_made and os.fspath(value) == "-":
             self.fail("Give a folder: what is made is not named on standard input.", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -62,9 +61,9 @@ class Name(click.types.StringParamType):
         return str(value)
 
 
-EXISTING = PathName(exists=True, path_type=Path)
-PLACE = PathName(path_type=Path)
-NEW_PLACE = NewPlace(path_type=Path)
+EXISTING = PathName(exists=True)
+PLACE = PathName()
+NEW_PLACE = PathName(is_made=True)
 NAME = Name()
 
 
