@@ -37,9 +37,6 @@ K = TypeVar("K")
 S = TypeVar("S")
 T = TypeVar("T")
 
-_JUDGES = frozenset({"analyse", "calibrate", "diagnose", "extend"})
-"""Commands that score tracks, or hold a model against them: settings must agree with these."""
-
 
 def run(
     stage: Stage[S, K] | OneThing, root: Path, tell: Tell, *, task: Task | None = None
@@ -73,7 +70,7 @@ def run(
     task = task or Task()
     # First: where there is no trial no lock is to lie.
     trial = read_trial(root)
-    if stage.name in _JUDGES:
+    if stage.scores_tracks:
         check_agreement(trial)
     started = Run(root=root, command=stage.name, tell=tell, task=task)
     with at_work(root, stage.name, task):

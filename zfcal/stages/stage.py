@@ -171,6 +171,9 @@ class Stage(ABC, Generic[S, K]):
     is_chain: ClassVar[bool] = False
     """Whether each thing starts from the one before: then none is made after one left out."""
 
+    scores_tracks: ClassVar[bool] = False
+    """Whether tracks are scored, or a model held against them: settings must agree with these."""
+
     @abstractmethod
     def open(self, run: Run) -> S:
         """Read what the things share. It is read again where it has changed."""
@@ -198,7 +201,10 @@ class OneThing:
         The command: of the lock and in lineage.
     item
         Returns the thing; None where there is nothing to make, which was told.
+    scores_tracks
+        As of a `Stage`.
     """
 
     name: str
     item: Callable[[Run], Item | None]
+    scores_tracks: bool = False

@@ -169,6 +169,7 @@ class Analyse(Stage[_Shared, int]):
     """
 
     name = "analyse"
+    scores_tracks = True
     counted = "analyse"
 
     options: AnalyseOptions = field(default_factory=AnalyseOptions)

@@ -158,6 +158,7 @@ class Calibrate(Stage[_Shared, _Window]):
     """
 
     name = "calibrate"
+    scores_tracks = True
     counted = "rounds"
     is_chain = True
 

@@ -283,7 +283,9 @@ def calibrate_span(
     task
         How to go about it.
     """
-    stage = OneThing(name="calibrate", item=lambda run: _model(run, span, options))
+    stage = OneThing(
+        name="calibrate", item=lambda run: _model(run, span, options), scores_tracks=True
+    )
     run(stage, root, tell, task=task)
 
 

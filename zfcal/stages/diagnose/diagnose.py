@@ -167,7 +167,9 @@ def diagnose(
         The trial, the model or the tracks are wrong, the disk is full, or another
         diagnose is at work on the trial. Damaged segments are left out and told instead.
     """
-    stage = OneThing(name="diagnose", item=lambda run: _findings(run, options, draw))
+    stage = OneThing(
+        name="diagnose", item=lambda run: _findings(run, options, draw), scores_tracks=True
+    )
     there = run(stage, root, tell, task=task)
     return there[0] if there else None
 

@@ -97,7 +97,9 @@ def extend(
         The trial or the tracks are wrong, they are too little to say anything, an effect is
         unknown or in the model already, or another extend is at work on the trial.
     """
-    stage = OneThing(name="extend", item=lambda run: _extended(run, options, draw))
+    stage = OneThing(
+        name="extend", item=lambda run: _extended(run, options, draw), scores_tracks=True
+    )
     there = run(stage, root, tell, task=task)
     return there[0] if there and not (task and task.dry_run) else None
 
