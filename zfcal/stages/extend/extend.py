@@ -97,9 +97,8 @@ def extend(
         The trial or the tracks are wrong, they are too little to say anything, an effect is
         unknown or in the model already, or another extend is at work on the trial.
     """
-    stage = OneThing(
-        name="extend", item=lambda run: _extended(run, options, draw), scores_tracks=True
-    )
+    # Its diagnosis, made or up to date, looks whether settings agree with the tracks.
+    stage = OneThing(name="extend", item=lambda run: _extended(run, options, draw))
     there = run(stage, root, tell, task=task)
     return there[0] if there and not (task and task.dry_run) else None
 
