@@ -23,7 +23,7 @@ from zfcal.artifacts.cameras import read_camera_file
 from zfcal.artifacts.findings import ERROR, NOTE, OK, WARNING, Finding
 from zfcal.artifacts.lineage import Lineage, package_version, read_lineage
 from zfcal.artifacts.machine import check_computer
-from zfcal.artifacts.mcap_files import has_footer, overview
+from zfcal.artifacts.mcap_files import FRESH_S, has_footer, overview
 from zfcal.artifacts.models import read_model, read_model_for
 from zfcal.artifacts.reading.contents import hash_of, numbered_of
 from zfcal.artifacts.reading.opening import open_regular, unreadable
@@ -45,9 +45,6 @@ from zfcal.units import SEGMENT_S
 
 _CLOCK_SLACK_S = 2.0
 """Two computers that share a trial may differ by so much without a warning."""
-
-_GROWING_S = 10.0
-"""A file that changed so lately is taken to be growing still."""
 
 _CLOSING_S = 1.0
 """A tracker closes a minute once the first frame of the next is written, and sooner than this."""
@@ -315,7 +312,7 @@ def _check_model(place: _Place, path: Path) -> Iterator[Finding]:
 
 def _check_mcap(place: _Place, path: Path) -> Iterator[Finding]:
     name = path.relative_to(place.root).as_posix()
-    is_fresh = place.now_s - path.stat().st_mtime < _GROWING_S
+    is_fresh = place.now_s - path.stat().st_mtime < FRESH_S
     found = overview(path)
     if found.whole:
         return

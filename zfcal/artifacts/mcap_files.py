@@ -37,6 +37,9 @@ BROKEN = (
 """What reading a damaged MCAP file may raise."""
 
 
+FRESH_S = 10.0
+"""A file that changed so lately is taken to be growing still, or to be closed soon."""
+
 _MAGIC = b"\x89MCAP0\r\n"
 """An MCAP file begins with it, and a closed one ends with it."""
 

@@ -19,6 +19,7 @@ from mcap.writer import Writer
 from zfcal.arena import Arena
 from zfcal.artifacts.atomic import storage_error
 from zfcal.artifacts.lineage import LINEAGE_KEY, Lineage
+from zfcal.artifacts.mcap_files import FRESH_S
 from zfcal.artifacts.pose_messages import as_json, as_poses, as_scene, from_json, register
 from zfcal.artifacts.reading.contents import Looks, looks_of, numbered_of
 from zfcal.artifacts.reading.opening import open_to_write
@@ -29,9 +30,6 @@ from zfcal.tracks import FramePoses
 from zfcal.trial import second_of
 
 LIBRARY = "zfcal"
-_FRESH_S = 10.0
-"""A file that changed so lately may be closed soon."""
-
 _CLOCK_KEY = "zfcal.clock"
 """Metadata record of a live recording: when the trial began, in seconds since 1970."""
 
@@ -185,7 +183,7 @@ def read_clock(path: Path) -> dict[str, str] | None:
 def _is_fresh(path: Path) -> bool:
     """Return whether a file was written to moments ago; false for one that is gone."""
     try:
-        return time.time() - path.stat().st_mtime < _FRESH_S
+        return time.time() - path.stat().st_mtime < FRESH_S
     except OSError:
         return False
 
