@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 HEADER = "time_s,agent,kind,x_m,y_m,heading_rad,confidence\n"
+SURE = "0.0666667,0,0.1,0.2,0.9\n"
 
 
 def test_all_columns_by_hand(write, read):
@@ -72,6 +73,34 @@ def test_a_frame_column_does_without_times(write, read):
 
     assert tracks.frame.tolist() == [0, 3]
     assert tracks.time_s == pytest.approx([0.0, 0.2])
+
+
+@pytest.mark.parametrize("first_frame", [0, 1])
+def test_a_first_frame_in_a_file_without_frames_is_refused(write, refused, first_frame):
+    """What it could have no effect on is named, with the columns that there are."""
+    path = write("tracks.csv", "time_s,agent,x_m,y_m\n0,0,0.1,0.2\n")
+
+    message = refused(path, "csv", first_frame=first_frame)
+
+    assert f"{path}, line 1: first_frame = {first_frame} cannot take effect" in message
+    assert "expected a column 'frame', got time_s, agent, x_m, y_m." in message
+    assert "--columns frame=NAME" in message
+
+
+@pytest.mark.parametrize("columns", ["x_m,y_m", "x_m,y_m,confidence"])
+def test_a_least_confidence_in_a_file_without_any_is_refused(write, refused, read, columns):
+    """Without the column, and with one that says nothing; one word in it is enough."""
+    end = "," if columns.endswith("confidence") else ""
+    rows = f"0,0,0.1,0.2{end}\n0.0666667,0,0.1,0.2{end}\n"
+    path = write("tracks.csv", f"time_s,agent,{columns}\n{rows}")
+    sure = write("sure.csv", f"time_s,agent,x_m,y_m,confidence\n0,0,0.1,0.2,\n{SURE}")
+
+    message = refused(path, "csv", min_confidence=0.5)
+
+    assert f"{path}: min_confidence = 0.5 cannot take effect: expected a confidence" in message
+    assert "Leave --min-confidence out" in message
+    assert len(read(path, "csv", min_confidence=0.0).tracks) == 2
+    assert len(read(sure, "csv", min_confidence=0.5).tracks) == 2
 
 
 def test_a_frame_column_beside_times_is_kept(write, read):

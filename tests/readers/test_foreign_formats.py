@@ -275,6 +275,16 @@ def test_an_option_of_another_format_cannot_take_effect(name, options, sample, r
     assert f"{next(iter(options))} cannot take effect: format {name!r} takes" in message
 
 
+@pytest.mark.parametrize("name", ["trex", "robofish", "fishmodel", "trajectorytools"])
+def test_a_least_confidence_in_a_format_without_any_is_refused(name, sample, refused):
+    """It could leave out nothing."""
+    path, scale = sample(name)
+
+    assert "min_confidence = 0.5 cannot take effect" in refused(
+        path, name, **scale, min_confidence=0.5
+    )
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path, refused):
     """Before anything else is looked at."""
     assert "gone.csv: no such file" in refused(tmp_path / "gone.csv", "csv")

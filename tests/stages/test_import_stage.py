@@ -168,6 +168,92 @@ def test_robots_can_come_from_a_file_of_their_own(trial, tmp_path, heard, wander
     ]
 
 
+def with_confidence(path, value):
+    """Give every row of a CSV file the same confidence."""
+    first, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([f"{first},confidence", *(f"{row},{value}" for row in rows)]) + "\n")
+    return path
+
+
+def test_a_least_confidence_must_take_effect_in_one_of_two_files(trial, tmp_path, heard, wandering):
+    """Robots that stand for certain beside fish that are tracked, but not both without any."""
+    fish = write_csv(tmp_path / "fish.csv", wandering(70))
+    robot = write_csv(tmp_path / "robot.csv", wandering(70, n_fish=1, seed=5))
+    options = {"min_confidence": 0.5}
+    source = Source(path=fish, format="csv", options=options, robot_tracks=robot)
+
+    with pytest.raises(InputError, match=r"fish\.csv: min_confidence = 0\.5 cannot take effect"):
+        import_tracks(trial, source, heard.append)
+    assert not (trial / "tracks").exists()
+
+    with_confidence(robot, 0.9)
+    import_tracks(trial, source, heard.append)
+    assert len(read_tracks(trial / "tracks" / "000000.parquet")) == 4 * 300
+
+
+def test_a_column_of_confidences_that_says_nothing_is_told_when_it_is_read(trial, csv):
+    """Its header looks as if the option could take effect."""
+    with_confidence(csv, "")
+    with pytest.raises(InputError, match=r"min_confidence = 0\.5 cannot take effect"):
+        import_tracks(trial, csv_source(csv, min_confidence=0.5), say_nothing)
+    assert not (trial / "tracks").exists()
+
+
+@pytest.fixture
+def no_hashing(monkeypatch):
+    """Let nobody read a whole source to hash it."""
+
+    def hashed(_root, path):
+        pytest.fail(f"{path} was hashed before its mistake was told")
+
+    monkeypatch.setattr("zfcal.stages.import_.hash_sources", hashed)
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "problem"),
+    [
+        ("time_s,agent,x,y_m", {}, "expected columns"),
+        ("time_s,agent,x_px,y_px", {}, "positions are in pixels"),
+        ("time_s,agent,x_m,y_m", {"m_per_px": 0.001}, "cannot take effect"),
+        ("time_s,agent,x_m,y_m", {"min_confidence": 0.5}, "cannot take effect"),
+        ("time_s,agent,x_m,y_m", {"first_frame": 1}, "cannot take effect"),
+        ("time_s,agent,x_m,y_m", {"box": "centre"}, "cannot take effect"),
+        ("time_s,agent,x_m,y_m", {"columns": (("frame", "number"),)}, "expected a column 'number'"),
+    ],
+)
+@pytest.mark.usefixtures("no_hashing")
+def test_what_a_header_shows_is_told_before_the_file_is_hashed(
+    trial, tmp_path, header, options, problem
+):
+    """A recording of gigabytes takes minutes."""
+    path = tmp_path / "tracks.csv"
+    path.write_text(f"{header}\n0.0,0,0.5,0.5\n")
+    with pytest.raises(InputError, match=problem):
+        import_tracks(trial, csv_source(path, **options), say_nothing)
+
+
+@pytest.mark.parametrize("name", ["csv", "trex", "cats"])
+@pytest.mark.usefixtures("no_hashing")
+def test_a_folder_that_no_reader_takes_is_told_before_it_is_hashed(trial, tmp_path, name):
+    """Somebody names the folder of all recordings."""
+    (tmp_path / "all").mkdir()
+    (tmp_path / "all" / "film.mp4").write_bytes(b"x")
+    source = Source(path=tmp_path / "all", format=name, options={})
+    with pytest.raises(InputError, match=r"all: expected (a file|the files of one video)"):
+        import_tracks(trial, source, say_nothing)
+
+
+def test_tracks_of_another_source_are_told_before_the_new_one_is_hashed(
+    trial, csv, tmp_path, request
+):
+    """Names are enough to know."""
+    import_tracks(trial, csv_source(csv), say_nothing)
+    other = csv.rename(tmp_path / "other.csv")
+    request.getfixturevalue("no_hashing")
+    with pytest.raises(InputError, match=r"comes from import of tracks\.csv, .* other\.csv"):
+        import_tracks(trial, csv_source(other), say_nothing)
+
+
 def test_a_robot_in_a_trial_without_one_is_refused(tmp_path, csv, heard):
     """trial.toml says who is in the tank."""
     root = tmp_path / "alone"

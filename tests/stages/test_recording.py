@@ -58,7 +58,7 @@ def write_segments(trial, recorded, tell, *, task=None):
     tracks, end_s, lineage = recorded
 
     def item(run):
-        return segmented(run, trial, lineage, [], lambda: Recording(tracks=tracks, end_s=end_s))
+        return segmented(run, lineage, [], lambda: Recording(tracks=tracks, end_s=end_s))
 
     run(OneThing(name="import", item=item), trial.root, tell, task=task)
 
@@ -152,12 +152,24 @@ def test_a_dry_run_writes_and_removes_nothing(trial, heard, wandering, read_all)
 def test_tracks_of_another_file_are_not_replaced(trial, heard, wandering):
     """One trial holds one recording; force is needed."""
     write_segments(trial, recording_of(wandering(60), 60.0), heard.append, task=Task())
-    other = dataclasses.replace(LINEAGE, inputs={"b.csv": "0" * 64})
     with pytest.raises(InputError, match=r"comes from import of a\.csv.*b\.csv"):
-        check_same_source(trial, other, Task())
-    check_same_source(trial, other, Task(force=True))
-    changed = dataclasses.replace(LINEAGE, inputs={"a.csv": "1" * 64})
-    check_same_source(trial, changed, Task())
+        check_same_source(trial, "import", sources=["b.csv"], task=Task())
+    check_same_source(trial, "import", sources=["b.csv"], task=Task(force=True))
+    check_same_source(trial, "import", sources=["a.csv"], task=Task())
+
+
+def test_of_sources_of_many_files_a_few_are_named_and_the_others_counted(trial, heard, wandering):
+    """Those first by which the two differ: 2000 images, and then 1999 of them and a new one."""
+    images = [f"images/{number:06d}.png" for number in range(2000)]
+    lineage = dataclasses.replace(LINEAGE, inputs=dict.fromkeys(images, "0" * 64))
+    write_segments(trial, recording_of(wandering(60), 60.0, lineage), heard.append)
+    with pytest.raises(InputError) as error:
+        check_same_source(trial, "import", sources=[*images[1:], "images/new.png"], task=Task())
+    path = trial.root / "tracks" / "000000.parquet"
+    assert str(error.value) == (
+        f"{path}: comes from import of {', '.join(images[:3])} and 1997 more, "
+        f"expected none or {', '.join(['images/new.png', *images[1:3]])} and 1997 more."
+    )
 
 
 def test_a_source_outside_is_recorded_by_its_bare_name(tmp_path):

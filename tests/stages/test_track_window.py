@@ -11,6 +11,7 @@ from zfcal.artifacts.lineage import read_lineage
 from zfcal.artifacts.segments import segment_path
 from zfcal.artifacts.tables import read_tracks, write_tracks
 from zfcal.behaviour.located import join, locate
+from zfcal.errors import InputError
 from zfcal.stages.events import LeftOut, say_nothing
 from zfcal.stages.recording import cut
 from zfcal.stages.segments import Segments
@@ -67,3 +68,37 @@ def test_a_segment_of_another_minute_is_left_out_by_whoever_reads(make_trial, he
     assert "expected 60 s to 120 s" in problems[0]
     seen = ~np.isnan(stretch.samples.xy_m[..., 0]).all(axis=1)
     assert seen.tolist() == [True] * 300 + [False] * 300 + [True] * 300
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_folder_in_the_place_of_a_segment_is_told_once_and_none_of_the_files(
+    make_trial, heard, start
+):
+    """What is made of the others is what would be made without it."""
+    root = make_trial(seconds=180)
+    path = segment_path(root, start)
+    path.unlink()
+    without = read_stretch(open_trial(root), None, say_nothing)
+    path.mkdir()
+
+    stretch = read_stretch(open_trial(root), None, heard.append)
+
+    (told,) = [event for event in heard if isinstance(event, LeftOut)]
+    assert told.problem.startswith(f"{path}: cannot be read (")
+    assert stretch.files == tuple(segment_path(root, each) for each in STARTS if each != start)
+    assert (stretch.n_left_out, stretch.n_segments) == (1, 3)
+    assert np.array_equal(stretch.samples.k, without.samples.k)
+    assert np.array_equal(stretch.samples.xy_m, without.samples.xy_m, equal_nan=True)
+
+
+def test_tracks_of_which_nothing_can_be_read_are_one_error(make_trial, heard):
+    """A folder and a damaged file: each is told, and both are counted."""
+    root = make_trial(seconds=120)
+    segment_path(root, 0).unlink()
+    segment_path(root, 0).mkdir()
+    segment_path(root, 60).write_bytes(b"PAR1 and no more")
+
+    with pytest.raises(InputError, match="none of 2 segments of tracks can be read"):
+        read_stretch(open_trial(root), None, heard.append)
+
+    assert len([event for event in heard if isinstance(event, LeftOut)]) == 2

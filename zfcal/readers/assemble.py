@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Bools, Floats, Ints
 from zfcal.errors import InputError
-from zfcal.readers.options import ImportOptions
+from zfcal.readers.options import Idle, ImportOptions, without_confidence
 from zfcal.readers.raw import Rows
 from zfcal.tracks import FISH, KINDS, ROBOT, Tracks
 from zfcal.units import M_PER_CM, M_PER_MM
@@ -49,11 +49,14 @@ class Imported:
         A sentence each: columns left out, missing positions, agents renamed.
     warnings
         A sentence each: what was taken without the file being sure of it.
+    idle
+        Given options that take no effect in this file.
     """
 
     tracks: Tracks
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+    idle: Idle = field(default_factory=dict)
 
 
 def assemble(path: Path, rows: Rows, options: ImportOptions) -> Imported:
@@ -75,7 +78,7 @@ def assemble(path: Path, rows: Rows, options: ImportOptions) -> Imported:
         no tank can span, infinite values, an agent twice in a frame, or more
         agents at once than the trial has.
     """
-    scale_m = _scale(path, rows.unit, options)
+    scale_m = scale_of(path, rows.unit, options)
     kind, kind_notes = _kinds(path, rows, options)
     keep, notes = _present(path, rows, options)
     x_m, y_m, heading_rad = _place(rows, scale_m, options)
@@ -94,11 +97,21 @@ def assemble(path: Path, rows: Rows, options: ImportOptions) -> Imported:
     _check_extent(path, tracks, rows.unit, scale_m)
     _check_once(path, tracks)
     _check_counts(path, tracks, options)
-    return Imported(tracks=tracks, notes=(*rows.notes, *kind_notes, *notes, *_axes(rows, options)))
+    return Imported(
+        tracks=tracks,
+        notes=(*rows.notes, *kind_notes, *notes, *_axes(rows, options)),
+        idle={**rows.idle, **_idle(path, rows, options)},
+    )
 
 
-def _scale(path: Path, unit: str, options: ImportOptions) -> float:
-    """Return metres per unit of the file."""
+def scale_of(path: Path, unit: str, options: ImportOptions) -> float:
+    """Return metres per unit of the file.
+
+    Raises
+    ------
+    InputError
+        No scale for pixels, or one for a unit of length.
+    """
     if unit == "px":
         if options.m_per_px is None:
             raise InputError(
@@ -186,6 +199,12 @@ def _confidence(rows: Rows) -> Floats:
     if rows.confidence is None:
         return np.ones(len(rows.frame))
     return np.where(np.isnan(rows.confidence), 1.0, rows.confidence)
+
+
+def _idle(path: Path, rows: Rows, options: ImportOptions) -> Idle:
+    if rows.confidence is not None and not np.isnan(rows.confidence).all():
+        return {}
+    return without_confidence(path, options)
 
 
 def _place(rows: Rows, scale_m: float, options: ImportOptions) -> tuple[Floats, Floats, Floats]:

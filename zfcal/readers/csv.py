@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
 from zfcal.errors import InputError
-from zfcal.readers.assemble import EXTENT_LIMIT_M, Imported, assemble
+from zfcal.readers.assemble import EXTENT_LIMIT_M, Imported, assemble, scale_of
 from zfcal.readers.clock import check_rate
-from zfcal.readers.options import ImportOptions
+from zfcal.readers.options import Idle, ImportOptions, without_confidence
 from zfcal.readers.raw import Rows
 from zfcal.readers.text import (
     Layout,
@@ -74,12 +74,40 @@ def read_csv(path: Path, options: ImportOptions) -> Imported:
         names=names,
         y_down=unit == "px",
         notes=notes,
+        idle=_without_frames(path, table.layout.names, options),
     )
     return assemble(path, rows, options)
 
 
-def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str, ...]]:
-    """Return the known columns under our names, the unit, and what was passed over."""
+def check_csv(path: Path, options: ImportOptions) -> Idle:
+    """Look at the header of CSV tracks alone, and return the options that take no effect.
+
+    Raises
+    ------
+    InputError
+        A column is missing, or the scale does not go with the unit.
+    """
+    names, unit = _columns(path, options)
+    scale_of(path, unit, options)
+    idle = _without_frames(path, names, options)
+    return idle if "confidence" in names else {**idle, **without_confidence(path, options)}
+
+
+def _without_frames(path: Path, names: tuple[str, ...], options: ImportOptions) -> Idle:
+    """Return that ``first_frame``, if given, is idle in a file without frame numbers."""
+    if options.first_frame is None or "frame" in names:
+        return {}
+    problem = InputError(
+        f"{path}, line 1: first_frame = {options.first_frame} cannot take effect: expected a "
+        f"column 'frame', got {', '.join(names)}.",
+        hint="Leave --first-frame out: time_s says when each row is. Or name the column of frame "
+        "numbers: --columns frame=NAME",
+    )
+    return {"first_frame": problem}
+
+
+def _columns(path: Path, options: ImportOptions) -> tuple[tuple[str, ...], str]:
+    """Return the columns, the known ones under our names, and the unit of positions."""
     header = header_of(path, ",")
     names = _renamed(path, header, options)
     unit = "px" if {"x_px", "y_px"} <= set(names) else "m"
@@ -91,6 +119,12 @@ def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str
             f"{path}, line 1: expected columns {_EXPECTED}, got {', '.join(header)}.",
             hint="Rename them in the file, or here: --columns agent=id,x_px=pos_x",
         )
+    return names, unit
+
+
+def _read(path: Path, options: ImportOptions) -> tuple[TextTable, str, tuple[str, ...]]:
+    """Return the known columns under our names, the unit, and what was passed over."""
+    names, unit = _columns(path, options)
     other = "m" if unit == "px" else "px"
     wanted = set(_NUMERIC + _TEXT) - {f"x_{other}", f"y_{other}"}
     layout = Layout(

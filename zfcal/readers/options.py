@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Literal
+from pathlib import Path
+from typing import Literal, TypeAlias
 
 from zfcal.errors import InputError
 
 SPECIAL = frozenset({"columns", "keypoint", "body_axis", "box", "first_frame"})
 """Options that only some formats can make use of."""
+
+Idle: TypeAlias = Mapping[str, InputError]
+"""Given options that take no effect in a file, and what is said where they do in no other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +99,33 @@ def given(options: ImportOptions) -> frozenset[str]:
     """
     special = (field for field in fields(options) if field.name in SPECIAL)
     return frozenset(f.name for f in special if getattr(options, f.name) != f.default)
+
+
+def without_confidence(path: Path, options: ImportOptions) -> Idle:
+    """Return that ``min_confidence``, if given, is idle: the file states no confidence."""
+    least = options.min_confidence
+    if not least > 0:
+        return {}
+    problem = InputError(
+        f"{path}: min_confidence = {least:g} cannot take effect: expected a confidence for some "
+        "position, got none.",
+        hint="Leave --min-confidence out. Of a CSV whose column has another name: "
+        "--columns confidence=NAME",
+    )
+    return {"min_confidence": problem}
+
+
+def refuse_idle(*files: Idle) -> None:
+    """Refuse options that take effect in none of the files that are imported together.
+
+    Raises
+    ------
+    InputError
+        There is one.
+    """
+    for name in files[0]:
+        if all(name in idle for idle in files):
+            raise files[0][name]
 
 
 def _require(holds: bool, name: str, expected: str, got: object) -> None:  # noqa: FBT001

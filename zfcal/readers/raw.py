@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats, Ints
+from zfcal.readers.options import Idle
 from zfcal.tracks import KINDS
 
 _NAMED = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>\d+)")
@@ -41,6 +42,8 @@ class Rows:
         Whether the format is known to count y downwards.
     notes
         What a person should know of the file, a sentence each.
+    idle
+        Options of its format that take no effect in this file.
     """
 
     time_s: Floats
@@ -55,6 +58,7 @@ class Rows:
     names: Mapping[int, str] = field(default_factory=dict)
     y_down: bool = True
     notes: tuple[str, ...] = ()
+    idle: Idle = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,7 @@ from zfcal.errors import InputError
 from zfcal.readers.assemble import Imported, assemble
 from zfcal.readers.clock import check_declared, check_rate
 from zfcal.readers.extras import whole
-from zfcal.readers.options import ImportOptions
+from zfcal.readers.options import Idle, ImportOptions, without_confidence
 from zfcal.readers.raw import Rows
 from zfcal.readers.text import Layout, header_of, numbers, read_table
 from zfcal.tracks import FISH, KINDS, ROBOT
@@ -63,15 +63,32 @@ def read_trex(path: Path, options: ImportOptions) -> Imported:
         ``head``. With ``m_per_px`` the scale of TRex is replaced, where the file
         tells it.
     """
+    mark, files = _asked(path, options)
+    individuals = [_read(file, mark, number) for number, file in enumerate(files)]
+    parts = [_rows(individual, mark, options) for individual in individuals]
+    return assemble(path, _joined(parts), options)
+
+
+def check_trex(path: Path, options: ImportOptions) -> Idle:
+    """Look at the names of the files alone, and return the options that take no effect.
+
+    Raises
+    ------
+    InputError
+        A folder has no files of TRex or those of several videos, or no position is of such a part.
+    """
+    _asked(path, options)
+    return without_confidence(path, options)
+
+
+def _asked(path: Path, options: ImportOptions) -> tuple[str, list[Path]]:
+    """Return how the names of the columns are marked, and the files of the individuals."""
     source = options.keypoint or _CENTROID
     if source not in _SOURCES:
         raise InputError(
             f"{path}: TRex has no body part {source!r}, expected one of {', '.join(_SOURCES)}."
         )
-    files = _files(path) if path.is_dir() else [path]
-    individuals = [_read(file, _SOURCES[source], number) for number, file in enumerate(files)]
-    parts = [_rows(individual, _SOURCES[source], options) for individual in individuals]
-    return assemble(path, _joined(parts), options)
+    return _SOURCES[source], _files(path) if path.is_dir() else [path]
 
 
 def _files(folder: Path) -> list[Path]:

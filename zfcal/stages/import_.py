@@ -12,13 +12,29 @@ import numpy as np
 from zfcal.artifacts.lineage import JSON, Lineage
 from zfcal.artifacts.settings import read_trial
 from zfcal.errors import InputError
-from zfcal.readers import Imported, ImportOptions, guess_format, import_foreign
+from zfcal.readers import (
+    Imported,
+    ImportOptions,
+    check_part,
+    guess_format,
+    import_part,
+    refuse_idle,
+)
 from zfcal.stages.events import Note, Tell
 from zfcal.stages.making import run
-from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_of_recording
+from zfcal.stages.recording import (
+    TRACKS,
+    Recording,
+    check_same_source,
+    hash_sources,
+    named_sources,
+    segmented,
+    starts_of_recording,
+)
 from zfcal.stages.stage import Item, OneThing, Run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks, concatenate
+from zfcal.trial import Trial
 
 _LIMITS = {"n_fish", "n_robots"}
 """Options that come from trial.toml and change no number."""
@@ -81,9 +97,10 @@ def import_tracks(root: Path, source: Source, tell: Tell, *, task: Task | None =
 def _recording(run: Run, source: Source, name: str) -> Item:
     opened = open_trial(run.root)
     options = _options(opened, source.options)
+    _check(run, opened.trial, _parts(source, options), name)
 
     def record() -> Recording:
-        tracks = _read(source, name, options, run.tell)
+        tracks = _read(_parts(source, options), name, run.tell)
         _tell_outside(opened, tracks, run.tell)
         _tell_missing(opened, tracks, run.tell)
         return Recording(
@@ -93,7 +110,24 @@ def _recording(run: Run, source: Source, name: str) -> Item:
         )
 
     lineage = _lineage(opened, source, name, options)
-    return segmented(run, opened.trial, lineage, starts_of_recording(run.root), record)
+    return segmented(run, lineage, starts_of_recording(run.root), record)
+
+
+def _parts(source: Source, options: ImportOptions) -> list[tuple[Path, ImportOptions]]:
+    """Return the files that are imported together, and how each is read."""
+    parts = [(source.path, options)]
+    if source.robot_tracks is not None:
+        # Everybody in that file is a robot, whatever the file calls it.
+        alone = dataclasses.replace(options, n_fish=options.n_robots, robots=())
+        parts.append((source.robot_tracks, alone))
+    return parts
+
+
+def _check(run: Run, trial: Trial, parts: list[tuple[Path, ImportOptions]], name: str) -> None:
+    """Refuse what is seen to be wrong at once: hashing a recording may take minutes."""
+    refuse_idle(*(check_part(path, name, options) for path, options in parts))
+    sources = [each for path, _ in parts for each in named_sources(run.root, path)]
+    check_same_source(trial, run.command, sources=sources, task=run.task)
 
 
 def _guessed(path: Path, tell: Tell) -> str:
@@ -138,25 +172,25 @@ def _lineage(opened: OpenTrial, source: Source, name: str, options: ImportOption
     )
 
 
-def _read(source: Source, name: str, options: ImportOptions, tell: Tell) -> Tracks:
-    found = import_foreign(source.path, name, options)
-    for note in found.notes:
-        tell(Note(text=f"{source.path}: {note}"))
-    _tell_warnings(source.path, found, tell)
-    if source.robot_tracks is None:
-        return found.tracks
-    # Everybody in that file is a robot, whatever the file calls it.
-    alone = dataclasses.replace(options, n_fish=options.n_robots, robots=())
-    others = import_foreign(source.robot_tracks, name, alone)
-    _tell_warnings(source.robot_tracks, others, tell)
-    robots = others.tracks
-    shift = int(found.tracks.agent.max()) + 1 - int(robots.agent.min())
-    robots = dataclasses.replace(
-        robots,
-        agent=(robots.agent + shift).astype(np.int32),
-        kind=np.full(len(robots), ROBOT, dtype=np.int8),
+def _read(parts: list[tuple[Path, ImportOptions]], name: str, tell: Tell) -> Tracks:
+    found = [import_part(path, name, options) for path, options in parts]
+    refuse_idle(*(each.idle for each in found))
+    for note in found[0].notes:
+        tell(Note(text=f"{parts[0][0]}: {note}"))
+    for (path, _), each in zip(parts, found, strict=True):
+        _tell_warnings(path, each, tell)
+    first, *others = (each.tracks for each in found)
+    return concatenate([first, *(_as_robots(tracks, beside=first) for tracks in others)])
+
+
+def _as_robots(tracks: Tracks, *, beside: Tracks) -> Tracks:
+    """Return tracks of robots alone, under ids that nobody else has."""
+    shift = int(beside.agent.max()) + 1 - int(tracks.agent.min())
+    return dataclasses.replace(
+        tracks,
+        agent=(tracks.agent + shift).astype(np.int32),
+        kind=np.full(len(tracks), ROBOT, dtype=np.int8),
     )
-    return concatenate([found.tracks, robots])
 
 
 def _tell_warnings(path: Path, found: Imported, tell: Tell) -> None:

@@ -31,6 +31,9 @@ STRETCH_KEY = "recording_s"
 _LONGEST_S = 1e7
 """No recording goes on for so long, about 4 months."""
 
+_MOST_NAMED = 3
+"""Files that a message names: a folder of images has a million."""
+
 _SLACK_S = 1e-6
 """A time this little before a segment's start is the start, but for rounding."""
 
@@ -54,8 +57,8 @@ class Recording:
     extra: Mapping[str, JSON] = field(default_factory=dict)
 
 
-def hash_sources(root: Path, path: Path) -> dict[str, str]:
-    """Return how a source is recorded: the hash of each of its files, by name.
+def named_sources(root: Path, path: Path) -> dict[str, Path]:
+    """Return the files of a source by the names under which they are recorded.
 
     A name is the path relative to the trial, or begins with the bare name of a
     source outside it: where it lay on somebody's disk does not bear on the result.
@@ -69,17 +72,35 @@ def hash_sources(root: Path, path: Path) -> dict[str, str]:
     """
     files = sorted(part for part in path.rglob("*") if part.is_file()) if path.is_dir() else [path]
     outside = relative_to(root, path).startswith("..")
+    return {
+        part.relative_to(path.parent).as_posix() if outside else relative_to(root, part): part
+        for part in files
+    }
+
+
+def hash_sources(root: Path, path: Path) -> dict[str, str]:
+    """Return how a source is recorded: the hash of each of its files, by `named_sources`."""
     found = {}
-    for part in files:
+    for name, part in named_sources(root, path).items():
         # Readers of films and of other programs' tracks open it by its name.
         hold_steady(part)
-        name = part.relative_to(path.parent).as_posix() if outside else relative_to(root, part)
         found[name] = hash_of(part)
     return found
 
 
-def check_same_source(trial: Trial, lineage: Lineage, task: Task) -> None:
+def check_same_source(trial: Trial, command: str, *, sources: Collection[str], task: Task) -> None:
     """Refuse to replace tracks that came from somewhere else.
+
+    Parameters
+    ----------
+    trial
+        Whose tracks are to be written.
+    command
+        By which command.
+    sources
+        The names of its inputs, as lineage states them.
+    task
+        A forced one replaces all.
 
     Raises
     ------
@@ -96,15 +117,22 @@ def check_same_source(trial: Trial, lineage: Lineage, task: Task) -> None:
         except (DamagedError, InputError):
             # It says not where it comes from: it is replaced as stale.
             continue
-        same = found.command == lineage.command and set(found.inputs) == set(lineage.inputs)
-        if not (same or (found.command == lineage.command == "simulate")):
-            names = ", ".join(found.inputs) or "no file"
+        same = found.command == command and set(found.inputs) == set(sources)
+        if not (same or (found.command == command == "simulate")):
             raise InputError(
-                f"{path}: comes from {found.command} of {names}, expected none or "
-                f"{', '.join(lineage.inputs)}.",
+                f"{path}: comes from {found.command} of {_few(found.inputs, beside=sources)}, "
+                f"expected none or {_few(sources, beside=found.inputs)}.",
                 hint="One trial holds one recording: make another trial, or replace these "
                 "tracks with --force.",
             )
+
+
+def _few(names: Collection[str], *, beside: Collection[str]) -> str:
+    """Return some of the names, those first that others do not have, and how many more."""
+    known = set(beside)
+    listed = ", ".join(sorted(names, key=lambda name: name in known)[:_MOST_NAMED])
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return f"{listed or 'no file'}{more}"
 
 
 def starts_of_recording(root: Path) -> list[int]:
@@ -172,27 +200,21 @@ def starts_between(first_s: float, end_s: float) -> list[int]:
 
 
 def segmented(
-    run: Run, trial: Trial, lineage: Lineage, starts: list[int], record: Callable[[], Recording]
+    run: Run, lineage: Lineage, starts: list[int], record: Callable[[], Recording]
 ) -> Item:
     """Return the segments of a recording, of which those missing or stale are written.
 
     Parameters
     ----------
-    run, trial
-        On which trial.
+    run
+        On which trial, whose segments come from the same source: see `check_same_source`.
     lineage
         Of every segment.
     starts
         The seconds at which the segments start; empty where only the recording tells.
     record
         Returns the whole recording.
-
-    Raises
-    ------
-    InputError
-        The trial holds tracks of another source, and the task is not forced.
     """
-    check_same_source(trial, lineage, run.task)
     # To remove those that the recording does not reach any more is a reason as well.
     others = set(segment_starts(run.root)) - set(starts)
     outputs = [

@@ -21,7 +21,14 @@ from zfcal.model.simulate import simulate_tracks
 from zfcal.stages.events import Planned, Tell
 from zfcal.stages.init import NewTrial, create_trial
 from zfcal.stages.making import run
-from zfcal.stages.recording import TRACKS, Recording, hash_sources, segmented, starts_between
+from zfcal.stages.recording import (
+    TRACKS,
+    Recording,
+    check_same_source,
+    hash_sources,
+    segmented,
+    starts_between,
+)
 from zfcal.stages.stage import Item, OneThing, Run
 from zfcal.stages.trial_context import OpenTrial, Task, open_trial
 from zfcal.tracks import FISH, ROBOT, Tracks
@@ -104,8 +111,9 @@ def _simulation(run: Run, options: SimulateOptions, *, is_new: bool) -> Item:
     def record() -> Recording:
         return Recording(tracks=swim(opened, options), end_s=options.duration_s)
 
-    starts = starts_between(0.0, options.duration_s)
-    return segmented(run, opened.trial, _lineage(opened, options), starts, record)
+    starts, lineage = starts_between(0.0, options.duration_s), _lineage(opened, options)
+    check_same_source(opened.trial, lineage.command, sources=lineage.inputs, task=run.task)
+    return segmented(run, lineage, starts, record)
 
 
 def new_trial(root: Path, options: SimulateOptions) -> NewTrial:

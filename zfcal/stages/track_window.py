@@ -17,7 +17,7 @@ from zfcal.artifacts.tables import read_extra, read_tracks
 from zfcal.errors import DamagedError, InputError
 from zfcal.sampling import sample_range
 from zfcal.stages.events import LeftOut, Tell
-from zfcal.stages.segments import STEP_S, segment_files
+from zfcal.stages.segments import STEP_S, readable, segment_files
 from zfcal.stages.trial_context import OpenTrial
 from zfcal.tracks import Samples, Tracks, concatenate, joined
 
@@ -38,9 +38,11 @@ class Stretch:
     samples
         The same on the model's clock.
     files
-        The segments that the stretch touches, damaged ones as well.
+        The segments that the stretch touches and that can be opened, damaged ones as well.
+    n_segments
+        How many the stretch touches, whatever they turned out to be.
     n_left_out
-        How many of them could not be read.
+        How many of those could not be read.
     noise_m
         Position noise as the segments state it, in metres; None where none does.
     """
@@ -48,6 +50,7 @@ class Stretch:
     tracks: Tracks
     samples: Samples
     files: tuple[Path, ...]
+    n_segments: int
     n_left_out: int
     noise_m: float | None
 
@@ -62,26 +65,27 @@ def read_stretch(opened: OpenTrial, window_s: tuple[int, int] | None, tell: Tell
     window_s
         From and to, in seconds since trial start; None for all.
     tell
-        Hears of each damaged segment, which is left out.
+        Hears of each segment that is damaged or no file, which is left out.
 
     Raises
     ------
     InputError
-        There are no tracks, all are damaged, or they were recorded at another rate.
+        There are no tracks, none can be read, or they were recorded at another rate.
     """
     root = opened.trial.root
-    files = segment_files(root, window_s)
-    if not files:
+    touched = segment_files(root, window_s)
+    if not touched:
         where = "" if window_s is None else f" from {window_s[0]} s to {window_s[1]} s"
         raise InputError(
             f"{root}: has no tracks{where}.",
             hint=f"Import them first: zfcal import SRC {root}",
         )
+    files = readable(touched, tell)
     found = [_read_or_tell(opened, path, tell) for path in files]
     read = [segment for segment in found if segment is not None]
     if not read:
         raise InputError(
-            f"{root}: none of {len(files)} segments of tracks can be read.",
+            f"{root}: none of {len(touched)} segments of tracks can be read.",
             hint="Import the recording again.",
         )
     tracks = concatenate([rows for _, rows, _ in read])
@@ -91,7 +95,8 @@ def read_stretch(opened: OpenTrial, window_s: tuple[int, int] | None, tell: Tell
         tracks=tracks,
         samples=joined((samples for _, _, samples in read), first=first, stop=stop),
         files=tuple(files),
-        n_left_out=len(files) - len(read),
+        n_segments=len(touched),
+        n_left_out=len(touched) - len(read),
         noise_m=noise_of([path for path, _, _ in read]),
     )
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 
 import numpy as np
 import pytest
@@ -252,6 +253,35 @@ def test_a_damaged_segment_is_left_out_and_noted(make_trial, asked, heard):
     heard.clear()
     diagnose(root, DiagnoseOptions(), heard.append)
     assert len(of_type(heard, LeftOut)) == len(of_type(heard, UpToDate)) == 1
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "huge"])
+def test_what_is_no_segment_is_left_out_and_no_input(make_trial, asked, heard, kind):
+    """It is told each time; once the segment is back the findings are made anew."""
+    root = make_trial(seconds=240)
+    path = root / "tracks" / "000060.parquet"
+    path.rename(root / "away")
+    makes = {
+        "folder": path.mkdir,
+        "pipe": lambda: os.mkfifo(path),
+        "huge": lambda: (path.touch(), os.truncate(path, 600 * 10**6)),
+    }
+    makes[kind]()
+    found = diagnose(root, DiagnoseOptions(), heard.append)
+    (told,) = of_type(heard, LeftOut)
+    assert told.damaged
+    assert "tracks/000060.parquet" in told.problem
+    assert "tracks/000060.parquet" not in read_lineage(found).inputs
+    notes = {note["name"]: note for note in read_json(found)["notes"]}
+    assert notes["left-out"]["values"] == {"left_out": 1.0, "segments": 4.0}
+    heard.clear()
+    diagnose(root, DiagnoseOptions(), heard.append)
+    assert len(of_type(heard, LeftOut)) == len(of_type(heard, UpToDate)) == 1
+    (path.rmdir if kind == "folder" else path.unlink)()
+    (root / "away").rename(path)
+    diagnose(root, DiagnoseOptions(), heard.append)
+    assert [e.reason for e in of_type(heard, Made)][-1] == "input tracks/000060.parquet is new"
+    assert "left-out" not in {note["name"] for note in read_json(found)["notes"]}
 
 
 def test_a_segment_of_another_minute_is_left_out(make_trial, asked, heard):

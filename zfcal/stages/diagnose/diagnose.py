@@ -279,7 +279,7 @@ def _estimate(case: Case, stretch: Stretch, stated_m: float | None, source: str)
 def _document(case: Case, stretch: Stretch, diagnosis: Diagnosis) -> dict[str, Any]:
     document = findings_document(diagnosis, case.opened.arena)
     if stretch.n_left_out:
-        n = len(stretch.files)
+        n = stretch.n_segments
         says = f"{stretch.n_left_out} of {n} segments of tracks were damaged and left out."
         values = {"left_out": float(stretch.n_left_out), "segments": float(n)}
         document["notes"].append({"name": "left-out", "says": says, "values": values})

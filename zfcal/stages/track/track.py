@@ -52,7 +52,7 @@ def track(root: Path, options: TrackOptions, tell: Tell, *, task: Task | None = 
             # What drives a camera is read once, at its start: an image never comes again.
             with one_content(seen) as seen:
                 tracks = plan.lineage()
-            check_same_source(plan.opened.trial, tracks, task)
+            _check_same_source(plan, tracks, task)
             _follow_live(plan, (tracks, seen), tell, task=task)
             return
         settled(lambda: _track(root, options, tell, task=task), tell)
@@ -62,7 +62,7 @@ def _track(root: Path, options: TrackOptions, tell: Tell, *, task: Task) -> None
     plan = plan_of(open_trial(root), options)
     tracks = plan.lineage()
     poses = dataclasses.replace(tracks, schema=POSES)
-    check_same_source(plan.opened.trial, tracks, task)
+    _check_same_source(plan, tracks, task)
     origins = Origins(tracks=tracks, poses=poses, is_live=False)
     if _is_done(plan, origins, tell, task=task):
         return
@@ -70,6 +70,10 @@ def _track(root: Path, options: TrackOptions, tell: Tell, *, task: Task) -> None
         _tell_plan(plan, origins, tell, task=task)
         return
     Following(plan, origins, tell, task=task).run()
+
+
+def _check_same_source(plan: Plan, tracks: Lineage, task: Task) -> None:
+    check_same_source(plan.opened.trial, tracks.command, sources=tracks.inputs, task=task)
 
 
 def _is_done(plan: Plan, origins: Origins, tell: Tell, *, task: Task) -> bool:
