@@ -82,7 +82,7 @@ def _lags(soon, half):
 @pytest.fixture
 def seen():
     """Return what six steps of fish saw of two fish and a robot, all at random."""
-    rng, n, others = np.random.default_rng(3), 6, 3
+    rng, speeds, n, others = np.random.default_rng(3), np.random.default_rng(4), 6, 3
 
     def ways(*shape):
         angle = rng.uniform(-np.pi, np.pi, shape)
@@ -107,6 +107,10 @@ def seen():
         off_axis_rad=rng.uniform(0, np.pi, (n, others)),
         speed_m_s=rng.uniform(0, 0.2, (n, others)),
         lately_m_s=rng.uniform(0, 0.2, (n, others)),
+        mean_speeds_m_s={
+            over_s: (speeds.uniform(0, 0.2, (n, others)), speeds.uniform(0, 0.1, n))
+            for over_s in (0.2, 0.6, 1.0, 2.0)
+        }.__getitem__,
         heading=ways(n, others),
         course=0.05 * ways(n, others),
         here=np.ones((n, others), dtype=bool),

@@ -604,6 +604,79 @@ def test_the_fastest_over_two_seconds_is_one_fish(arena, seen):
     np.testing.assert_array_equal(weights[..., 0], np.tile([2.0, 0.0, 0.0], (N, 1)))
 
 
+def test_the_fastest_over_some_time_is_in_view_and_near(seen):
+    """By the mean of that time; not who is hidden or far, nor a slower one where that is asked."""
+    some = dataclasses.replace(
+        seen,
+        mean_speeds_m_s={
+            0.6: (np.tile([0.1, 0.2, 0.3], (N, 1)), np.linspace(0.02, 0.12, N)),
+            2.0: (np.tile([0.3, 0.2, 0.1], (N, 1)), np.zeros(N)),
+        }.__getitem__,
+        in_sight=np.tile([True, True, False], (N, 1)),
+        distance_m=np.tile([0.05, 0.2, 0.05], (N, 1)),
+    )
+    for over_s, within_m, expected in ((0.6, 0.3, 1), (0.6, 0.1, 0), (2.0, 0.3, 0)):
+        chosen = some.fastest(over_s, within_m, if_faster=False)[..., 0]
+        np.testing.assert_array_equal(chosen, np.tile(np.arange(OTHERS) == expected, (N, 1)))
+    faster = some.fastest(0.6, 0.1, if_faster=True)[..., 0]
+    np.testing.assert_array_equal(faster[:, 0], np.linspace(0.02, 0.12, N) < 0.1)
+    assert not faster[:, 1:].any()
+
+
+def test_each_sort_of_the_fastest_is_asked_over_each_time(arena, seen):
+    """And what is asked is the one of its label."""
+    sorts = [
+        each
+        for each in find_effect("leader-following").features(arena)
+        if isinstance(each, OneOf) and each.kind.endswith("over some time")
+    ]
+    assert sorted(len(each.features) for each in sorts) == [8, 24]
+    for feature in sorts[0].features + sorts[1].features:
+        over_s, within_m = (
+            float(part)
+            for part in feature.label.split(" of ")[1].split(" m")[0].split(" s within ")
+        )
+        chosen = seen.fastest(over_s, within_m, if_faster="if it was" in feature.label)
+        own = seen.attention[..., None] if feature.label.startswith("heeding") else 1.0
+        np.testing.assert_array_equal(feature.weights(seen), own * chosen)
+
+
+def test_steps_end_nearer_by_how_long_they_are(arena, seen):
+    """A tenth of a metre a second counts as one; by how far others are: near or not."""
+    near, far = ({"distance_m": np.full((N, OTHERS), away)} for away in (0.01, 0.4))
+    fast = {"own_speed_m_s": np.full(N, 0.2)}
+    asked = labelled("group-cohesion", "ending nearer to each", arena)
+    for some, weight in ((near, 0), (far, 1)):
+        vectors = asked.vectors(dataclasses.replace(seen, **some, **fast))
+        np.testing.assert_allclose(vectors[:, weight], 2 * seen.bearing.sum(axis=1))
+        assert not vectors[:, 1 - weight].any()
+    one = labelled("group-cohesion", "ending nearer to the nearest", arena)
+    vectors = one.vectors(dataclasses.replace(seen, **fast)).sum(axis=1)
+    nearest = seen.distance_m.argmin(axis=1)
+    np.testing.assert_allclose(vectors, 2 * seen.bearing[np.arange(N), nearest])
+    middle = labelled("group-cohesion", "ending nearer to the middle", arena)
+    vectors = middle.vectors(dataclasses.replace(seen, **fast)).sum(axis=1)
+    mean = (seen.distance_m[..., None] * seen.bearing).mean(axis=1)
+    np.testing.assert_allclose(vectors, 2 * mean / np.linalg.norm(mean, axis=1, keepdims=True))
+
+
+def test_slow_steps_may_turn_back_and_fast_ones_aside(arena, seen):
+    """A component about the way back by speed, and an axis by what speed has beside its mean."""
+    back = labelled("speed-turn-coupling", "turning back, by speed", arena)
+    np.testing.assert_array_equal(back.toward(seen)[:, 0], -seen.own_heading)
+    slow = dataclasses.replace(seen, own_speed_m_s=np.zeros(N))
+    np.testing.assert_array_equal(back.weights(slow)[:, 0, 0], np.ones(N))
+    assert back.over is not None
+    aside = labelled("speed-turn-coupling", "straight or aside, by speed", arena)
+    assert aside.axial
+    assert not aside.vectors(slow).any()
+    x, y = seen.own_heading.T
+    doubled = np.stack([x * x - y * y, 2 * x * y], axis=1)
+    by = hats(seen.own_speed_m_s, (0.0, 0.05, 0.1, 0.15, 0.2))
+    expected = (by - by.mean(axis=0))[:, 1:, None] * doubled[:, None]
+    np.testing.assert_allclose(aside.vectors(seen), expected)
+
+
 def test_the_foremost_is_the_one_most_straight_ahead(arena, seen):
     """Nobody beside or behind is; its heading counts by its distance."""
     some = dataclasses.replace(
@@ -732,6 +805,7 @@ def test_who_is_alone_has_no_features_of_others(arena, seen):
         heading=seen.heading[:, :0],
         in_sight=seen.in_sight[:, :0],
         other=seen.other[:, :0],
+        mean_speeds_m_s=lambda _over_s: (np.zeros((N, 0)), np.zeros(N)),
     )
     assert none.nearest.shape == (N, 0, 1)
     for each in find_effect("leader-following").features(arena):

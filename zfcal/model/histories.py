@@ -30,14 +30,25 @@ _WIDE_RAD = 1.2
 
 def lately(states: Floats, dt_s: float) -> Floats:
     """Return the mean speed over two seconds up to each sample, since who is there came."""
-    speed, present = states[:, SPEED], states[:, ZONE] > 0
-    total, count = np.zeros_like(speed), np.zeros_like(speed)
-    for ago in range(min(len(speed), max(1, round(_LATELY_S / dt_s)))):
-        present = present.copy()
-        present[ago:] &= states[: len(speed) - ago, ZONE] > 0
-        present[:ago] = False
+    return mean_speed(states[:, SPEED], states[:, ZONE] > 0, _LATELY_S / dt_s)
+
+
+def mean_speed(speed: Floats, present: NDArray[np.bool_], n_steps: float) -> Floats:
+    """Return the mean speed over some steps up to each sample, since who is there came.
+
+    Parameters
+    ----------
+    speed, present : ndarray, shape (sample, agent)
+    n_steps
+        Rounded; at least one.
+    """
+    since, total, count = present, np.zeros_like(speed), np.zeros_like(speed)
+    for ago in range(min(len(speed), max(1, round(n_steps)))):
+        since = since.copy()
+        since[ago:] &= present[: len(speed) - ago]
+        since[:ago] = False
         then = np.roll(speed, ago, axis=0)
-        known = present & np.isfinite(then) & (then >= 0)
+        known = since & np.isfinite(then) & (then >= 0)
         total += np.where(known, then, 0.0)
         count += known
     return np.asarray(total / np.maximum(count, 1))

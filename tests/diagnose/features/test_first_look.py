@@ -81,6 +81,20 @@ def test_it_sees_what_is_there(base, fits):
     assert looked[best] > 20
 
 
+def test_what_was_looked_for_is_not_looked_for_again(base, fits, monkeypatch):
+    """Nor a part of it; more than that is."""
+    drift = next(effect for effect in all_effects() if effect.name == "directional-drift")
+    choice = next(each for each in drift.features(base[0].arena) if isinstance(each, OneOf))
+    both = fits.most_promising(choice)
+    with monkeypatch.context() as patch:
+        patch.setattr(FirstLook, "nats", None)
+        assert fits.most_promising(choice) == both
+        assert fits.most_promising(choice, 1) == both[:1]
+        with pytest.raises(TypeError):
+            fits.most_promising(choice, 3)
+    assert fits.most_promising(choice, 3)[:2] == both
+
+
 def towards(angle_rad):
     """Return a leaning to a direction of the tank, as strong everywhere."""
     way = np.array([np.cos(angle_rad), np.sin(angle_rad)])

@@ -198,6 +198,20 @@ def test_what_all_walls_have_in_common_is_no_place(bodies):
 
 
 @pytest.mark.slow
+def test_beside_walls_all_but_landings_is_kept(banded):
+    """What else was fitted is not fitted once more, and landings are as if they had been asked."""
+    fits = Fits(law=banded)
+    beside, anew = fits.beside_walls, Fits(law=banded, off_walls=True)
+    assert beside._null is fits._null
+    assert beside._own is fits._own
+    spot = find_effect("place-preference").features(banded.scene.arena)[-1].features[0]
+    np.testing.assert_array_equal(
+        beside.gain("place-preference", spot).log_p, anew.gain("place-preference", spot).log_p
+    )
+    assert fits.beside_walls is beside
+
+
+@pytest.mark.slow
 def test_bodies_that_keep_off_walls_have_no_landing_named(bodies):
     """All landings are asked beside what all walls have in common, where one stands out."""
     told = tell(gains_of(bodies, all_effects()))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from zfcal.model.histories import in_open, lately, stayed
+from zfcal.model.histories import in_open, lately, mean_speed, stayed
 from zfcal.model.kernels.state import FOLLOWS, ROOM, SPEED, ZONE
 
 
@@ -25,6 +25,14 @@ def test_it_is_the_mean_of_two_seconds():
     states[:, SPEED, 0] = [1.0, 2.0, 3.0, 4.0, 5.0, np.nan]
     found = lately(states, 0.5)[:, 0]
     assert found == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.5, 4.0])
+
+
+def test_it_may_be_the_mean_of_other_times():
+    """Two steps; of one step what that was, whatever share of a step is asked for."""
+    speed = np.array([1.0, 2.0, 4.0])[:, None]
+    there = np.ones((3, 1), dtype=bool)
+    assert mean_speed(speed, there, 2.2)[:, 0] == pytest.approx([1.0, 1.5, 3.0])
+    assert mean_speed(speed, there, 0.3)[:, 0] == pytest.approx([1.0, 2.0, 4.0])
 
 
 def rooms(*numbers):

@@ -232,6 +232,30 @@ def test_some_headings_can_be_drawn_to_the_fastest_within_reach(ask):
     assert asked.component()[0] == 0.0
 
 
+def test_some_headings_can_be_drawn_to_who_was_faster_lately(ask):
+    """The fastest in view and within reach, whatever its last step; nobody who was slower."""
+    rows = {
+        "X": [0.0, 0.1, 0.0, 0.3, -0.1], "Y": [0.0, 0.0, 0.05, 0.0, 0.0],
+        "SPEED": [0.1, 0.01, 0.2, 0.2, 0.2], "LATELY": [0.05, 0.1, 0.07, 0.2, 0.3],
+    }  # fmt: skip
+    given = {"strength": 1.0, "drawn": 1.0, "lately": 1.0, "reach_m": 0.2, "kappa": 6.0}
+    asked = ask("leader-following", given, **rows)
+    asked.sight[0, 4] = 0.0
+    weight, out = asked.component()
+    assert (weight, *out) == pytest.approx((0.1, 1.0, 0.0, 6.0))
+    assert asked.sight_of(1) == 1.0
+    asked = ask("leader-following", given, **{**rows, "LATELY": [0.4, 0.1, 0.07, 0.2, 0.3]})
+    assert asked.component()[0] == 0.0
+
+
+def test_who_was_the_fastest_lately_can_be_followed(ask):
+    """Whoever was the fastest at the last step."""
+    given = {"strength": 1.0, "fastest": 1.0, "lately": 1.0}
+    rows = {"SPEED": [0.1, 0.2, 0.1], "LATELY": [0.3, 0.1, 0.2]}
+    asked = ask("leader-following", given, **rows)
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
+
+
 def test_some_headings_can_be_drawn_to_one_fish(ask):
     """Whatever its speed; nobody is drawn to oneself."""
     rows = {"X": [0.0, 0.1, 0.0], "Y": [0.0, 0.0, 0.05], "SPEED": [0.3, 0.1, 0.05]}

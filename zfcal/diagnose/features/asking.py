@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -86,7 +86,7 @@ def gains_of(  # noqa: PLR0913 - the last ones have defaults
         some = [pair for pairs in found for pair in pairs if pair[1].n_strengths]
         hopeful = _hopeful([*nothing, *(gain for _, gain in some)])
         if any(isinstance(feature, Landing) and gain in hopeful for feature, gain in some):
-            some = _off_walls(fits, asked, some, fit_all=fit_all)
+            some = _off_walls(fits, asked, some, pool.map, fit_all=fit_all)
             hopeful = _hopeful([*nothing, *(gain for _, gain in some)])
         return nothing + list(pool.map(lambda pair: _refitted(fits, pair, hopeful), some))
 
@@ -95,17 +95,24 @@ def _off_walls(
     fits: Fits,
     asked: Sequence[tuple[str, Feature]],
     found: Sequence[tuple[Single, Gain]],
+    each: Callable[..., Iterable[list[tuple[Single, Gain]]]],
     *,
     fit_all: bool,
 ) -> list[tuple[Single, Gain]]:
     """Return what was found, landings fitted beside what all walls have in common.
 
     That takes as long as all landings together, so it is asked where one of them stands out.
+
+    Parameters
+    ----------
+    each
+        Maps a function over them.
     """
-    beside = replace(fits, off_walls=True)
+    beside = fits.beside_walls
     landings = [pair for pair in asked if _is_landing(pair[1])]
     others = [pair for pair in found if not isinstance(pair[0], Landing)]
-    return others + [pair for each in landings for pair in _gains(beside, *each, fit_all=fit_all)]
+    made = each(lambda pair: _gains(beside, *pair, fit_all=fit_all), landings)
+    return others + [pair for pairs in made for pair in pairs]
 
 
 def _is_landing(feature: Feature) -> bool:
@@ -139,14 +146,18 @@ def _refitted(fits: Fits, asked: tuple[Single, Gain], hopeful: Sequence[Gain]) -
 
 def best_feature(fits: Fits, effect: Effect) -> tuple[Single, Gain] | None:
     """Return the feature of an effect that gains most; None where none can be fitted."""
-    asked = _askable(fits.law, effect)
-    fits.prepare(asked)
-    found = [pair for each in asked for pair in _gains(fits, effect.name, each, fit_all=True)]
-    some = [pair for pair in found if pair[1].n_strengths]
-    best = max(some, key=lambda pair: pair[1].nats, default=None)
-    if best is not None and isinstance(best[0], Landing) and not fits.off_walls:
-        return best_feature(replace(fits, off_walls=True), effect)
+    asked = [(effect.name, feature) for feature in _askable(fits.law, effect)]
+    fits.prepare([feature for _, feature in asked])
+    found = [pair for each in asked for pair in _gains(fits, *each, fit_all=True)]
+    best = _most(found)
+    if best is not None and isinstance(best[0], Landing):
+        return _most(_off_walls(fits, asked, found, map, fit_all=True))
     return best
+
+
+def _most(found: Sequence[tuple[Single, Gain]]) -> tuple[Single, Gain] | None:
+    some = [pair for pair in found if pair[1].n_strengths]
+    return max(some, key=lambda pair: pair[1].nats, default=None)
 
 
 def _askable(law: Law, effect: Effect) -> list[Feature]:

@@ -55,7 +55,8 @@ def curve_of(
         return None
     feature, gain = found
     made = FeatureCurve(label=feature.label, nats=gain.nats, form_nats=nats)
-    fits = replace(fits, off_walls=isinstance(feature, Landing))
+    if isinstance(feature, Landing):
+        fits = fits.beside_walls
     fit = fits.fit(feature)
     along = feature.along or along_under(feature.label, _n_own(fits, feature, fit))
     if along is None:

@@ -23,6 +23,7 @@ from zfcal.model.histories import (
     courses,
     in_open,
     lately,
+    mean_speed,
     recent_turn,
     stayed,
     straight,
@@ -303,6 +304,12 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
         head_late(places, at, turns.who, steps, REPULSION_M, True, toward, made)
         return np.asarray(made[rows, others])
 
+    who, dt_s = turns.who, steps.scene.dt_s
+
+    def mean_speeds(over_s: float) -> tuple[Floats, Floats]:
+        mean = mean_speed(places[:, SPEED], places[:, ZONE] > 0, over_s / dt_s)
+        return mean[at[:, None], others], mean[at, who]
+
     cross = heading[:, None, 0] * bearing[..., 1] - heading[:, None, 1] * bearing[..., 0]
     dot = (heading[:, None] * bearing).sum(axis=-1)
     past = own[:, [PAST_HX, PAST_HY]]
@@ -324,6 +331,7 @@ def _seen_as_drawn(steps: Steps, states: Floats, heading: Floats) -> Seen:
         off_axis_rad=np.abs(np.arctan2(cross, dot)),
         speed_m_s=theirs(SPEED, at),
         lately_m_s=lately(states, steps.scene.dt_s)[at[:, None], others],
+        mean_speeds_m_s=mean_speeds,
         heading=np.stack([theirs(HX, at), theirs(HY, at)], axis=-1) * present,
         course=courses(states, steps.scene.dt_s)[at[:, None], others] * present,
         here=here,

@@ -217,6 +217,14 @@ class Fits:
         made = Landings(law=self.law)
         return made.beyond_walls() if self.off_walls else made
 
+    @cached_property
+    def beside_walls(self) -> Fits:
+        """These, but that landings are beside what all walls have in common."""
+        made = replace(self, off_walls=True)
+        kept = ("_own", "_null", "_at_null", "_untilted")
+        made.__dict__.update({name: getattr(self, name) for name in kept})
+        return made
+
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:
         """Return what a tilt adds with the base's parameters fitted once more beside it."""
         bent = leaned(self.law, feature, self.tilt(feature).factor)
@@ -226,6 +234,18 @@ class Fits:
 
     def most_promising(self, choice: OneOf, n: int = _FITTED) -> list[Single]:
         """Return the features that a first look says most of, more than their strengths cost."""
+        sought, found = self._promising.get(choice, (0, []))
+        if sought < n:
+            found = self._looked_for(choice, n)
+            self._promising[choice] = n, found
+        return found[:n]
+
+    @cached_property
+    def _promising(self) -> dict[OneOf, tuple[int, list[Single]]]:
+        """These, and how many were asked for: who draws a curve asks again."""
+        return {}
+
+    def _looked_for(self, choice: OneOf, n: int) -> list[Single]:
         every = range(len(choice.features))
         looked_at: Sequence[int] = every
         if has_many(choice):

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.directions import lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import (
@@ -26,9 +25,12 @@ from zfcal.model.effects.forms import (
     turn_to,
 )
 from zfcal.model.effects.weights import (
+    NEARING,
     aside_of,
     every_step,
     halfway,
+    middle_by,
+    middle_of,
     only,
     seen_and_nearest,
     summed,
@@ -36,7 +38,7 @@ from zfcal.model.effects.weights import (
 )
 from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
 from zfcal.model.kernels.compiled import hook, inlined
-from zfcal.model.kernels.hats import hats, hats_where
+from zfcal.model.kernels.hats import hats_where
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.state import FOLLOWS, ZONE, X, Y
 
@@ -142,29 +144,6 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
-
-
-def _middle_of(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return the unit vector to the middle of some others, and how far it is.
-
-    Parameters
-    ----------
-    counts : ndarray of bool, shape (step, other)
-        Who is among them.
-    """
-    distance = np.where(seen.here & counts, seen.distance_m, 0.0)
-    total = np.einsum("sjd,sj->sd", seen.bearing, distance)
-    mean = total / np.maximum((seen.here & counts).sum(axis=1), 1)[:, None]
-    far = lengths(mean)
-    return mean / np.maximum(far, 1e-9)[:, None], far
-
-
-def _middle(seen: Seen) -> tuple[Floats, Floats]:
-    """Return the unit vector to the middle of all others, and hat functions of its distance."""
-    toward, far = _middle_of(seen, np.ones_like(seen.here))
-    return toward, hats(far, _KNOTS_M)
-
-
 _Some: TypeAlias = Callable[[Seen], NDArray[np.bool_]]
 
 _SOME: dict[str, _Some] = {
@@ -179,7 +158,7 @@ _SOME: dict[str, _Some] = {
 def _drawn_to(label: str, counts: _Some) -> Component:
     return Component(
         label=f"drawn to {label}",
-        toward=lambda seen: only(_middle_of(seen, counts(seen))[0]),
+        toward=lambda seen: only(middle_of(seen, counts(seen))[0]),
         weights=_alike,
         kappa=4.0,
     )
@@ -188,17 +167,17 @@ def _drawn_to(label: str, counts: _Some) -> Component:
 def _leaning_to(label: str, counts: _Some) -> Tilt:
     return Tilt(
         label=f"leaning to {label}",
-        vectors=lambda seen: only(_middle_of(seen, counts(seen))[0]),
+        vectors=lambda seen: only(middle_of(seen, counts(seen))[0]),
         low=0.0,
     )
 
 
 def _toward(seen: Seen) -> Floats:
-    return only(_middle(seen)[0])
+    return only(middle_by(seen, _KNOTS_M)[0])
 
 
 def _by_distance(seen: Seen) -> Floats:
-    return only(_middle(seen)[1])
+    return only(middle_by(seen, _KNOTS_M)[1])
 
 
 def _alike(seen: Seen) -> Floats:
@@ -206,11 +185,11 @@ def _alike(seen: Seen) -> Floats:
 
 
 def _to_middle(seen: Seen) -> Floats:
-    return only(_middle(seen)[0])
+    return only(middle_by(seen, _KNOTS_M)[0])
 
 
 def _leaning(seen: Seen) -> Floats:
-    toward, weights = _middle(seen)
+    toward, weights = middle_by(seen, _KNOTS_M)
     return np.asarray(weights[..., None] * toward[:, None])
 
 
@@ -227,7 +206,7 @@ def _of_nearest(seen: Seen) -> Floats:
 
 
 def _turning(seen: Seen, *, along_walls: bool = False) -> Floats:
-    toward, weights = _middle(seen)
+    toward, weights = middle_by(seen, _KNOTS_M)
     return np.asarray(aside_of(seen, toward[:, None], along_walls=along_walls) * weights)
 
 
@@ -275,6 +254,13 @@ _FEATURES: tuple[Feature, ...] = (
     Turned(
         label="turning to the nearest", by=_turning_to_nearest, neighbours=False, low=0.0,
         along=_TO_NEAREST,
+    ),
+    OneOf(
+        kind="ending nearer",
+        features=tuple(
+            Tilt(label=f"ending nearer to {whom}", vectors=vectors, low=0.0)
+            for whom, vectors in NEARING.items()
+        ),
     ),
     OneOf(kind="drawn to some", features=tuple(_drawn_to(*each) for each in _SOME.items())),
     OneOf(kind="leaning to some", features=tuple(_leaning_to(*each) for each in _SOME.items())),

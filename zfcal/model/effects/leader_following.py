@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, W
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, SIGHT
-from zfcal.model.kernels.state import HX, HY, SPEED, ZONE, X, Y
+from zfcal.model.kernels.state import HX, HY, LATELY, SPEED, ZONE, X, Y
 
 _PER_STRENGTH = 0.1
 
@@ -46,6 +48,17 @@ def fastest_in_view(state: Hooked, sight: Hooked, n: int, i: int) -> int:
     return found
 
 
+@inlined
+def faster_lately(state: Hooked, sight: Hooked, n: int, i: int, reach_m: float) -> int:
+    """Return the fastest in view and within reach, of those that lately were faster; or -1."""
+    found, most = -1, state[LATELY * n + i]
+    for j in range(n):
+        is_near = sight[i * n + j] > 0.0 and apart(state, n, i, j) < reach_m
+        if is_near and state[LATELY * n + j] > most:
+            found, most = j, state[LATELY * n + j]
+    return found
+
+
 @hook(COMPONENT)
 def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-def]
     """Add a component about the bearing of the fastest within reach, or in view.
@@ -56,7 +69,9 @@ def component(state, sight, n, i, parameters, out):  # type: ignore[no-untyped-d
         return 0.0
     k = int(parameters[2])
     if k < 0:
-        if parameters[1] > 0.0:
+        if parameters[7] > 0.0:
+            k = faster_lately(state, sight, n, i, parameters[4])
+        elif parameters[1] > 0.0:
             k = fastest_in_view(state, sight, n, i)
         else:
             k = fastest_within(state, n, i, parameters[4])
@@ -87,10 +102,11 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
     if parameters[2] >= 0.0:
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
-        if not state[SPEED * n + j] >= 0.0:  # Of unknown speed: it has just come into sight.
+        row = LATELY if parameters[7] > 0.0 else SPEED
+        if not state[row * n + j] >= 0.0:  # Of unknown speed: it has just come into sight.
             return 1.0
         for k in range(n):
-            if sight[i * n + k] > 0.0 and state[SPEED * n + k] > state[SPEED * n + j]:
+            if sight[i * n + k] > 0.0 and state[row * n + k] > state[row * n + j]:
                 return 1.0
         return math.exp(parameters[0])
     return math.exp(parameters[0] * quickness(state[SPEED * n + j]))
@@ -176,9 +192,37 @@ def _leaning_within(reach_m: float) -> Weights:
     return lambda seen: summed(_within(reach_m)(seen), seen.bearing)
 
 
+def _over_time(
+    label: str, reaches_m: Sequence[float], made: Callable[[str, Weights], Component]
+) -> OneOf:
+    """Return a feature of the fastest, by the time that its speed is taken over."""
+    return OneOf(
+        kind=f"{label}, over some time",
+        features=tuple(
+            made(
+                f"{label} {over_s:g} s within {reach_m:g} m" + ", if it was faster" * if_faster,
+                partial(Seen.fastest, over_s=over_s, within_m=reach_m, if_faster=if_faster),
+            )
+            for over_s in _OVER_S
+            for reach_m in reaches_m
+            for if_faster in (False, True)
+        ),
+    )
+
+
 _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
+_OVER_S = (0.2, 0.6, 1.0, 2.0)
+_IN_VIEW_M = (0.1, 0.25, 9.0)
 _REACH_M = (0.1, 0.2, 9.0)
 _FAST_M_S = (0.0, 0.07, 0.09, 0.11)
+
+
+def _attended(label: str, weights: Weights) -> Component:
+    return factor_on_attention(weights, label=label)
+
+
+def _drawn(label: str, weights: Weights) -> Component:
+    return Component(label=label, toward="bearing", weights=weights, kappa=8.0)
 
 
 def _near(seen: Seen) -> Floats:
@@ -236,6 +280,8 @@ _FEATURES: tuple[Feature, ...] = (
             for reach_m in _REACH_M
         ),
     ),
+    _over_time("heeding the fastest of", _IN_VIEW_M[-1:], _attended),
+    _over_time("drawn to the fastest of", _IN_VIEW_M, _drawn),
     OneOf(
         kind=_LEANING,
         features=tuple(
@@ -321,19 +367,29 @@ EFFECT = Effect(
             says="1: who is straight ahead and has the fish's own heading gets all of it, whatever "
             "its speed; others by the cosines of both angles, and none beyond a right angle.",
         ),
+        EffectParameter(
+            name="lately",
+            low=0.0,
+            high=1.0,
+            default=0.0,
+            says="1: who is the fastest goes by mean speeds that fade over two seconds; where some "
+            "are drawn, to the fastest in view within that distance, if faster than the fish.",
+        ),
     ),
     probe=0.01,
     component=component,
     sight=sight,
     further_shapes=lambda _arena: (
         {"fastest": 1.0},
+        {"fastest": 1.0, "lately": 1.0},
         {"same_way": 1.0},
         {"drawn": 1.0, "fastest": 1.0},
         *({"who": float(who)} for who in range(_MOST_LED)),
         *({"drawn": 1.0, "reach_m": reach_m} for reach_m in (0.1, 0.15, 0.2, 2.0)),
+        *({"drawn": 1.0, "lately": 1.0, "reach_m": reach_m} for reach_m in (0.1, 0.25, 2.0)),
         *({"drawn": 1.0, "who": float(who)} for who in range(_MOST_LED)),
     ),
-    fixed=("fastest", "who", "drawn", "reach_m", "kappa", "same_way"),
+    fixed=("fastest", "who", "drawn", "reach_m", "kappa", "same_way", "lately"),
     needs={"component": ("drawn",)},
     lacks=needs_neighbour,
     features=lambda _arena: _FEATURES,

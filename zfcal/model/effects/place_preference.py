@@ -25,7 +25,7 @@ from zfcal.model.kernels.hats import hats
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
 from zfcal.model.kernels.rooms import find_rooms
 from zfcal.model.kernels.state import DT_S, FOLLOWS, X, Y
-from zfcal.model.kernels.ways_to import write_ways_to
+from zfcal.model.kernels.ways_to import distances_to, write_ways_to
 from zfcal.model.places import places
 
 _AT_IT_M = 0.02
@@ -226,7 +226,7 @@ def _at_wall(wall: Floats) -> Landing:
 def _at_spot(spot: Floats) -> Landing:
     return Landing(
         label=f"landing at {spot[0]:.2f}, {spot[1]:.2f}",
-        away_m=lambda _seen, _rows, xy_m: lengths(xy_m - spot),
+        away_m=lambda _seen, _rows, xy_m: distances_to(xy_m, spot),
         knots_m=_SPOT_M,
         along=Along(cue="distance to the place (m)", knots=_SPOT_M[:-1]),
         forms=tuple(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zfcal.arrays import Floats
-from zfcal.model.directions import lengths
+from zfcal.model.directions import doubled, lengths
 from zfcal.model.effects.base import Effect, EffectParameter
 from zfcal.model.effects.circumstances import by_circumstances, each_under, paces_by
 from zfcal.model.effects.forms import SPEED_M_S, quickness, tilt
@@ -68,6 +68,11 @@ def _quicker(seen: Seen) -> Floats:
 def _by_speed(seen: Seen) -> Floats:
     """Return the own heading, weighed by what the step's speed has beside the mean of all steps."""
     return np.asarray(_quicker(seen)[..., None] * seen.own_heading[:, None])
+
+
+def _axis_by_speed(seen: Seen) -> Floats:
+    """Return that of twice the angle: steps straight on and straight back, against those aside."""
+    return np.asarray(_quicker(seen)[..., None] * doubled(seen.own_heading)[:, None])
 
 
 def _by_last_speed(seen: Seen) -> Floats:
@@ -139,8 +144,16 @@ _SCATTERED = 1.0
 """Concentration of headings that are hardly those of the fish."""
 
 
+_BACK = 3.0
+_BY_ITS_SPEED = Along(cue="speed of the step (m/s)", knots=_KNOTS_M_S)
+
+
 def _ahead(seen: Seen) -> Floats:
     return only(seen.own_heading)
+
+
+def _back(seen: Seen) -> Floats:
+    return only(-seen.own_heading)
 
 
 def _each_speed(seen: Seen) -> Floats:
@@ -168,9 +181,18 @@ _FEATURES: tuple[Feature, ...] = (
         toward=_ahead,
         weights=_each_speed,
         kappa=_SCATTERED,
-        along=Along(cue="speed of the step (m/s)", knots=_KNOTS_M_S),
+        along=_BY_ITS_SPEED,
         over=Component(label="scattered", toward=_ahead, weights=_alike, kappa=_SCATTERED),
     ),
+    Component(
+        label="turning back, by speed",
+        toward=_back,
+        weights=_each_speed,
+        kappa=_BACK,
+        along=_BY_ITS_SPEED,
+        over=Component(label="turning back", toward=_back, weights=_alike, kappa=_BACK),
+    ),
+    Tilt(label="straight or aside, by speed", vectors=_axis_by_speed, axial=True),
     Landing(
         label="landing aside",
         away_m=_aside_m,

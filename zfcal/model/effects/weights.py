@@ -13,13 +13,19 @@ from zfcal.arrays import Floats
 from zfcal.model.directions import in_tank, lengths
 from zfcal.model.effects.circumstances import each_fish, each_under
 from zfcal.model.features import MOST_SHARPER, Along, Component, Seen, Tilt, Turned, Weights
-from zfcal.model.kernels.hats import hats
+from zfcal.model.kernels.hats import hats, hats_where
 
 _LEAST = -0.98
 """The lowest strength of what a mixture has already: two hundredths of it are left."""
 
 _AGREEMENTS = (0.5, 0.7, 0.85, 1.0)
 """Lengths of the mean of headings from which several count as agreeing, up to all alike."""
+
+_NEARED_M = (0.05, 0.15)
+"""Between those that are near already, and those that may be neared."""
+
+_PER_M_S = 10.0
+"""A step at 0.1 m/s counts as one."""
 
 
 def aside_of(seen: Seen, toward: Floats, *, along_walls: bool = False) -> Floats:
@@ -255,3 +261,51 @@ def rooms_of(
     x, y = np.moveaxis(seen.xy_m[:, None] + seen.distance_m[..., None] * bearing, -1, 0)
     mine = np.stack([shapely.contains_xy(room, seen.xy_m) for room in rooms], axis=-1)
     return mine, np.stack([shapely.contains_xy(room, x, y) for room in rooms], axis=-1)
+
+
+def middle_of(seen: Seen, counts: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Return the unit vector to the middle of some others, and how far it is.
+
+    Parameters
+    ----------
+    counts : ndarray of bool, shape (step, other)
+        Who is among them.
+    """
+    distance = np.where(seen.here & counts, seen.distance_m, 0.0)
+    total = np.einsum("sjd,sj->sd", seen.bearing, distance)
+    mean = total / np.maximum((seen.here & counts).sum(axis=1), 1)[:, None]
+    far = lengths(mean)
+    return mean / np.maximum(far, 1e-9)[:, None], far
+
+
+def middle_by(seen: Seen, knots_m: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Return the unit vector to the middle of all others, and hat functions of its distance."""
+    toward, far = middle_of(seen, np.ones_like(seen.here))
+    return toward, hats(far, knots_m)
+
+
+def _nearing_middle(seen: Seen) -> Floats:
+    toward, weights = middle_by(seen, _NEARED_M)
+    return _by_reach(seen, weights[..., None] * toward[:, None])
+
+
+def _nearing_each(seen: Seen) -> Floats:
+    return _by_reach(seen, summed(hats_where(seen.here, seen.distance_m, _NEARED_M), seen.bearing))
+
+
+def _nearing_nearest(seen: Seen) -> Floats:
+    near = hats_where(seen.here, seen.distance_m, _NEARED_M) * seen.nearest
+    return _by_reach(seen, summed(near, seen.bearing))
+
+
+def _by_reach(seen: Seen, vectors: Floats) -> Floats:
+    """Return vectors by how long the step is: so much nearer does it end, if it goes that way."""
+    return np.asarray(_PER_M_S * seen.own_speed_m_s[:, None, None] * vectors)
+
+
+NEARING: dict[str, Weights] = {
+    "the middle": _nearing_middle,
+    "each": _nearing_each,
+    "the nearest": _nearing_nearest,
+}
+"""Of whom a step may end nearer to: vectors of a tilt, shape (step, weight, 2)."""

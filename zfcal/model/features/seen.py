@@ -49,6 +49,9 @@ class Seen:
     distance_m, off_axis_rad, speed_m_s, lately_m_s : ndarray, shape (step, other)
         Of the other: `AWAY_M` where it is not there; how far aside of the own heading; its last
         speed, and the mean over two seconds.
+    mean_speeds_m_s
+        Of a number of seconds: the mean speeds over so long of each other one, shape (step, other),
+        and of the fish itself, shape (step,). Not to be written to.
     heading, course : ndarray, shape (step, other, 2)
         Of the other: the direction of its last step, and its mean velocity over two seconds in m/s;
         zeros where that is not known.
@@ -100,6 +103,7 @@ class Seen:
     off_axis_rad: Floats
     speed_m_s: Floats
     lately_m_s: Floats
+    mean_speeds_m_s: Callable[[float], tuple[Floats, Floats]]
     heading: Floats
     course: Floats
     here: NDArray[np.bool_]
@@ -166,6 +170,22 @@ class Seen:
     def foremost(self) -> Floats:
         """One for the other one that is most straight ahead, of those before the fish."""
         return self.chosen(-self.off_axis_rad, self.here & (self.off_axis_rad < math.pi / 2))
+
+    def fastest(self, over_s: float, within_m: float, *, if_faster: bool) -> Floats:
+        """Return one for the fastest of those in view and near, else 0, shape (step, other, 1).
+
+        Parameters
+        ----------
+        over_s
+            Speeds are means over so long.
+        within_m
+            Of those within this distance.
+        if_faster
+            Whether only where it was faster than the fish itself.
+        """
+        theirs, own = self.mean_speeds_m_s(over_s)
+        among = self.here & self.in_sight & (self.distance_m < within_m)
+        return self.chosen(theirs, among & (theirs > own[:, None]) if if_faster else among)
 
     def chosen(self, values: Floats, among: NDArray[np.bool_]) -> Floats:
         """Return one for the other one of the highest value, else 0, shape (step, other, 1).
