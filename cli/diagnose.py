@@ -62,7 +62,9 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     from zfcal.api.trials import task_of
 
     from .diagnosis import diagnose_all
+    from .heaps import share_one_heap
 
+    share_one_heap()
     chosen = diagnosis_of(options)
     if chosen.out_dir is not None and (len(trials) != 1 or trials[0] == STDIN):
         raise click.UsageError("-o is for one trial: its findings would overwrite each other's.")

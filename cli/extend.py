@@ -55,6 +55,9 @@ def command(out: Output, /, trials: tuple[str, ...], **options: Any) -> None:
     from zfcal.api.extending import extend_one, extension_of
     from zfcal.api.trials import task_of
 
+    from .heaps import share_one_heap
+
+    share_one_heap()
     chosen, task = extension_of(options), task_of(options)
     _check_one(trials, options)
     out.bare = len(trials) == 1
