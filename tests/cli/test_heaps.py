@@ -1,11 +1,14 @@
 """Threads of a command take memory from one heap."""
 
+import ctypes
 import platform
 import re
 import subprocess
 import sys
 
 import pytest
+
+from zfcal_cli.heaps import share_one_heap
 
 _COUNTED = """
 import ctypes, threading
@@ -40,6 +43,15 @@ def test_threads_share_a_heap_once_they_are_told(shared):
     said = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
     heaps = re.findall(r"<heap nr=", said)
     assert (len(heaps) == 1) is shared
+
+
+def test_another_c_library_is_left_alone(monkeypatch):
+    """It has no such setting: nothing of it is opened."""
+    opened = []
+    monkeypatch.setattr(ctypes, "CDLL", opened.append)
+    monkeypatch.setattr(platform, "libc_ver", lambda: ("", ""))
+    share_one_heap()
+    assert not opened
 
 
 @pytest.mark.parametrize("command", ["diagnose", "extend"])
