@@ -234,6 +234,7 @@ def options_of(words: Sequence[str] | None = None) -> argparse.Namespace:
     add("--minutes", type=float, default=float("inf"), help="begin no trial after so long")
     add("--report", action="store_true", help="make no trial; summarise those that are there")
     add("--build", type=Path, default=BUILD, help="where finished trials are kept")
+    add("--stored", type=Path, default=RESULTS / PACKED, help="trials that were made elsewhere")
     for each in fields(Scale):
         add(f"--{each.name}", type=int, default=each.default, help="trials, see plan.py")
     return made.parse_args(words)
@@ -253,7 +254,7 @@ def main() -> None:
     desk = Desk(
         folder=options.build,
         marks={**trial.marks(SECTIONS), VIDEO: film.mark()},
-        packed=ledger.read(RESULTS / PACKED),
+        packed=ledger.read(options.stored),
     )
     deadline_s = time.monotonic() + 60 * options.minutes
     todo = [] if options.report else missing(jobs, desk, options.sections)
