@@ -611,6 +611,7 @@ def test_the_fastest_over_some_time_is_in_view_and_near(seen):
         mean_speeds_m_s={
             0.6: (np.tile([0.1, 0.2, 0.3], (N, 1)), np.linspace(0.02, 0.12, N)),
             2.0: (np.tile([0.3, 0.2, 0.1], (N, 1)), np.zeros(N)),
+            1.0: (np.tile([0.0, 0.0, 0.1], (N, 1)), np.full(N, 0.02)),
         }.__getitem__,
         in_sight=np.tile([True, True, False], (N, 1)),
         distance_m=np.tile([0.05, 0.2, 0.05], (N, 1)),
@@ -621,6 +622,43 @@ def test_the_fastest_over_some_time_is_in_view_and_near(seen):
     faster = some.fastest(0.6, 0.1, if_faster=True)[..., 0]
     np.testing.assert_array_equal(faster[:, 0], np.linspace(0.02, 0.12, N) < 0.1)
     assert not faster[:, 1:].any()
+    for over_s, if_faster in ((2.0, True), (1.0, True), (1.0, False)):  # Whose speed is not known.
+        assert not some.fastest(over_s, 0.3, if_faster=if_faster).any()
+
+
+def test_of_one_other_none_is_the_fastest(arena, seen):
+    """But it may be fast, or faster than the fish itself."""
+    pair = dataclasses.replace(
+        seen, here=np.tile([True, False, False], (N, 1)), distance_m=np.full((N, OTHERS), 0.05),
+        in_sight=np.tile([True, False, False], (N, 1)), speed_m_s=np.full((N, OTHERS), 0.1),
+    )  # fmt: skip
+    kinds = {"drawn to the fastest", "drawn to the fastest in view"}
+    asked = [
+        each
+        for feature in find_effect("leader-following").features(arena)
+        if isinstance(feature, OneOf) and (feature.kind in kinds or "over some" in feature.kind)
+        for each in feature.features
+    ]
+    conditional = [feature.label for feature in asked if feature.weights(pair).any()]
+    expected = [
+        feature.label
+        for feature in asked
+        if "faster" in feature.label or "0.07" in feature.label or "0.09" in feature.label
+    ]
+    assert conditional == expected
+
+
+def test_some_are_drawn_sharply_to_each_in_view(arena, seen):
+    """Within some distance."""
+    (sort,) = (
+        each
+        for each in find_effect("group-cohesion").features(arena)
+        if isinstance(each, OneOf) and each.kind == "drawn to each in view, sharply"
+    )
+    for feature, reach_m in zip(sort.features, (0.1, 0.25, 9.0), strict=True):
+        near = seen.in_sight & (seen.distance_m < reach_m)
+        np.testing.assert_array_equal(feature.weights(seen)[..., 0], near)
+        assert feature.kappa == 8.0
 
 
 def test_each_sort_of_the_fastest_is_asked_over_each_time(arena, seen):

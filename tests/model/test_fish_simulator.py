@@ -8,6 +8,7 @@ import shapely
 
 from zfcal.errors import InputError
 from zfcal.model.fish_simulator import Shoal
+from zfcal.model.kernels.state import LATELY, SPEED
 from zfcal.model.simulate import simulate_tracks
 
 NOBODY = np.empty((0, 3))
@@ -88,6 +89,20 @@ def test_a_robot_that_is_not_there_is_not_seen(model, two_rooms):
     np.testing.assert_array_equal(swum(alone, 50, nobody), swum(beside, 50, far))
     near = np.array([[0.225, 0.775, 0.0]])
     assert not np.array_equal(swum(alone, 300, nobody), swum(beside, 300, near))
+
+
+def test_a_robot_that_appears_has_no_speed_yet(model, two_rooms):
+    """Neither at its first step nor after a gap: then it has that of the steps it has taken."""
+    lasting = dataclasses.replace(model, effects={"turning-bias": {"strength": 0.1}})
+    shoal = Shoal(lasting, two_rooms, n_fish=2, n_robots=1, seed=8)
+    path = np.array([[[0.225, 0.775 - 0.01 * k, 0.0]] for k in range(4)])
+    nobody = np.full((1, 3), np.nan)
+    for robots in (*path, nobody, *path):
+        shoal.step(robots)
+        if robots is path[0]:
+            assert np.isnan(shoal._state[SPEED, -1])
+            assert shoal._state[LATELY, -1] == 0.0
+    assert shoal._state[[SPEED, LATELY], -1] == pytest.approx(0.01 / model.dt_s)
 
 
 def test_fish_stay_in_the_tank(model, two_rooms):

@@ -16,7 +16,7 @@ from zfcal.model.kernels.heading import apply_move
 from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, in_vectors, make_sight
-from zfcal.model.kernels.placing import place, remember, settle
+from zfcal.model.kernels.placing import forget, place, remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
 from zfcal.model.kernels.state import (
@@ -157,8 +157,11 @@ def _put(i: int, pose: Floats, state: Floats, tank: Tank) -> None:
         # So far away that nobody sees it.
         state[X, i], state[Y, i], state[ZONE, i] = _AWAY_M, _AWAY_M, 0.0
         return
-    dx, dy = pose[0] - state[X, i], pose[1] - state[Y, i]
-    state[SPEED, i] = np.sqrt(dx * dx + dy * dy) / state[DT_S, i]
+    if state[ZONE, i] > 0.0:
+        dx, dy = pose[0] - state[X, i], pose[1] - state[Y, i]
+        state[SPEED, i] = np.sqrt(dx * dx + dy * dy) / state[DT_S, i]
+    else:
+        forget(i, state)
     state[X, i], state[Y, i] = pose[0], pose[1]
     state[HX, i], state[HY, i] = np.cos(pose[2]), np.sin(pose[2])
     state[ZONE, i] = zone_of(pose[0], pose[1], tank)

@@ -15,7 +15,7 @@ from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.looking import look
 from zfcal.model.kernels.moves import draw_one
 from zfcal.model.kernels.perception import Sight, make_sight
-from zfcal.model.kernels.placing import remember, settle
+from zfcal.model.kernels.placing import forget, remember, settle
 from zfcal.model.kernels.random import seeded
 from zfcal.model.kernels.run import see_late
 from zfcal.model.kernels.state import (
@@ -24,14 +24,11 @@ from zfcal.model.kernels.state import (
     HX,
     HY,
     KIND,
-    LATELY,
     LEFT_AT_S,
-    LEFT_FROM,
     LEFT_S,
     NEVER_S,
     PAST_HX,
     PAST_HY,
-    ROOM,
     SPEED,
     STATES,
     TIME,
@@ -165,10 +162,7 @@ def _measure(state: Floats, time_s: float, found: Floats, first: int, tank: Tank
             state[X, i], state[Y, i], state[SPEED, i] = np.nan, np.nan, np.nan
             continue
         if not was_there:
-            # Whoever comes back may be another one.
-            for field in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM, LATELY):
-                state[field, i] = 0.0
-            state[LEFT_AT_S, i], state[SPEED, i] = -NEVER_S, np.nan
+            forget(i, state)
         else:
             dx, dy = x - state[X, i], y - state[Y, i]
             state[SPEED, i] = math.sqrt(dx * dx + dy * dy) / state[DT_S, i]

@@ -13,6 +13,7 @@ from zfcal.diagnose.features.asking import _absorbed, _askable, _one, fits_besid
 from zfcal.diagnose.features.curves import redrawn
 from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.law import Law
+from zfcal.diagnose.features.naming import best_by_name
 from zfcal.diagnose.screening import Screen
 from zfcal.diagnose.selection import LEVEL
 from zfcal.model.effects import find_effect
@@ -80,6 +81,18 @@ def test_what_a_redrawn_law_takes_along_is_what_it_would_work_out(law, base):
     np.testing.assert_array_equal(made.cells, anew.cells)
     np.testing.assert_array_equal(made.weight, anew.weight)
     np.testing.assert_array_equal(made.base, anew.base)
+
+
+@pytest.mark.parametrize("n_fish", [2, 3])
+def test_few_fish_drawn_sharply_to_each_in_view_follow_no_leader(screen, n_fish):
+    """The fastest in view is often the only one: that tells nothing of speeds."""
+    effects = {"group-cohesion": {"weight": 0.6, "kappa": 10.0, "each": 1.0}}
+    screened = screen(7200 + n_fish, effects, minutes=10.0, n_fish=n_fish)
+    law = Law(scene=screened.scene, fitted=screened.fitted)
+    led = find_effect("leader-following")
+    nats = {each.name: each.nats for each in best_by_name(gains_of(law, [COHESION, led]))}
+    assert nats["group-cohesion"] > 30
+    assert nats["leader-following"] < 0.7 * nats["group-cohesion"]
 
 
 def test_a_tank_without_rooms_has_nobody_leaving_them(law):

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from zfcal.diagnose.features import asking
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.fits import Fits
-from zfcal.diagnose.features.landings import leaned
+from zfcal.diagnose.features.landings import Landings, leaned
 from zfcal.diagnose.features.law import Law
 from zfcal.diagnose.features.naming import tell
 from zfcal.diagnose.looks import in_the_model
@@ -38,14 +39,33 @@ def ends_of(scene):
     return xy[:, None] + (turns.speed_m_s * scene.dt_s)[:, None, None] * ways
 
 
-@pytest.fixture(scope="module")
-def banded(base, worlds):
-    """Return a law of fish of which steps that end within 5 cm of one wall are likelier."""
-    scene, fitted = base
+def band(scene):
+    """Return a factor on steps that end within 5 cm of one wall, shape (turn, cell)."""
     inside = WALL[0] - ends_of(scene)[..., 0] < BAND_M
-    factor = np.where(inside & (ends_of(scene)[..., 1] < WALL[3]), math.exp(3.0), 1.0)
-    drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
-    return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+    return np.where(inside & (ends_of(scene)[..., 1] < WALL[3]), math.exp(3.0), 1.0)
+
+
+def off_walls(scene, factor=1e-9):
+    """Return a factor on steps that end within 25 mm of any wall, shape (turn, cell)."""
+    return np.where(scene.arena.wall_distance(ends_of(scene)) < 0.025, factor, 1.0)
+
+
+@pytest.fixture(scope="module")
+def bent(base, worlds):
+    """Return what makes the law of fish whose steps have a factor."""
+    scene, fitted = base
+
+    def make(factor):
+        drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
+        return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def banded(base, bent):
+    """Return a law of fish of which steps that end within 5 cm of one wall are likelier."""
+    return bent(band(base[0]))
 
 
 def at_wall(arena):
@@ -71,18 +91,20 @@ def test_a_band_along_a_wall_is_a_place(banded):
 
 
 @pytest.mark.slow
-def test_a_landing_that_is_asked_for_is_fitted_beside_walls_too(banded):
+def test_a_landing_that_is_asked_for_is_fitted_beside_walls_too(base, bent):
     """It promises nothing, and a clear one has all landings fitted anew."""
-    fits = Fits(law=banded, off_walls=True)
+    law = bent(band(base[0]) * off_walls(base[0], 0.7))
+    fits = Fits(law=law).beside_walls
+    assert fits.landings.walls is not None
     coupling = find_effect("speed-turn-coupling")
     idle = next(
         each
-        for each in coupling.features(banded.scene.arena)
+        for each in coupling.features(law.scene.arena)
         if isinstance(each, Landing) and not fits.may_gain(each)
     )
     clear = ("place-preference", "landing at a wall")
     kinds = {clear, (coupling.name, idle.label)}
-    found = gains_of(banded, [find_effect(clear[0]), coupling], kinds=kinds)
+    found = gains_of(law, [find_effect(clear[0]), coupling], kinds=kinds)
     gains = {each.key: each for each in found}
     assert gains[clear].nats > 20
     made = gains[coupling.name, idle.label].log_p
@@ -178,13 +200,9 @@ def test_where_nobody_lands_is_shunned(base, worlds):
 
 
 @pytest.fixture(scope="module")
-def bodies(base, worlds):
+def bodies(base, bent):
     """Return the law of fish whose middles keep 25 mm off every wall."""
-    scene, fitted = base
-    ends = ends_of(scene)
-    factor = np.where(scene.arena.wall_distance(ends) < 0.025, 1e-9, 1.0)
-    drawn = worlds.redrawn(scene, fitted, np.random.default_rng(4), lambda _angle: factor)
-    return Law(scene=drawn, fitted=maximise(drawn, fitted.parameters))
+    return bent(off_walls(base[0]))
 
 
 @pytest.mark.slow
@@ -192,23 +210,36 @@ def test_what_all_walls_have_in_common_is_no_place(bodies):
     """Each wall is shunned by itself, and no more than the others."""
     walls = at_wall(bodies.scene.arena)
     alone = Fits(law=bodies).gain("place-preference", walls)
-    beside = Fits(law=bodies, off_walls=True).gain("place-preference", walls)
+    beside = Fits(law=bodies).beside_walls.gain("place-preference", walls)
     assert alone.nats > 10
     assert beside.nats < 2
 
 
 @pytest.mark.slow
-def test_beside_walls_all_but_landings_is_kept(banded):
+def test_beside_walls_all_but_landings_is_kept(bodies):
     """What else was fitted is not fitted once more, and landings are as if they had been asked."""
-    fits = Fits(law=banded)
-    beside, anew = fits.beside_walls, Fits(law=banded, off_walls=True)
-    assert beside._null is fits._null
-    assert beside._own is fits._own
-    spot = find_effect("place-preference").features(banded.scene.arena)[-1].features[0]
-    np.testing.assert_array_equal(
-        beside.gain("place-preference", spot).log_p, anew.gain("place-preference", spot).log_p
-    )
+    fits, anew = Fits(law=bodies), Landings(law=bodies).beyond_walls()
+    beside = fits.beside_walls
+    assert beside is not fits
+    for kept in ("_null", "_own"):
+        assert getattr(beside, kept) is getattr(fits, kept)
+    assert beside.landings._ends is fits.landings._ends
+    spot = find_effect("place-preference").features(bodies.scene.arena)[-1].features[0]
+    np.testing.assert_array_equal(beside.gain("place-preference", spot).log_p, anew.fit(spot).log_p)
     assert fits.beside_walls is beside
+    assert "_few" not in beside.__dict__
+    choice = find_effect("place-preference").features(bodies.scene.arena)[-1]
+    asking._off_walls(fits, [("place-preference", choice)], [], lambda *_: (), fit_all=True)
+    assert "_few" in beside.__dict__  # Worked out before threads ask for it side by side.
+
+
+def test_walls_that_gain_nothing_are_nothing_to_be_beside(nothing, monkeypatch):
+    """Then no landing is fitted again."""
+    assert nothing.beside_walls is nothing
+    found = [("a feature", "its gain")]
+    asked = [("place-preference", at_wall(nothing.law.scene.arena))]
+    monkeypatch.setattr(asking, "_gains", None)
+    assert asking._off_walls(nothing, asked, found, map, fit_all=True) == found
 
 
 @pytest.mark.slow
@@ -222,7 +253,7 @@ def test_a_band_along_one_wall_is_more_than_all_have(banded):
     """It is not taken for what they have in common."""
     walls = at_wall(banded.scene.arena)
     alone = Fits(law=banded).gain("place-preference", walls).log_p.sum()
-    beside = Fits(law=banded, off_walls=True).gain("place-preference", walls).log_p.sum()
+    beside = Fits(law=banded).beside_walls.gain("place-preference", walls).log_p.sum()
     assert beside > 0.7 * alone
 
 

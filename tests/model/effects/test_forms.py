@@ -256,6 +256,18 @@ def test_who_was_the_fastest_lately_can_be_followed(ask):
     assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
 
 
+def test_who_has_no_mean_speed_yet_neither_leads_nor_follows_the_faster(ask):
+    """A mean of 0 is one that is not known."""
+    given = {"strength": 1.0, "fastest": 1.0, "lately": 1.0}
+    asked = ask("leader-following", given, SPEED=[0.1, 0.1, 0.1], LATELY=[0.3, 0.0, 0.0])
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, 1.0])
+    given = {"strength": 1.0, "drawn": 1.0, "lately": 1.0, "reach_m": 2.0}
+    rows = {"X": [0.0, 0.1, 0.0], "Y": [0.0, 0.0, 0.05], "SPEED": [0.1, 0.1, 0.1]}
+    for own, weight in ((0.0, 0.0), (0.01, 0.1)):
+        asked = ask("leader-following", given, **rows, LATELY=[own, 0.2, 0.1])
+        assert asked.component()[0] == pytest.approx(weight)
+
+
 def test_some_headings_can_be_drawn_to_one_fish(ask):
     """Whatever its speed; nobody is drawn to oneself."""
     rows = {"X": [0.0, 0.1, 0.0], "Y": [0.0, 0.0, 0.05], "SPEED": [0.3, 0.1, 0.05]}

@@ -109,8 +109,11 @@ def _off_walls(
         Maps a function over them.
     """
     beside = fits.beside_walls
+    if beside is fits:
+        return list(found)
     landings = [pair for pair in asked if _is_landing(pair[1])]
     others = [pair for pair in found if not isinstance(pair[0], Landing)]
+    beside.prepare([feature for _, feature in landings])
     made = each(lambda pair: _gains(beside, *pair, fit_all=fit_all), landings)
     return others + [pair for pairs in made for pair in pairs]
 

@@ -85,14 +85,11 @@ class Fits:
     beyond : ndarray, shape (step,), optional
         Log densities that are to be gained over, where the base alone has higher ones by another
         law: that of noisy positions, say.
-    off_walls
-        Whether landings are beside what all walls have in common.
     """
 
     law: Law
     also: tuple[Mixed, ...] = ()
     beyond: Floats | None = None
-    off_walls: bool = False
 
     @cached_property
     def _own(self) -> tuple[list[Columns], list[Bounds]]:
@@ -214,15 +211,17 @@ class Fits:
     @cached_property
     def landings(self) -> Landings:
         """Fits of features of landing."""
-        made = Landings(law=self.law)
-        return made.beyond_walls() if self.off_walls else made
+        return Landings(law=self.law)
 
     @cached_property
     def beside_walls(self) -> Fits:
-        """These, but that landings are beside what all walls have in common."""
-        made = replace(self, off_walls=True)
+        """These with landings beside what all walls have in common, or themselves without that."""
+        landings = self.landings.beyond_walls()
+        if landings is self.landings:
+            return self
+        made = replace(self)
         kept = ("_own", "_null", "_at_null", "_untilted")
-        made.__dict__.update({name: getattr(self, name) for name in kept})
+        made.__dict__.update({name: getattr(self, name) for name in kept}, landings=landings)
         return made
 
     def refitted(self, feature: Tilt, gain: Gain) -> Gain:

@@ -101,7 +101,9 @@ class Landings:
         fit = self.fit(walls)
         if chdtrc(len(fit.strengths), 2 * max(float(fit.log_p.sum()), 0.0)) > LEVEL:
             return self
-        return replace(self, walls=self.bent(walls, fit))
+        made = replace(self, walls=self.bent(walls, fit))
+        made.__dict__.update(_ends=self._ends, _places=self._places)
+        return made
 
     @cached_property
     def _cells(self) -> Floats:

@@ -36,7 +36,7 @@ from zfcal.model.effects.weights import (
     summed,
     turning_as_a_whole,
 )
-from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned
+from zfcal.model.features import Along, Component, Feature, OneOf, Seen, Tilt, Turned, Weights
 from zfcal.model.kernels.compiled import hook, inlined
 from zfcal.model.kernels.hats import hats_where
 from zfcal.model.kernels.hooks import COMPONENT, FACTOR, ROTATION
@@ -144,6 +144,7 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
+_IN_VIEW_M = (0.1, 0.25, 9.0)
 _Some: TypeAlias = Callable[[Seen], NDArray[np.bool_]]
 
 _SOME: dict[str, _Some] = {
@@ -199,6 +200,12 @@ def _of_each(seen: Seen) -> Floats:
 
 def _of_each_seen(seen: Seen) -> Floats:
     return _of_each(seen) * seen.in_sight[..., None]
+
+
+def _in_view(reach_m: float) -> Weights:
+    return lambda seen: np.asarray(
+        seen.here & seen.in_sight & (seen.distance_m < reach_m), dtype=np.float64
+    )[..., None]
 
 
 def _of_nearest(seen: Seen) -> Floats:
@@ -260,6 +267,16 @@ _FEATURES: tuple[Feature, ...] = (
         features=tuple(
             Tilt(label=f"ending nearer to {whom}", vectors=vectors, low=0.0)
             for whom, vectors in NEARING.items()
+        ),
+    ),
+    OneOf(
+        kind="drawn to each in view, sharply",
+        features=tuple(
+            Component(
+                label=f"drawn to each in view within {reach_m:g} m, sharply", toward="bearing",
+                weights=_in_view(reach_m), kappa=8.0,
+            )
+            for reach_m in _IN_VIEW_M
         ),
     ),
     OneOf(kind="drawn to some", features=tuple(_drawn_to(*each) for each in _SOME.items())),

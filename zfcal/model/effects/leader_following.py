@@ -25,6 +25,7 @@ from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import HX, HY, LATELY, SPEED, ZONE, X, Y
 
 _PER_STRENGTH = 0.1
+_KNOWN = 1e-12  # A mean of 0 is one that is not known.
 
 
 @inlined
@@ -51,7 +52,8 @@ def fastest_in_view(state: Hooked, sight: Hooked, n: int, i: int) -> int:
 @inlined
 def faster_lately(state: Hooked, sight: Hooked, n: int, i: int, reach_m: float) -> int:
     """Return the fastest in view and within reach, of those that lately were faster; or -1."""
-    found, most = -1, state[LATELY * n + i]
+    own = state[LATELY * n + i]
+    found, most = -1, own if own > 0.0 else math.inf  # Unknown, when it has just come into sight.
     for j in range(n):
         is_near = sight[i * n + j] > 0.0 and apart(state, n, i, j) < reach_m
         if is_near and state[LATELY * n + j] > most:
@@ -103,7 +105,8 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
         row = LATELY if parameters[7] > 0.0 else SPEED
-        if not state[row * n + j] >= 0.0:  # Of unknown speed: it has just come into sight.
+        least = _KNOWN if row == LATELY else 0.0
+        if not state[row * n + j] >= least:  # Of unknown speed: it has just come into sight.
             return 1.0
         for k in range(n):
             if sight[i * n + k] > 0.0 and state[row * n + k] > state[row * n + j]:
@@ -153,7 +156,8 @@ def _going_its_way(seen: Seen) -> Floats:
 def _fast_in_view(least_m_s: float) -> Weights:
     """Return one for the fastest other one in view, if it is faster than that."""
     return lambda seen: seen.chosen(
-        seen.speed_m_s, seen.in_sight & seen.here & (seen.speed_m_s > least_m_s)
+        seen.speed_m_s,
+        seen.in_sight & (seen.speed_m_s > least_m_s) & (seen.has_rival | (least_m_s > 0)),
     )
 
 
@@ -183,7 +187,7 @@ def _within(reach_m: float) -> Weights:
 
     def weights(seen: Seen) -> Floats:
         near = seen.here & (seen.distance_m < reach_m) & (seen.speed_m_s >= 0)
-        return seen.chosen(seen.speed_m_s, near)
+        return seen.chosen(seen.speed_m_s, near & seen.has_rival)
 
     return weights
 

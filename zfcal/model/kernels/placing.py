@@ -53,6 +53,14 @@ def settle(i: int, state: Floats, tank: Tank) -> None:
     state[CLEAR, i] = clearance(state[X, i], state[Y, i], tank)
 
 
+@inlined
+def forget(i: int, state: Floats) -> None:
+    """Drop what is known of an agent's past: whoever comes back may be another one."""
+    for row in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM, LATELY):
+        state[row, i] = 0.0
+    state[LEFT_AT_S, i], state[SPEED, i] = -NEVER_S, math.nan
+
+
 @kernel
 def place(state: Floats, tank: Tank, individuals: Floats, random: NDArray[np.uint64]) -> None:
     """Put all agents at uniform places inside, with uniform headings.

@@ -10,20 +10,17 @@ from zfcal.arrays import Floats, Ints
 from zfcal.model.kernels.compiled import inlined, kernel
 from zfcal.model.kernels.geometry import Tank, zone_of
 from zfcal.model.kernels.perception import REPULSION_M, make_sight, see
-from zfcal.model.kernels.placing import remember, settle
+from zfcal.model.kernels.placing import forget, remember, settle
 from zfcal.model.kernels.state import (
     DT_S,
     HX,
     HY,
     KIND,
-    LATELY,
     LEFT_AT_S,
-    LEFT_FROM,
     LEFT_S,
     NEVER_S,
     PAST_HX,
     PAST_HY,
-    ROOM,
     SPEED,
     STATES,
     TIME,
@@ -76,10 +73,7 @@ def fill_states(
                     state[PAST_HX, i], state[PAST_HY, i] = state[HX, i], state[HY, i]
                     state[HX, i], state[HY, i] = dx / length, dy / length
             elif zone > 0:
-                # Whoever comes back may be another one.
-                for row in (HX, HY, PAST_HX, PAST_HY, ROOM, LEFT_FROM, LATELY):
-                    state[row, i] = 0.0
-                state[LEFT_AT_S, i] = -NEVER_S
+                forget(i, state)
             state[SPEED, i] = length / clock[1]
             state[ZONE, i] = zone
             if zone > 0:
