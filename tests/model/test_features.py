@@ -626,6 +626,24 @@ def test_the_fastest_over_some_time_is_in_view_and_near(seen):
         assert not some.fastest(over_s, 0.3, if_faster=if_faster).any()
 
 
+def test_a_current_may_lean_more_across_walls_than_along(arena, seen):
+    """The axes of the tank, and what of each is across the wall; off the walls nothing more."""
+    feature = labelled("directional-drift", "leaning, more across walls", arena)
+    vectors = feature.vectors(seen)
+    axes, across = vectors[:, :2], vectors[:, 2:]
+    np.testing.assert_array_equal(
+        axes, labelled("directional-drift", "leaning", arena).vectors(seen)
+    )
+    wall = seen.follows_walls
+    assert not across[~wall].any()
+    np.testing.assert_allclose(
+        (across[wall] * seen.along_wall[wall, None]).sum(axis=2), 0, atol=1e-9
+    )
+    aside = np.stack([-seen.along_wall[:, 1], seen.along_wall[:, 0]], axis=1)
+    expected = (axes * aside[:, None]).sum(axis=2)[wall]
+    np.testing.assert_allclose((across * aside[:, None]).sum(axis=2)[wall], expected)
+
+
 def test_of_one_other_none_is_the_fastest(arena, seen):
     """But it may be fast, or faster than the fish itself."""
     pair = dataclasses.replace(

@@ -170,6 +170,18 @@ def _both_ways(angle_rad: float) -> Component:
     )
 
 
+def _and_across_walls(seen: Seen) -> Floats:
+    """Return the axes, and what of them is across the wall that a fish follows.
+
+    A current carries both ways along a wall to the same side: there headings lean across it by more
+    than they prefer one of these ways. Who prefers a direction does both alike.
+    """
+    axes, wall = _axes(seen), seen.along_wall[:, None]
+    along = (axes * wall).sum(axis=-1, keepdims=True) * wall
+    across = np.where(seen.follows_walls[:, None, None], axes - along, 0.0)
+    return np.concatenate([axes, across], axis=1)
+
+
 def _axes_off_the_walls(seen: Seen) -> Floats:
     return np.asarray((~seen.follows_walls)[:, None, None] * _axes(seen))
 
@@ -207,6 +219,7 @@ _FEATURES: tuple[Feature, ...] = (
     Turned(label="turning", by=_aside, neighbours=False),
     *turning_as_a_whole(partial(_aside, along_walls=True)),
     Tilt(label="carried", vectors=_carried),
+    Tilt(label="leaning, more across walls", vectors=_and_across_walls),
 )
 
 
