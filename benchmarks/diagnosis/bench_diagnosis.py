@@ -234,7 +234,8 @@ def options_of(words: Sequence[str] | None = None) -> argparse.Namespace:
     add("--minutes", type=float, default=float("inf"), help="begin no trial after so long")
     add("--report", action="store_true", help="make no trial; summarise those that are there")
     add("--build", type=Path, default=BUILD, help="where finished trials are kept")
-    add("--stored", type=Path, default=RESULTS / PACKED, help="trials that were made elsewhere")
+    says = "packed trials that count as well, in place of those stored with the results"
+    add("--stored", type=Path, default=RESULTS / PACKED, metavar="FILE", help=says)
     for each in fields(Scale):
         add(f"--{each.name}", type=int, default=each.default, help="trials, see plan.py")
     return made.parse_args(words)
@@ -249,6 +250,8 @@ def main() -> None:
     from hidden.effects import LISTED, UNLISTED
     from hidden.further import FURTHER
 
+    if not options.stored.exists():
+        sys.exit(f"--stored {options.stored}: there is no such file.")
     scale = Scale(**{each.name: getattr(options, each.name) for each in fields(Scale)})
     jobs = plan(scale, LISTED, UNLISTED, tuple(FURTHER), quick=options.quick)
     desk = Desk(

@@ -73,7 +73,8 @@ def test_a_trial_is_hidden_diagnosed_kept_and_told(command, ledger, tmp_path):
     """The document counts what is begun in six seconds, and no trial of other code beside it."""
     build, out = tmp_path / "build", tmp_path / "out"
     least = ("--quick", "--sections", "lengths", "--few", "1", "--minutes", "0.1")
-    places = ("--build", build, "--stored", tmp_path / "none", "--out", out)
+    (tmp_path / "none.jsonl").touch()
+    places = ("--build", build, "--stored", tmp_path / "none.jsonl", "--out", out)
     command("diagnosis/bench_diagnosis.py", *least, "--workers", "1", *places)
 
     rows = ledger.read(build / "lengths.jsonl")

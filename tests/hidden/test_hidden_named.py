@@ -1,4 +1,4 @@
-"""A look at speeds by features: names forms that are not ours, and nothing where nothing is."""
+"""A look by features: names forms that are not ours, and nothing where nothing is."""
 
 from pathlib import Path
 
@@ -63,6 +63,12 @@ def test_a_form_that_is_not_ours_is_named_once(found, form, strength, minutes):
     assert told.verdict is Verdict.NAMED
     assert [each.name for each in told.effects] == [form.split("/")[0]]
     assert find_effect(form.split("/")[0]).paces
+
+
+def test_a_strong_current_is_no_place(found):
+    """It leans headings across walls by more than along them (151 nats for the best place)."""
+    told = found("directional-drift", "strong", 4, 10.0)
+    assert [each.name for each in told.effects] == ["directional-drift"]
 
 
 @pytest.mark.parametrize("form", ["startle", "lit-room"])

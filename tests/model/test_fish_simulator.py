@@ -97,12 +97,22 @@ def test_a_robot_that_appears_has_no_speed_yet(model, two_rooms):
     shoal = Shoal(lasting, two_rooms, n_fish=2, n_robots=1, seed=8)
     path = np.array([[[0.225, 0.775 - 0.01 * k, 0.0]] for k in range(4)])
     nobody = np.full((1, 3), np.nan)
-    for robots in (*path, nobody, *path):
-        shoal.step(robots)
-        if robots is path[0]:
-            assert np.isnan(shoal._state[SPEED, -1])
-            assert shoal._state[LATELY, -1] == 0.0
-    assert shoal._state[[SPEED, LATELY], -1] == pytest.approx(0.01 / model.dt_s)
+    for _ in range(2):
+        shoal.step(path[0])
+        assert np.isnan(shoal._state[SPEED, -1])
+        assert shoal._state[LATELY, -1] == 0.0
+        for robot in path[1:]:
+            shoal.step(robot)
+        assert shoal._state[[SPEED, LATELY], -1] == pytest.approx(0.01 / model.dt_s)
+        shoal.step(nobody)
+
+
+def test_a_robot_that_brushes_a_wall_keeps_its_speed(model, two_rooms):
+    """Its middle is outside for a step: it is seen there, and was not away."""
+    shoal = Shoal(model, two_rooms, n_fish=2, n_robots=1, seed=8)
+    for x_m in (0.94, 0.945, 0.955, 0.945):
+        shoal.step(np.array([[x_m, 0.2, 0.0]]))
+    assert shoal._state[SPEED, -1] == pytest.approx(0.01 / model.dt_s)
 
 
 def test_fish_stay_in_the_tank(model, two_rooms):

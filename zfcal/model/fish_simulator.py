@@ -157,7 +157,7 @@ def _put(i: int, pose: Floats, state: Floats, tank: Tank) -> None:
         # So far away that nobody sees it.
         state[X, i], state[Y, i], state[ZONE, i] = _AWAY_M, _AWAY_M, 0.0
         return
-    if state[ZONE, i] > 0.0:
+    if state[X, i] < _AWAY_M:
         dx, dy = pose[0] - state[X, i], pose[1] - state[Y, i]
         state[SPEED, i] = np.sqrt(dx * dx + dy * dy) / state[DT_S, i]
     else:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from zfcal.diagnose.features import asking
+from zfcal.diagnose.features import asking, curves
 from zfcal.diagnose.features.asking import fits_beside, gains_of
 from zfcal.diagnose.features.fits import Fits
 from zfcal.diagnose.features.landings import Landings, leaned
@@ -231,6 +231,15 @@ def test_beside_walls_all_but_landings_is_kept(bodies):
     choice = find_effect("place-preference").features(bodies.scene.arena)[-1]
     asking._off_walls(fits, [("place-preference", choice)], [], lambda *_: (), fit_all=True)
     assert "_few" in beside.__dict__  # Worked out before threads ask for it side by side.
+
+
+@pytest.mark.slow
+def test_the_curve_of_a_form_is_beside_walls_too(bodies, monkeypatch):
+    """Both curves of one picture are."""
+    walls, beside = at_wall(bodies.scene.arena), Fits(law=bodies).beside_walls
+    monkeypatch.setattr(curves, "redrawn", lambda law, *_: law)
+    found = curves._of_the_form(beside, walls, None)
+    np.testing.assert_array_equal(found, beside.fit(walls).strengths)
 
 
 def test_walls_that_gain_nothing_are_nothing_to_be_beside(nothing, monkeypatch):

@@ -220,6 +220,12 @@ def test_nobody_of_unknown_speed_is_the_fastest(ask):
     assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.e])
 
 
+def test_who_has_no_speed_yet_is_as_fast_as_most(ask):
+    """Neither slow, as one that stands, nor fast."""
+    asked = ask("leader-following", {"strength": 1.0}, SPEED=[0.1, math.nan, 0.02])
+    assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, math.exp(-1)])
+
+
 def test_some_headings_can_be_drawn_to_the_fastest_within_reach(ask):
     """The one at 0.2 m is faster still and too far: 0.1 about the bearing of that at 0.1 m."""
     rows = {"X": [0.0, 0.1, 0.0, 0.2], "Y": [0.0, 0.0, 0.05, 0.0], "SPEED": [0.3, 0.1, 0.05, 0.2]}
@@ -257,7 +263,7 @@ def test_who_was_the_fastest_lately_can_be_followed(ask):
 
 
 def test_who_has_no_mean_speed_yet_neither_leads_nor_follows_the_faster(ask):
-    """A mean of 0 is one that is not known."""
+    """A mean of 0 is that of who has just come, or has not moved since."""
     given = {"strength": 1.0, "fastest": 1.0, "lately": 1.0}
     asked = ask("leader-following", given, SPEED=[0.1, 0.1, 0.1], LATELY=[0.3, 0.0, 0.0])
     assert [asked.sight_of(j) for j in (1, 2)] == pytest.approx([1.0, 1.0])

@@ -213,12 +213,19 @@ class Fits:
         """Fits of features of landing."""
         return Landings(law=self.law)
 
-    @cached_property
+    @property
     def beside_walls(self) -> Fits:
-        """These with landings beside what all walls have in common, or themselves without that."""
+        """These with landings beside what all walls have in common, or themselves without that.
+
+        `dataclasses.replace` of them has landings as they are.
+        """
+        return self if self._off_walls is None else self._off_walls
+
+    @cached_property
+    def _off_walls(self) -> Fits | None:
         landings = self.landings.beyond_walls()
         if landings is self.landings:
-            return self
+            return None
         made = replace(self)
         kept = ("_own", "_null", "_at_null", "_untilted")
         made.__dict__.update({name: getattr(self, name) for name in kept}, landings=landings)

@@ -160,7 +160,9 @@ def log_speed(speed_m_s: float, usual_m_s: float) -> float:
 
 @inlined
 def quickness(speed_m_s: float) -> float:
-    """Return how far a speed is from 0.07 m/s, in units of 0.05 m/s, in [-1.4, 2]."""
+    """Return how far a speed is from 0.07 m/s, in units of 0.05 m/s, in [-1.4, 2]; 0 if unknown."""
+    if not speed_m_s >= 0.0:
+        return 0.0
     return cut((speed_m_s - SPEED_M_S) / 0.05, -1.4, 2.0)
 
 

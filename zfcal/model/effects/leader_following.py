@@ -25,7 +25,7 @@ from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import HX, HY, LATELY, SPEED, ZONE, X, Y
 
 _PER_STRENGTH = 0.1
-_KNOWN = 1e-12  # A mean of 0 is one that is not known.
+_KNOWN = 1e-12  # A mean of 0 is that of who has just come, or has not moved since.
 
 
 @inlined
@@ -53,7 +53,7 @@ def fastest_in_view(state: Hooked, sight: Hooked, n: int, i: int) -> int:
 def faster_lately(state: Hooked, sight: Hooked, n: int, i: int, reach_m: float) -> int:
     """Return the fastest in view and within reach, of those that lately were faster; or -1."""
     own = state[LATELY * n + i]
-    found, most = -1, own if own > 0.0 else math.inf  # Unknown, when it has just come into sight.
+    found, most = -1, own if own >= _KNOWN else math.inf  # It has just come into sight.
     for j in range(n):
         is_near = sight[i * n + j] > 0.0 and apart(state, n, i, j) < reach_m
         if is_near and state[LATELY * n + j] > most:
@@ -157,7 +157,7 @@ def _fast_in_view(least_m_s: float) -> Weights:
     """Return one for the fastest other one in view, if it is faster than that."""
     return lambda seen: seen.chosen(
         seen.speed_m_s,
-        seen.in_sight & (seen.speed_m_s > least_m_s) & (seen.has_rival | (least_m_s > 0)),
+        seen.in_sight & (seen.speed_m_s > least_m_s) & (seen.has_rivals or least_m_s > 0),
     )
 
 
@@ -187,7 +187,7 @@ def _within(reach_m: float) -> Weights:
 
     def weights(seen: Seen) -> Floats:
         near = seen.here & (seen.distance_m < reach_m) & (seen.speed_m_s >= 0)
-        return seen.chosen(seen.speed_m_s, near & seen.has_rival)
+        return seen.chosen(seen.speed_m_s, near & seen.has_rivals)
 
     return weights
 

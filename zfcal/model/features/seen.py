@@ -174,8 +174,6 @@ class Seen:
     def fastest(self, over_s: float, within_m: float, *, if_faster: bool) -> Floats:
         """Return one for the fastest of those in view and near, else 0, shape (step, other, 1).
 
-        Of those of unknown speed none is.
-
         Parameters
         ----------
         over_s
@@ -183,18 +181,18 @@ class Seen:
         within_m
             Of those within this distance.
         if_faster
-            Whether only where it was faster than the fish itself; else where there are others to
-            be faster than.
+            Whether only where it was faster than the fish itself; else nobody is, where there
+            is never more than one other.
         """
         theirs, own = self.mean_speeds_m_s(over_s)
-        among = self.here & self.in_sight & (self.distance_m < within_m) & (theirs > 0)
-        is_rival = (own[:, None] > 0) & (theirs > own[:, None]) if if_faster else self.has_rival
-        return self.chosen(theirs, among & is_rival)
+        among = self.here & self.in_sight & (self.distance_m < within_m)
+        some = theirs > own[:, None] if if_faster else self.has_rivals
+        return self.chosen(theirs, among & some)
 
     @property
-    def has_rival(self) -> NDArray[np.bool_]:
-        """Whether two others are there: of one nothing is the most. Shape (step, 1)."""
-        return np.asarray(self.here.sum(axis=1, keepdims=True) > 1)
+    def has_rivals(self) -> bool:
+        """Whether there are ever two others, of whom one may be the fastest."""
+        return bool((self.here.sum(axis=1) > 1).any())
 
     def chosen(self, values: Floats, among: NDArray[np.bool_]) -> Floats:
         """Return one for the other one of the highest value, else 0, shape (step, other, 1).
