@@ -106,10 +106,8 @@ class _Knots:
 def _of_the_form(fits: Fits, feature: Single, with_it: Screen) -> Floats:
     """Return the strengths where headings are drawn from the model with the effect, their mean."""
     random = np.random.default_rng([fits.law.seed, 11])
-    made = [replace(fits, law=redrawn(fits.law, with_it, random)) for _ in range(_REDRAWN)]
-    if isinstance(feature, Landing):
-        made = [each.beside_walls for each in made]
-    return np.mean([each.fit(feature).strengths for each in made], axis=0)
+    laws = [redrawn(fits.law, with_it, random) for _ in range(_REDRAWN)]
+    return np.mean([replace(fits, law=law).fit(feature).strengths for law in laws], axis=0)
 
 
 def redrawn(law: Law, screen: Screen, random: np.random.Generator) -> Law:

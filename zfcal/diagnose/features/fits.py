@@ -85,11 +85,14 @@ class Fits:
     beyond : ndarray, shape (step,), optional
         Log densities that are to be gained over, where the base alone has higher ones by another
         law: that of noisy positions, say.
+    off_walls
+        Whether landings are beside what all walls have in common: see `beside_walls`.
     """
 
     law: Law
     also: tuple[Mixed, ...] = ()
     beyond: Floats | None = None
+    off_walls: bool = False
 
     @cached_property
     def _own(self) -> tuple[list[Columns], list[Bounds]]:
@@ -211,22 +214,20 @@ class Fits:
     @cached_property
     def landings(self) -> Landings:
         """Fits of features of landing."""
-        return Landings(law=self.law)
+        made = Landings(law=self.law)
+        return made.beyond_walls() if self.off_walls else made
 
     @property
     def beside_walls(self) -> Fits:
-        """These with landings beside what all walls have in common, or themselves without that.
-
-        `dataclasses.replace` of them has landings as they are.
-        """
-        return self if self._off_walls is None else self._off_walls
+        """These with landings beside what all walls have in common, or themselves without that."""
+        return self if self._further is None else self._further
 
     @cached_property
-    def _off_walls(self) -> Fits | None:
+    def _further(self) -> Fits | None:
         landings = self.landings.beyond_walls()
         if landings is self.landings:
             return None
-        made = replace(self)
+        made = replace(self, off_walls=True)
         kept = ("_own", "_null", "_at_null", "_untilted")
         made.__dict__.update({name: getattr(self, name) for name in kept}, landings=landings)
         return made
