@@ -171,7 +171,7 @@ def _both_ways(angle_rad: float) -> Component:
 
 
 def _and_across_walls(seen: Seen) -> Floats:
-    """Return the axes, and what of them is across the wall that a fish follows.
+    """Return the axes, and what of them is across the wall a fish follows, shape (step, 4, 2).
 
     A current carries both ways along a wall to the same side: there headings lean across it by more
     than they prefer one of these ways. Who prefers a direction does both alike.

@@ -25,7 +25,9 @@ from zfcal.model.effects.forms import (
     turn_to,
 )
 from zfcal.model.effects.weights import (
+    IN_VIEW_M,
     NEARING,
+    SHARP,
     aside_of,
     every_step,
     halfway,
@@ -144,7 +146,6 @@ def whole_rotation(state, sight, n, i, parameters):  # type: ignore[no-untyped-d
 
 
 _KNOTS_M = (0.0, 0.05, 0.1, 0.2, 0.4)
-_IN_VIEW_M = (0.1, 0.25, 9.0)
 _Some: TypeAlias = Callable[[Seen], NDArray[np.bool_]]
 
 _SOME: dict[str, _Some] = {
@@ -274,9 +275,9 @@ _FEATURES: tuple[Feature, ...] = (
         features=tuple(
             Component(
                 label=f"drawn to each in view within {reach_m:g} m, sharply", toward="bearing",
-                weights=_in_view(reach_m), kappa=8.0,
+                weights=_in_view(reach_m), kappa=SHARP,
             )
-            for reach_m in _IN_VIEW_M
+            for reach_m in IN_VIEW_M
         ),
     ),
     OneOf(kind="drawn to some", features=tuple(_drawn_to(*each) for each in _SOME.items())),

@@ -14,6 +14,8 @@ from zfcal.model.effects.circumstances import by_circumstances
 from zfcal.model.effects.forms import Hooked, apart, needs_neighbour, quickness
 from zfcal.model.effects.weights import (
     ATTENTION,
+    IN_VIEW_M,
+    SHARP,
     factor_on_attention,
     precision_of_attention,
     summed,
@@ -25,7 +27,7 @@ from zfcal.model.kernels.hooks import COMPONENT, SIGHT
 from zfcal.model.kernels.state import HX, HY, LATELY, SPEED, ZONE, X, Y
 
 _PER_STRENGTH = 0.1
-_KNOWN = 1e-12  # A mean of 0 is that of who has just come, or has not moved since.
+_KNOWN_M_S = 1e-12  # A mean of 0 is that of who has just come, or has not moved since.
 
 
 @inlined
@@ -53,7 +55,7 @@ def fastest_in_view(state: Hooked, sight: Hooked, n: int, i: int) -> int:
 def faster_lately(state: Hooked, sight: Hooked, n: int, i: int, reach_m: float) -> int:
     """Return the fastest in view and within reach, of those that lately were faster; or -1."""
     own = state[LATELY * n + i]
-    found, most = -1, own if own >= _KNOWN else math.inf  # It has just come into sight.
+    found, most = -1, own if own >= _KNOWN_M_S else math.inf  # It has just come into sight.
     for j in range(n):
         is_near = sight[i * n + j] > 0.0 and apart(state, n, i, j) < reach_m
         if is_near and state[LATELY * n + j] > most:
@@ -105,7 +107,7 @@ def sight(state, sight, n, i, parameters, j):  # type: ignore[no-untyped-def]
         return math.exp(parameters[0]) if j == int(parameters[2]) else 1.0
     if parameters[1] > 0.0:
         row = LATELY if parameters[7] > 0.0 else SPEED
-        least = _KNOWN if row == LATELY else 0.0
+        least = _KNOWN_M_S if row == LATELY else 0.0
         if not state[row * n + j] >= least:  # Of unknown speed: it has just come into sight.
             return 1.0
         for k in range(n):
@@ -216,17 +218,12 @@ def _over_time(
 
 _DRAWN, _LEANING = "drawn to the fastest", "leaning to the fastest"
 _OVER_S = (0.2, 0.6, 1.0, 2.0)
-_IN_VIEW_M = (0.1, 0.25, 9.0)
 _REACH_M = (0.1, 0.2, 9.0)
 _FAST_M_S = (0.0, 0.07, 0.09, 0.11)
 
 
-def _attended(label: str, weights: Weights) -> Component:
-    return factor_on_attention(weights, label=label)
-
-
 def _drawn(label: str, weights: Weights) -> Component:
-    return Component(label=label, toward="bearing", weights=weights, kappa=8.0)
+    return Component(label=label, toward="bearing", weights=weights, kappa=SHARP)
 
 
 def _near(seen: Seen) -> Floats:
@@ -284,8 +281,11 @@ _FEATURES: tuple[Feature, ...] = (
             for reach_m in _REACH_M
         ),
     ),
-    _over_time("heeding the fastest of", _IN_VIEW_M[-1:], _attended),
-    _over_time("drawn to the fastest of", _IN_VIEW_M, _drawn),
+    _over_time(
+        "heeding the fastest of", IN_VIEW_M[-1:],
+        lambda label, weights: factor_on_attention(weights, label=label),
+    ),
+    _over_time("drawn to the fastest of", IN_VIEW_M, _drawn),
     OneOf(
         kind=_LEANING,
         features=tuple(

@@ -24,6 +24,10 @@ _AGREEMENTS = (0.5, 0.7, 0.85, 1.0)
 _NEARED_M = (0.05, 0.15)
 """Between those that are near already, and those that may be neared."""
 
+IN_VIEW_M, SHARP = (0.1, 0.25, 9.0), 8.0
+"""Distances within which those in view draw headings sharply, and how concentrated these are about
+them: to be drawn to the fastest is held against to be drawn to each."""
+
 _PER_M_S = 10.0
 """A step at 0.1 m/s counts as one."""
 
