@@ -89,6 +89,14 @@ def test_a_trial_is_hidden_diagnosed_kept_and_told(command, ledger, tmp_path):
     assert (out / "pictures" / "diagnosis-confusion-quick.png").stat().st_size > 5000
 
 
+def test_stored_trials_that_are_not_there_are_refused(bench, monkeypatch, tmp_path):
+    """Else what is written in their place would hold fewer."""
+    place = tmp_path / "none.jsonl.gz"
+    monkeypatch.setattr("sys.argv", ["bench", "--report", "--stored", str(place)])
+    with pytest.raises(SystemExit, match="there is no such file"):
+        bench.main()
+
+
 @pytest.mark.slow
 def test_a_trial_through_video_is_tracked(script, planned):
     """Its positions are the tracker's: they err, where those of the table do not."""
